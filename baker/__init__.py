@@ -1,0 +1,1 @@
+"""Baker: radiosity lightmaps and ambient occlusion for game assets."""

@@ -1,0 +1,1 @@
+"""Data and checks that everything shares; knows nothing above it."""

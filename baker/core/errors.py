@@ -1,0 +1,62 @@
+"""Errors that `baker` raises: one base, four children, each a sentence for a person.
+
+A message says what was found, in which file and object, and what to do about it.
+"""
+
+from __future__ import annotations
+
+
+class BakerError(Exception):
+    """Is the base of every error that baker raises on purpose.
+
+    Parameters
+    ----------
+    message : str
+        One sentence: what was found, what was expected, what to do.
+    file : str or None
+        The file concerned.
+    object : str or None
+        The node, mesh, accessor or setting concerned.
+    """
+
+    kind = "error"
+    exit_code = 1
+
+    def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        self.object = object
+
+    def __str__(self) -> str:
+        """Return file, object and message in one line."""
+        where = ": ".join(part for part in (self.file, self.object) if part)
+        return f"{where}: {self.message}" if where else self.message
+
+
+class SettingsError(BakerError):
+    """Says that a flag or a configuration key is wrong (exit code 2)."""
+
+    kind = "settings"
+    exit_code = 2
+
+
+class InputError(BakerError):
+    """Says that an input is unreadable, malformed or holds nothing to bake (exit code 3)."""
+
+    kind = "input"
+    exit_code = 3
+
+
+class ResourceError(BakerError):
+    """Says that memory, disk or a needed library ran out or is absent (exit code 4)."""
+
+    kind = "resource"
+    exit_code = 4
+
+
+class Cancelled(BakerError):  # noqa: N818 - the public name of the interface
+    """Says that the caller asked to stop (exit code 130)."""
+
+    kind = "cancelled"
+    exit_code = 130

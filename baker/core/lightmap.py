@@ -1,0 +1,78 @@
+"""Finished maps, what each texel of them is, and the result of a bake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas
+from baker.core.scene import Scene, SceneWarning
+from baker.core.settings import BakeSettings
+
+
+class TexelStatus(IntEnum):
+    """What a texel of a page is; the values stored in `status_0.png`."""
+
+    EMPTY = 0
+    COVERED = 1
+    DILATED = 2
+    INVALID = 3
+    UNCONVERGED = 4
+
+
+@dataclass(frozen=True)
+class Lightmap:
+    """One channel of a bake.
+
+    Attributes
+    ----------
+    channel : str
+        "irradiance", "ao", ...
+    unit : str
+        "lx" for irradiance, "1" for AO.
+    value : (P, H, W, C) float32
+        Pages, rows (row 0 is v = 0), columns; C = 3 (linear Rec.709) or 1.
+    """
+
+    channel: str
+    unit: str
+    value: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """All that a bake made.
+
+    Attributes
+    ----------
+    lightmaps : dict of str to Lightmap
+    status : (P, H, W) uint8, `TexelStatus`
+    texel_count : (I,) int64
+        Texels of each instance, in the order of `scene.instances`.
+    statistics : dict of channel to {min, max, mean, clipped, invalid}
+    timings : dict of stage to seconds
+    rays : dict of stage to count
+    solve : dict, {patches, nonzeros, iterations, residual, energy: {emitted, absorbed, escaped}}
+    denoise : dict, what the denoiser was and did (empty if none ran)
+    out : Path or None
+        The folder written, if any.
+    """
+
+    scene: Scene
+    atlas: Atlas
+    settings: BakeSettings
+    lightmaps: dict[str, Lightmap]
+    status: NDArray[np.uint8]
+    texel_count: NDArray[np.int64]
+    statistics: dict[str, dict[str, Any]] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict)
+    rays: dict[str, int] = field(default_factory=dict)
+    solve: dict[str, Any] = field(default_factory=dict)
+    denoise: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[SceneWarning, ...] = ()
+    out: Path | None = None

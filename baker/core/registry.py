@@ -1,0 +1,56 @@
+"""Named plugins: a file registers itself by name, callers look the name up.
+
+Based on: Mitsuba 3's plugin-per-file layout.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Registry(Generic[T]):
+    """Maps names to plugins found in one package.
+
+    Parameters
+    ----------
+    package : str
+        Dotted name of the package whose modules register themselves; it is searched on first use.
+    """
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+        self._plugins: dict[str, T] = {}
+        self._searched = False
+
+    def register(self, name: str) -> Callable[[T], T]:
+        """Return a decorator that files its argument under `name`."""
+
+        def add(plugin: T) -> T:
+            if name in self._plugins:
+                raise ValueError(f"'{name}' is registered twice in {self.package}")
+            self._plugins[name] = plugin
+            return plugin
+
+        return add
+
+    def _search(self) -> None:
+        if not self._searched:
+            self._searched = True
+            package = importlib.import_module(self.package)
+            for module in sorted(m.name for m in pkgutil.iter_modules(package.__path__)):
+                importlib.import_module(f"{self.package}.{module}")
+
+    def names(self) -> list[str]:
+        """List the registered names, sorted."""
+        self._search()
+        return sorted(self._plugins)
+
+    def get(self, name: str) -> T | None:
+        """Return the plugin of that name, or None."""
+        self._search()
+        return self._plugins.get(name)

@@ -1,0 +1,196 @@
+"""A scene as the rest of baker sees it: frozen arrays in metres, +Y up, linear Rec.709.
+
+Importers build it, nothing changes it. Meshes are shared by instances; world space comes in
+`core.geometry`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image with how a material reads it.
+
+    Attributes
+    ----------
+    image : (H, W, 4) uint8 or float32
+        uint8: as stored, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is v = 0.
+    texcoord : int
+        Which TEXCOORD set of the mesh it reads.
+    transform : (2, 3) float64
+        uv_image = transform @ (u, v, 1): KHR_texture_transform.
+    wrap : (str, str)
+        "repeat", "mirror" or "clamp" along u and v.
+    """
+
+    image: NDArray[Any]
+    texcoord: int = 0
+    transform: NDArray[np.float64] = field(default_factory=lambda: np.eye(2, 3))
+    wrap: tuple[str, str] = ("repeat", "repeat")
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a surface reflects and emits.
+
+    Attributes
+    ----------
+    base_colour : (4,) tuple
+        Linear Rec.709 RGB and alpha, factor before texture and vertex colour.
+    emission : (3,) tuple
+        Radiance in cd/m2, factor times strength, before texture.
+    double_sided : bool
+        Reflects and emits on both sides; otherwise the back is black.
+    alpha_mode : str
+        "OPAQUE", "MASK" or "BLEND".
+    """
+
+    name: str = ""
+    base_colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    base_colour_texture: Texture | None = None
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_texture: Texture | None = None
+    double_sided: bool = False
+    alpha_mode: str = "OPAQUE"
+    alpha_cutoff: float = 0.5
+    metallic: float = 1.0
+    roughness: float = 1.0
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles in object space; all primitives of one mesh, one after the other.
+
+    Attributes
+    ----------
+    position : (V, 3) float32, object space
+    normal : (V, 3) float32, unit, object space; made by the importer where the file has none
+    triangle : (T, 3) int32, indices into the vertices; only good triangles are here
+    material : (T,) int32, index into `Scene.materials`
+    primitive : (T,) int32, index of the primitive in the source mesh
+    vertex_primitive : (V,) int32, index of the primitive that vertex belongs to
+    source_vertex : (V,) int32
+        Row of each vertex in its source primitive's accessors (after de-indexing of strips and
+        fans nothing changes: these are accessor rows). For flat normals made by the importer
+        one accessor row may appear several times.
+    texcoord : tuple of (V, 2) float32 or None
+        TEXCOORD sets by number. Set 1 is the candidate for a kept lightmap uv.
+    colour : (V, 4) float32, linear, or None
+    """
+
+    name: str
+    position: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    triangle: NDArray[np.int32]
+    material: NDArray[np.int32]
+    primitive: NDArray[np.int32]
+    vertex_primitive: NDArray[np.int32]
+    source_vertex: NDArray[np.int32]
+    texcoord: tuple[NDArray[np.float32] | None, ...] = (None, None)
+    colour: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A mesh placed in the world.
+
+    Attributes
+    ----------
+    node : int
+        glTF node index in `scene.glb` (for other formats: the index the writer gives it).
+    mesh : int
+        Index into `Scene.meshes`.
+    world_from_object : (4, 4) float64
+    """
+
+    node: int
+    name: str
+    mesh: int
+    world_from_object: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PunctualLight:
+    """A light without area: point, spot or directional (KHR_lights_punctual).
+
+    Attributes
+    ----------
+    kind : str
+        "point", "spot" or "directional".
+    intensity : (3,) tuple
+        Colour times intensity: cd for point and spot, lx for directional.
+    position, direction : (3,) tuple, world space; direction is where the light shines to, unit.
+    inner_cone, outer_cone : float, radians (spot)
+    """
+
+    kind: str
+    name: str
+    node: int
+    intensity: tuple[float, float, float]
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    inner_cone: float = 0.0
+    outer_cone: float = 0.7853981633974483
+
+
+@dataclass(frozen=True)
+class SceneWarning:
+    """A finding that does not stop the work: a stable code, a sentence, the object concerned."""
+
+    code: str
+    message: str
+    object: str = ""
+
+
+@dataclass(frozen=True)
+class SourceDocument:
+    """The glTF a scene came from, so that the writer can keep what it does not understand.
+
+    Attributes
+    ----------
+    json : dict
+        The document as parsed (never changed: the writer copies it).
+    buffers : tuple of bytes
+        Every buffer's bytes, resolved from the BIN chunk, files or data URIs.
+    folder : Path or None
+        Where relative image URIs are found.
+    """
+
+    json: dict[str, Any]
+    buffers: tuple[bytes, ...]
+    folder: Path | None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is baked.
+
+    Attributes
+    ----------
+    source : SourceDocument or None
+        None for formats other than glTF: the writer builds a new document.
+    sha256 : str
+        Hash over the scene file and every file it names, in order of mention.
+    """
+
+    name: str
+    path: Path | None
+    meshes: tuple[Mesh, ...]
+    materials: tuple[Material, ...]
+    instances: tuple[Instance, ...]
+    lights: tuple[PunctualLight, ...] = ()
+    warnings: tuple[SceneWarning, ...] = ()
+    source: SourceDocument | None = None
+    sha256: str = ""
+
+    @property
+    def n_triangles(self) -> int:
+        """Count the triangles of all instances."""
+        return sum(len(self.meshes[i.mesh].triangle) for i in self.instances)

@@ -1,0 +1,1 @@
+"""Repairs of finished maps: invalid texels, denoise, dilation."""

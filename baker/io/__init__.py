@@ -1,0 +1,1 @@
+"""Scene files in; GLB, manifest and folders out."""

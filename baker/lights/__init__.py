@@ -1,0 +1,1 @@
+"""Light families, one a file."""

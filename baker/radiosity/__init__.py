@@ -1,0 +1,1 @@
+"""Patches, form factors, solve, final gather."""

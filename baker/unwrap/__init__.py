@@ -1,0 +1,1 @@
+"""Lightmap uv: unwrap, pack, keep, check."""
