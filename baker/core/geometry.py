@@ -1,0 +1,115 @@
+"""The whole scene as one world-space triangle list with its lightmap uv.
+
+Every instance is expanded: a triangle here is one that a ray can hit and that owns texels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas
+from baker.core.scene import Scene
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """World-space triangles in the order of instances, then of the mesh's triangles.
+
+    Attributes
+    ----------
+    position : (V, 3) float32, metres, world
+    normal : (V, 3) float32, unit shading normals, world
+    uv : (V, 2) float32, lightmap uv of the page, 0 to 1
+    vertex_instance : (V,) int32
+    vertex_source : (V,) int32, the mesh vertex each came from
+    triangle : (T, 3) int32, counter-clockwise seen from the front
+    corner : (T, 3) int32, mesh vertex of each corner (same order as `triangle`)
+    face_normal : (T, 3) float32, unit
+    area : (T,) float32, m2
+    page, instance, chart, material : (T,) int32
+    double_sided : (T,) bool
+    """
+
+    position: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    vertex_source: NDArray[np.int32]
+    triangle: NDArray[np.int32]
+    face_normal: NDArray[np.float32]
+    area: NDArray[np.float32]
+    page: NDArray[np.int32]
+    instance: NDArray[np.int32]
+    chart: NDArray[np.int32]
+    material: NDArray[np.int32]
+    double_sided: NDArray[np.bool_]
+
+    @property
+    def diagonal(self) -> float:
+        """Return the diagonal of the bounding box, metres."""
+        if not len(self.position):
+            return 0.0
+        return float(np.linalg.norm(self.position.max(axis=0) - self.position.min(axis=0)))
+
+
+def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
+    """Place every instance in the world, with the lightmap uv of its layout.
+
+    Parameters
+    ----------
+    scene : Scene
+    atlas : Atlas
+        One layout for each instance, in order.
+
+    Returns
+    -------
+    Geometry
+    """
+    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _COLUMNS}
+    double_sided = np.array([m.double_sided for m in scene.materials], bool)
+    start = 0
+    for index, (instance, layout) in enumerate(zip(scene.instances, atlas.layouts, strict=True)):
+        mesh = scene.meshes[instance.mesh]
+        matrix = instance.world_from_object
+        # Transform each mesh vertex once, so that vertices split at charts stay bitwise equal and rays find no gap.
+        position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+        normal = mesh.normal.astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        triangle = layout.triangle
+        if np.linalg.det(matrix[:3, :3]) < 0:
+            triangle = triangle[:, ::-1]
+        columns["position"].append(position[layout.vertex])
+        columns["normal"].append(normal.astype(np.float32)[layout.vertex])
+        columns["uv"].append(layout.uv)
+        columns["vertex_source"].append(layout.vertex)
+        columns["triangle"].append(triangle + np.int32(start))
+        n = len(triangle)
+        columns["page"].append(np.full(n, layout.page, np.int32))
+        columns["instance"].append(np.full(n, index, np.int32))
+        columns["chart"].append(layout.chart)
+        columns["material"].append(mesh.material)
+        start += len(layout.vertex)
+    data = {name: np.concatenate(parts) if parts else _COLUMNS[name] for name, parts in columns.items()}
+    face_normal, area = face_normals(data["position"], data["triangle"])
+    return Geometry(**data, face_normal=face_normal, area=area, double_sided=double_sided[data["material"]])
+
+
+def face_normals(
+    position: NDArray[np.float32], triangle: NDArray[np.int32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return unit face normals (T, 3) and areas (T,) of triangles; zero-area faces get normal 0."""
+    corner = position[triangle].astype(np.float64)
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(cross, axis=1)
+    normal = cross / np.maximum(length, 1e-300)[:, None]
+    return normal.astype(np.float32), (0.5 * length).astype(np.float32)
+
+
+_COLUMNS: dict[str, NDArray[np.generic]] = {
+    "position": np.zeros((0, 3), np.float32), "normal": np.zeros((0, 3), np.float32),
+    "uv": np.zeros((0, 2), np.float32), "vertex_source": np.zeros(0, np.int32),
+    "triangle": np.zeros((0, 3), np.int32), "page": np.zeros(0, np.int32),
+    "instance": np.zeros(0, np.int32), "chart": np.zeros(0, np.int32), "material": np.zeros(0, np.int32),
+}  # fmt: skip

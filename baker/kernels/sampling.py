@@ -1,0 +1,160 @@
+"""Low-discrepancy numbers and the maps from the unit square to directions and triangles.
+
+Points are the first two Sobol dimensions (a (0,2)-sequence) under nested uniform (Owen) scrambling.
+The scramble of the first `shared` bits is the same for all texels, the rest differs from texel to
+texel: neighbouring texels' rays with the same sample number then point the same way (packets stay
+together), while each texel on its own still has a fully scrambled net.
+
+Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
+sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,
+2020; Shirley and Chiu, A low distortion map between disk and square, 1997; Duff et al., Building an
+orthonormal basis, revisited, 2017.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Numba widens uint32 arithmetic to 64 bits: every step is wrapped again.
+_u = np.uint32
+_INV_2_32 = np.float32(2.3283064e-10)
+_ONE_MINUS = np.float32(0.99999994)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def hash_u32(x):  # type: ignore[no-untyped-def]
+    """Return a well-mixed uint32 of a uint32 (Wellons' lowbias32)."""
+    x = _u(x ^ (x >> _u(16)))
+    x = _u(x * _u(0x7FEB352D))
+    x = _u(x ^ (x >> _u(15)))
+    x = _u(x * _u(0x846CA68B))
+    return _u(x ^ (x >> _u(16)))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def hash_combine(a, b):  # type: ignore[no-untyped-def]
+    """Return a uint32 that depends on both uint32 arguments."""
+    return hash_u32(_u(hash_u32(_u(a)) ^ _u(_u(b) * _u(0x9E3779B9) + _u(0x7F4A7C15))))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def reverse_bits(x):  # type: ignore[no-untyped-def]
+    """Return the uint32 with its bits in reverse order."""
+    x = _u(((x >> _u(1)) & _u(0x55555555)) | ((x & _u(0x55555555)) << _u(1)))
+    x = _u(((x >> _u(2)) & _u(0x33333333)) | ((x & _u(0x33333333)) << _u(2)))
+    x = _u(((x >> _u(4)) & _u(0x0F0F0F0F)) | ((x & _u(0x0F0F0F0F)) << _u(4)))
+    x = _u(((x >> _u(8)) & _u(0x00FF00FF)) | ((x & _u(0x00FF00FF)) << _u(8)))
+    return _u((x >> _u(16)) | (x << _u(16)))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
+    """Owen-scramble a bit-reversed uint32: each bit is flipped by a hash of the bits below it."""
+    x = _u(x + seed)
+    x = _u(x ^ _u(x * _u(0x6C50B47C)))
+    x = _u(x ^ _u(x * _u(0xB82F1E52)))
+    x = _u(x ^ _u(x * _u(0xC7AFE638)))
+    return _u(x ^ _u(x * _u(0x8D22F6E6)))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
+    """Return a number in [0, 1): the shared bits kept, the rest scrambled with the texel's seed.
+
+    `shared_reversed` is the bit-reversed, globally scrambled Sobol number; `mask` has the shared
+    bits (lowest in reversed order) set.
+    """
+    y = scramble_reversed(shared_reversed, seed)
+    y = _u((y & _u(~mask)) | (shared_reversed & mask))
+    return min(np.float32(reverse_bits(y)) * _INV_2_32, _ONE_MINUS)
+
+
+@njit(cache=True)
+def sobol_reversed(n, seed, dimension_pair):  # type: ignore[no-untyped-def]
+    """Return (n, 2) uint32: a globally scrambled (0,2)-sequence, bit-reversed.
+
+    Different `dimension_pair` numbers give independently scrambled and shuffled sequences.
+    """
+    out = np.zeros((n, 2), np.uint32)
+    seed_x = hash_combine(_u(seed), _u(3 * dimension_pair))
+    seed_y = hash_combine(_u(seed), _u(3 * dimension_pair + 1))
+    for i in range(n):
+        out[i, 0] = scramble_reversed(_u(i), seed_x)
+        y = _u(0)
+        v = _u(1) << _u(31)
+        j = i
+        while j:
+            if j & 1:
+                y = _u(y ^ v)
+            j >>= 1
+            v = _u(v ^ (v >> _u(1)))
+        out[i, 1] = scramble_reversed(reverse_bits(y), seed_y)
+    return out
+
+
+def shared_bits_mask(n_samples: int) -> np.uint32:
+    """Return the mask of bits shared by all texels: one point in each shared cell, at most 16 x 16 cells."""
+    return np.uint32((1 << min(int(math.log2(max(n_samples, 1))) // 2, 4)) - 1)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def cosine_direction(u, v):  # type: ignore[no-untyped-def]
+    """Map the unit square to the cosine-weighted hemisphere about +z; pdf = cos / pi.
+
+    Concentric discs, lifted; sine and cosine of at most pi/4 by polynomials (error under 3e-7).
+    """
+    a = np.float32(2.0) * u - np.float32(1.0)
+    b = np.float32(2.0) * v - np.float32(1.0)
+    wide = abs(a) > abs(b)
+    r = a if wide else b
+    other = b if wide else a
+    t = np.float32(0.0)
+    if r != np.float32(0.0):
+        t = np.float32(0.78539816) * other / r
+    t2 = t * t
+    c = np.float32(1.0) + t2 * (
+        np.float32(-0.5) + t2 * (np.float32(4.1666642e-2) + t2 * (np.float32(-1.3888397e-3) + t2 * np.float32(2.4760495e-5)))
+    )
+    s = t * (
+        np.float32(1.0)
+        + t2 * (np.float32(-1.6666667e-1) + t2 * (np.float32(8.3333310e-3) + t2 * np.float32(-1.9840874e-4)))
+    )
+    x = r * (c if wide else s)
+    y = r * (s if wide else c)
+    return x, y, math.sqrt(max(np.float32(0.0), np.float32(1.0) - r * r))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Return two unit vectors (six floats) that make a right-handed frame with the unit normal."""
+    sign = np.float32(1.0) if nz >= np.float32(0.0) else np.float32(-1.0)
+    a = np.float32(-1.0) / (sign + nz)
+    b = nx * ny * a
+    return (
+        np.float32(1.0) + sign * nx * nx * a, sign * b, -sign * nx,
+        b, sign + ny * ny * a, -ny,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, inline="always")
+def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
+    """Map the unit square to uniform barycentrics (b1, b2) of a triangle, keeping strata compact.
+
+    Based on: Heitz, A low-distortion map between triangle and square, 2019.
+    """
+    if v > u:
+        b1 = u * np.float32(0.5)
+        b2 = v - b1
+    else:
+        b2 = v * np.float32(0.5)
+        b1 = u - b2
+    return b1, b2
+
+
+def cosine_directions(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return `cosine_direction` of (n, 2) points of the unit square as (n, 3) float32."""
+    return np.array([cosine_direction(u, v) for u, v in points], np.float32).reshape(-1, 3)

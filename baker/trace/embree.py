@@ -1,0 +1,192 @@
+"""Embree's C API, loaded from the library that the `embreex` wheel carries.
+
+This is the only file that knows Embree's functions and constants. `RayScene` owns device, scene
+and the vertex memory; kernels get plain integers (function addresses and the scene pointer).
+
+Based on: Embree 4 API reference (Intel, 2023), rtcore.h of Embree 4.4.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, files, version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import ResourceError
+
+_GEOMETRY_TRIANGLE = 0
+_BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
+_FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
+_PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
+_SCENE_ROBUST = 1 << 2
+_QUALITY_MEDIUM = 1
+_ERROR_OUT_OF_MEMORY = 4
+_ERRORS = {1: "unknown error", 2: "invalid argument", 3: "invalid operation", 4: "out of memory",
+           5: "unsupported CPU", 6: "cancelled"}
+
+# name: (result type, argument types); p pointer, i int, u unsigned, z size_t, l ssize_t
+_SIGNATURES = {
+    "rtcNewDevice": ("p", "p"), "rtcReleaseDevice": ("", "p"), "rtcGetDeviceProperty": ("l", "pi"),
+    "rtcGetDeviceError": ("i", "p"), "rtcNewScene": ("p", "p"), "rtcReleaseScene": ("", "p"),
+    "rtcSetSceneFlags": ("", "pi"), "rtcSetSceneBuildQuality": ("", "pi"), "rtcCommitScene": ("", "p"),
+    "rtcNewGeometry": ("p", "pi"), "rtcReleaseGeometry": ("", "p"), "rtcCommitGeometry": ("", "p"),
+    "rtcSetSharedGeometryBuffer": ("", "piuipzzz"), "rtcAttachGeometry": ("u", "pp"),
+}  # fmt: skip
+_TYPES: dict[str, Any] = {
+    "p": ctypes.c_void_p, "i": ctypes.c_int, "u": ctypes.c_uint, "z": ctypes.c_size_t, "l": ctypes.c_ssize_t,
+    "": None,
+}  # fmt: skip
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """Load Embree 4 from embreex's installed files."""
+    try:
+        installed = files("embreex") or []
+    except PackageNotFoundError:
+        raise ResourceError("Embree is absent: install it with `pip install embreex`") from None
+    named = [f for f in installed if "embree4" in f.name and (".so" in f.name or f.suffix in {".dll", ".dylib"})]
+    if not named:
+        raise ResourceError("the installed embreex carries no Embree 4 library; install embreex 4.4 or newer")
+    if sys.platform == "win32":
+        import embreex  # noqa: F401 - its import registers the folder of the libraries
+    try:
+        library = ctypes.CDLL(str(named[0].locate()))
+    except OSError:
+        # The library's own dependency (TBB) is found through the extension module that links both.
+        import embreex.rtcore  # noqa: F401
+
+        library = ctypes.CDLL(str(named[0].locate()))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype = _TYPES[result]
+        function.argtypes = [_TYPES[a] for a in arguments]
+    return library
+
+
+def embree_version() -> str:
+    """Return the version of the Embree library in use, as "4.4.0"."""
+    library = _library()
+    device = library.rtcNewDevice(None)
+    number = int(library.rtcGetDeviceProperty(device, _PROPERTY_VERSION))
+    library.rtcReleaseDevice(device)
+    return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
+
+
+def embreex_version() -> str:
+    """Return the version of the wheel that carries Embree."""
+    return version("embreex")
+
+
+@dataclass(frozen=True)
+class Tracer:
+    """What a kernel needs to trace: plain integers, valid while its `RayScene` lives.
+
+    Attributes
+    ----------
+    scene : int
+        RTCScene.
+    intersect, occluded : int
+        Addresses of rtcIntersectN and rtcOccludedN.
+    width : int
+        N, the widest packet this CPU traces natively.
+    """
+
+    scene: int
+    intersect: int
+    occluded: int
+    width: int
+
+
+class RayScene:
+    """Triangles that rays can be cast at.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, metres, world
+    triangle : (T, 3) uint32 or int32
+    robust : bool
+        Embree's ROBUST flag: rays through shared edges and vertices never leak.
+    threads : int
+        Threads of the tree's build; 0 means all.
+
+    Raises
+    ------
+    ResourceError
+        If Embree is absent, of another major version, or runs out of memory.
+    """
+
+    def __init__(
+        self, position: NDArray[np.float32], triangle: NDArray[Any], *, robust: bool = True, threads: int = 0
+    ) -> None:
+        library = _library()
+        self._library = library
+        # Embree reads 16 bytes from each vertex: one spare row keeps the last read inside.
+        self._position = np.zeros((len(position) + 1, 3), np.float32)
+        self._position[:-1] = position
+        self._triangle = np.ascontiguousarray(triangle, np.uint32)
+        config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
+        self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
+        if not self._device:
+            raise ResourceError(f"Embree could not start: {_ERRORS.get(library.rtcGetDeviceError(None), 'unknown')}")
+        self._scene = library.rtcNewScene(self._device)
+        if int(library.rtcGetDeviceProperty(self._device, _PROPERTY_VERSION)) // 10000 != 4:
+            raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
+        library.rtcSetSceneFlags(self._scene, _SCENE_ROBUST if robust else 0)
+        library.rtcSetSceneBuildQuality(self._scene, _QUALITY_MEDIUM)
+        if len(self._triangle):
+            self._add_triangles()
+        library.rtcCommitScene(self._scene)
+        self._check("building the ray tree")
+        self.tracer = self._tracer()
+
+    def _add_triangles(self) -> None:
+        library = self._library
+        geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
+        library.rtcSetSharedGeometryBuffer(
+            geometry, _BUFFER_VERTEX, 0, _FORMAT_FLOAT3, self._position.ctypes.data, 0, 12, len(self._position) - 1
+        )
+        library.rtcSetSharedGeometryBuffer(
+            geometry, _BUFFER_INDEX, 0, _FORMAT_UINT3, self._triangle.ctypes.data, 0, 12, len(self._triangle)
+        )
+        library.rtcCommitGeometry(geometry)
+        library.rtcAttachGeometry(self._scene, geometry)
+        library.rtcReleaseGeometry(geometry)
+
+    def _check(self, what: str) -> None:
+        code = self._library.rtcGetDeviceError(self._device)
+        if code == _ERROR_OUT_OF_MEMORY:
+            raise ResourceError(f"memory ran out while {what}; bake fewer triangles at once")
+        if code:
+            raise ResourceError(f"Embree failed while {what}: {_ERRORS.get(code, code)}")
+
+    def _tracer(self) -> Tracer:
+        library = self._library
+        width = 4
+        for candidate, name in ((16, _PROPERTY_RAY16), (8, _PROPERTY_RAY8)):
+            if library.rtcGetDeviceProperty(self._device, name):
+                width = candidate
+                break
+        intersect, occluded = (
+            ctypes.cast(getattr(library, f"{kind}{width}"), ctypes.c_void_p).value or 0
+            for kind in ("rtcIntersect", "rtcOccluded")
+        )
+        return Tracer(int(self._scene), intersect, occluded, width)
+
+    def close(self) -> None:
+        """Release scene and device; the tracer must not be used any more."""
+        if self._device:
+            self._library.rtcReleaseScene(self._scene)
+            self._library.rtcReleaseDevice(self._device)
+            self._device = None
+
+    def __del__(self) -> None:
+        """Release what `close` did not."""
+        if getattr(self, "_device", None):
+            self.close()

@@ -1,0 +1,80 @@
+"""Ray packets as Numba kernels see them: memory layout and calls through function addresses.
+
+A packet of width N is 12 rows (ray) and 9 rows (hit) of N four-byte numbers, as RTCRayN and
+RTCRayHitN lay them out. A call through an address held in an integer, unlike one through a
+ctypes object, lets Numba keep the compiled kernel on disk.
+
+Based on: Embree 4 API reference, RTCRayHitN.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+# Rows of a packet, in units of its width.
+ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = range(12)
+NG_X, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID = range(12, 19)
+ROWS = 21
+MAX_WIDTH = 16
+NO_HIT = np.uint32(0xFFFFFFFF)
+
+
+@intrinsic
+def call_embree(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
+    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)` at an address."""
+    signature = types.void(types.int64, types.int64, types.int64, types.int64, types.int64)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        byte_pointer = ir.IntType(8).as_pointer()
+        function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
+        function = builder.inttoptr(args[0], function_type.as_pointer())
+        builder.call(function, [builder.inttoptr(a, byte_pointer) for a in args[1:]])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@njit(cache=True, nogil=True)
+def new_packet():  # type: ignore[no-untyped-def]
+    """Return memory for a packet: valid (16,) int32, floats (21 * 16,) float32 and its integer view.
+
+    All three start at multiples of 64 bytes, as Embree wants. Time, mask and flags are set once.
+    """
+    raw = np.zeros((ROWS * MAX_WIDTH + MAX_WIDTH) * 4 + 64, np.uint8)
+    start = (64 - raw.ctypes.data % 64) % 64
+    valid = raw[start : start + MAX_WIDTH * 4].view(np.int32)
+    body = raw[start + MAX_WIDTH * 4 : start + (ROWS + 1) * MAX_WIDTH * 4]
+    return valid, body.view(np.float32), body.view(np.uint32)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tnear, tfar):  # type: ignore[no-untyped-def]
+    """Write one ray into a lane of the packet."""
+    floats[ORG_X * width + lane] = x
+    floats[ORG_Y * width + lane] = y
+    floats[ORG_Z * width + lane] = z
+    floats[TNEAR * width + lane] = tnear
+    floats[DIR_X * width + lane] = dx
+    floats[DIR_Y * width + lane] = dy
+    floats[DIR_Z * width + lane] = dz
+    floats[TIME * width + lane] = 0.0
+    floats[TFAR * width + lane] = tfar
+    words[MASK * width + lane] = np.uint32(0xFFFFFFFF)
+    words[ID * width + lane] = np.uint32(0)
+    words[FLAGS * width + lane] = np.uint32(0)
+    words[PRIM_ID * width + lane] = np.uint32(0xFFFFFFFF)
+    words[GEOM_ID * width + lane] = np.uint32(0xFFFFFFFF)
+    # instID and instPrimID, one level each
+    words[19 * width + lane] = np.uint32(0xFFFFFFFF)
+    words[20 * width + lane] = np.uint32(0xFFFFFFFF)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
+    """Trace the lanes whose `valid` is -1; results are written into the packet."""
+    call_embree(function, valid.ctypes.data, scene, floats.ctypes.data, 0)
