@@ -1,0 +1,63 @@
+"""The texels that lie on surfaces, and what the ray stages need to know of each.
+
+Entries 0 to n_front are the texels of the pages. Behind them come the back sides of texels on
+double-sided surfaces: they take part in light transport but are not stored in any map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class TexelBuffer:
+    """Texels in Morton order of their pages (neighbours in the list are neighbours on the surface).
+
+    Attributes
+    ----------
+    resolution, n_pages, n_front : int
+    pixel : (n,) int64
+        (page * resolution + row) * resolution + column; a back entry has its front's pixel.
+    back : (n,) bool
+    first : (n_front + 1,) int64, `entry` : (m,) int32, `entry_area` : (m,) float32
+        Triangles that each front texel's square touches, and their areas inside it in texels.
+    chart, instance : (n,) int32
+    area : (n,) float32, m2 of surface inside the texel
+    position : (n, 3) float32, metres, centroid of that surface
+    normal : (n, 3) float32, unit, shading, flipped on back entries
+    albedo : (n, 3) float32, linear Rec.709
+    lookup : (P * H * W,) int32, entry of each pixel or -1
+    back_entry : (n_front,) int32, the back's entry of a front texel or -1
+    """
+
+    resolution: int
+    n_pages: int
+    n_front: int
+    pixel: NDArray[np.int64]
+    back: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    entry: NDArray[np.int32]
+    entry_area: NDArray[np.float32]
+    chart: NDArray[np.int32]
+    instance: NDArray[np.int32]
+    area: NDArray[np.float32]
+    position: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    lookup: NDArray[np.int32]
+    back_entry: NDArray[np.int32]
+
+    @property
+    def n(self) -> int:
+        """Count all entries, back sides included."""
+        return len(self.pixel)
+
+    def page_image(self, value: NDArray[np.generic], fill: float | int = 0) -> NDArray[np.generic]:
+        """Scatter per-front-texel values (n_front, ...) to (P, H, W, ...) images."""
+        shape = (self.n_pages * self.resolution * self.resolution, *value.shape[1:])
+        image = np.full(shape, fill, value.dtype)
+        image[self.pixel[: self.n_front]] = value[: self.n_front]
+        return image.reshape(self.n_pages, self.resolution, self.resolution, *value.shape[1:])

@@ -1,0 +1,109 @@
+"""Triangles cut by the square of a texel: area, and points uniform in what is left.
+
+Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+# A triangle cut by four half-planes has at most seven corners; two spare rows for the cutting.
+MAX_CORNERS = 9
+
+
+@njit(cache=True, nogil=True)
+def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
+    """Cut a triangle (3, 2) by the unit square at (x0, y0); return the corner count of `out`.
+
+    `out` and `spare` are (MAX_CORNERS, 2) float64 working memory.
+    """
+    n = 3
+    for i in range(3):
+        out[i, 0] = corner[i, 0] - x0
+        out[i, 1] = corner[i, 1] - y0
+    for side in range(4):
+        axis = side >> 1
+        m = 0
+        for i in range(n):
+            j = i + 1 if i + 1 < n else 0
+            a = out[i, axis] if side & 1 == 0 else 1.0 - out[i, axis]
+            b = out[j, axis] if side & 1 == 0 else 1.0 - out[j, axis]
+            if a >= 0.0:
+                spare[m, 0] = out[i, 0]
+                spare[m, 1] = out[i, 1]
+                m += 1
+            if (a >= 0.0) != (b >= 0.0):
+                t = a / (a - b)
+                spare[m, 0] = out[i, 0] + t * (out[j, 0] - out[i, 0])
+                spare[m, 1] = out[i, 1] + t * (out[j, 1] - out[i, 1])
+                m += 1
+        n = m
+        for i in range(n):
+            out[i, 0] = spare[i, 0]
+            out[i, 1] = spare[i, 1]
+        if n == 0:
+            return 0
+    return n
+
+
+@njit(cache=True, nogil=True)
+def polygon_area(corner, n):  # type: ignore[no-untyped-def]
+    """Return the area of the convex polygon of the first n corners (never negative)."""
+    twice = 0.0
+    for i in range(1, n - 1):
+        twice += abs(
+            (corner[i, 0] - corner[0, 0]) * (corner[i + 1, 1] - corner[0, 1])
+            - (corner[i + 1, 0] - corner[0, 0]) * (corner[i, 1] - corner[0, 1])
+        )
+    return 0.5 * twice
+
+
+@njit(cache=True, nogil=True)
+def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
+    """Return the point (x, y) that a uniform (u, v) of the unit square maps to, uniform in the polygon."""
+    if n < 3:
+        x = 0.0
+        y = 0.0
+        for i in range(n):
+            x += corner[i, 0] / n
+            y += corner[i, 1] / n
+        return x, y
+    target = u * polygon_area(corner, n)
+    last = n - 2
+    for i in range(1, n - 1):
+        ax = corner[i, 0] - corner[0, 0]
+        ay = corner[i, 1] - corner[0, 1]
+        bx = corner[i + 1, 0] - corner[0, 0]
+        by = corner[i + 1, 1] - corner[0, 1]
+        area = 0.5 * abs(ax * by - bx * ay)
+        if target < area or i == last:
+            s = np.sqrt(min(max(target / area, 0.0), 1.0)) if area > 0.0 else 0.0
+            return corner[0, 0] + s * (ax + v * (bx - ax)), corner[0, 1] + s * (ay + v * (by - ay))
+        target -= area
+    return corner[0, 0], corner[0, 1]
+
+
+@njit(cache=True, nogil=True)
+def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
+    """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 the square is inside."""
+    twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
+        corner[1, 1] - corner[0, 1]
+    )
+    if twice == 0.0:
+        return 1
+    inside = True
+    for i in range(3):
+        j = i + 1 if i < 2 else 0
+        # Inward normal of the edge and its value at the nearest and the farthest corner of the square.
+        nx = -(corner[j, 1] - corner[i, 1])
+        ny = corner[j, 0] - corner[i, 0]
+        if twice < 0.0:
+            nx = -nx
+            ny = -ny
+        base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
+        if base + max(nx, 0.0) + max(ny, 0.0) < 0.0:
+            return 0
+        if base + min(nx, 0.0) + min(ny, 0.0) < 0.0:
+            inside = False
+    return 2 if inside else 1

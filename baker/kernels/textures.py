@@ -1,0 +1,121 @@
+"""Material textures packed for kernels: mip pyramids in one flat array, bilinear lookups.
+
+Colours are averaged in linear light when the pyramid is made.
+Based on: Williams, Pyramidal parametrics, 1983; IEC 61966-2-1 (the sRGB curve).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+MAX_LEVELS = 16
+_WRAP = {"repeat": 0, "mirror": 1, "clamp": 2}
+
+
+class TexturePack(NamedTuple):
+    """Linear RGBA of all textures.
+
+    pixels (n, 4) float32; level (K, 16, 3) int64 rows of offset, width, height; n_levels (K,) int64;
+    wrap (K, 2) int64.
+    """
+
+    pixels: NDArray[np.float32]
+    level: NDArray[np.int64]
+    n_levels: NDArray[np.int64]
+    wrap: NDArray[np.int64]
+
+
+def linear_from_srgb(value: NDArray[Any]) -> NDArray[np.float32]:
+    """Return linear values of sRGB-encoded ones, both 0 to 1."""
+    value = np.asarray(value, np.float64)
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+_LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255.0)
+
+
+def _linear_image(image: NDArray[Any]) -> NDArray[np.float32]:
+    if image.dtype != np.uint8:
+        return image.astype(np.float32)
+    linear = _LINEAR_FROM_BYTE[image]
+    linear[..., 3] = image[..., 3] / np.float32(255.0)
+    return linear
+
+
+def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    rows = image if image.shape[0] == 1 else (image[: image.shape[0] // 2 * 2 : 2] + image[1::2]) * np.float32(0.5)
+    if rows.shape[1] == 1:
+        return rows
+    halved: NDArray[np.float32] = (rows[:, : rows.shape[1] // 2 * 2 : 2] + rows[:, 1::2]) * np.float32(0.5)
+    return halved
+
+
+def pack_textures(images: Sequence[tuple[NDArray[Any], tuple[str, str]]]) -> TexturePack:
+    """Build the pyramids.
+
+    Parameters
+    ----------
+    images : sequence of (image (H, W, 4) uint8 sRGB or float32 linear, (wrap u, wrap v))
+    """
+    level = np.zeros((max(len(images), 1), MAX_LEVELS, 3), np.int64)
+    n_levels = np.zeros(max(len(images), 1), np.int64)
+    wrap = np.zeros((max(len(images), 1), 2), np.int64)
+    parts: list[NDArray[np.float32]] = []
+    offset = 0
+    for k, (image, modes) in enumerate(images):
+        wrap[k] = [_WRAP[m] for m in modes]
+        current = _linear_image(image)
+        for n in range(MAX_LEVELS):
+            level[k, n] = offset, current.shape[1], current.shape[0]
+            n_levels[k] = n + 1
+            parts.append(current.reshape(-1, 4))
+            offset += current.shape[0] * current.shape[1]
+            if current.shape[0] == 1 and current.shape[1] == 1:
+                break
+            current = _halved(current)
+    pixels = np.concatenate(parts) if parts else np.zeros((1, 4), np.float32)
+    return TexturePack(pixels, level, n_levels, wrap)
+
+
+@njit(cache=True, nogil=True)
+def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
+    if mode == 0:
+        return i % n
+    if mode == 1:
+        j = i % (2 * n)
+        return j if j < n else 2 * n - 1 - j
+    return min(max(i, 0), n - 1)
+
+
+@njit(cache=True, nogil=True)
+def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-def]
+    """Write the linear RGBA of texture k at (u, v) to `out` (4,).
+
+    `footprint` is the width in uv (of the whole image) that the answer should average over.
+    """
+    width = max(pack.level[k, 0, 1], pack.level[k, 0, 2])
+    n = 0
+    if footprint * width > 1.0:
+        n = min(int(math.log2(footprint * width) + 0.5), pack.n_levels[k] - 1)
+    offset, w, h = pack.level[k, n, 0], pack.level[k, n, 1], pack.level[k, n, 2]
+    # A uv of many repeats keeps its fraction only.
+    x = (u - math.floor(u / 2.0) * 2.0 if pack.wrap[k, 0] != 2 else min(max(u, -1.0), 2.0)) * w - 0.5
+    y = (v - math.floor(v / 2.0) * 2.0 if pack.wrap[k, 1] != 2 else min(max(v, -1.0), 2.0)) * h - 0.5
+    x0 = int(math.floor(x))
+    y0 = int(math.floor(y))
+    fx = x - x0
+    fy = y - y0
+    for c in range(4):
+        out[c] = 0.0
+    for j in range(2):
+        for i in range(2):
+            weight = (fx if i else 1.0 - fx) * (fy if j else 1.0 - fy)
+            at = offset + _wrapped(y0 + j, h, pack.wrap[k, 1]) * w + _wrapped(x0 + i, w, pack.wrap[k, 0])
+            for c in range(4):
+                out[c] += weight * pack.pixels[at, c]

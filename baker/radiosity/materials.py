@@ -1,0 +1,106 @@
+"""Materials resolved for triangles: constants, texture numbers and the uv of each corner."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.geometry import Geometry
+from baker.core.scene import Scene, Texture
+from baker.kernels.textures import TexturePack, pack_textures
+
+
+class Shading(NamedTuple):
+    """What kernels need to know of materials.
+
+    Attributes
+    ----------
+    pack : TexturePack
+    base, emission : (M, 3) float32
+    base_texture, emission_texture : (M,) int32, -1 for none
+    base_uv, emission_uv : (V, 2) float32, by lightmap vertex (of the material its triangles have)
+    colour : (V, 3) float32, linear vertex colour
+    material : (T,) int32
+    """
+
+    pack: TexturePack
+    base: NDArray[np.float32]
+    emission: NDArray[np.float32]
+    base_texture: NDArray[np.int32]
+    emission_texture: NDArray[np.int32]
+    base_uv: NDArray[np.float32]
+    emission_uv: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    material: NDArray[np.int32]
+
+
+def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
+    """Pack the textures that materials use and find every triangle corner's uv.
+
+    Parameters
+    ----------
+    scene : Scene
+    geometry : Geometry
+        Made from the same scene.
+    """
+    images: list[tuple[NDArray[np.generic], tuple[str, str]]] = []
+    numbers: dict[tuple[int, tuple[str, str]], int] = {}
+
+    def number(texture: Texture | None) -> int:
+        if texture is None:
+            return -1
+        key = (id(texture.image), texture.wrap)
+        if key not in numbers:
+            numbers[key] = len(images)
+            images.append((texture.image, texture.wrap))
+        return numbers[key]
+
+    base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
+    emission_texture = np.array([number(m.emission_texture) for m in scene.materials], np.int32)
+    return Shading(
+        pack=pack_textures(images),
+        base=np.array([m.base_colour[:3] for m in scene.materials], np.float32).reshape(-1, 3),
+        emission=np.array([m.emission for m in scene.materials], np.float32).reshape(-1, 3),
+        base_texture=base_texture,
+        emission_texture=emission_texture,
+        base_uv=_corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials]),
+        emission_uv=_corner_uv(scene, geometry, [m.emission_texture for m in scene.materials]),
+        colour=_vertex_colour(scene, geometry),
+        material=geometry.material,
+    )
+
+
+def _corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) -> NDArray[np.float32]:
+    """Return (V, 2) float32: image uv of each lightmap vertex; (0, 0) rows where nothing is textured."""
+    if all(texture is None for texture in textures):
+        return np.zeros((1, 2), np.float32)
+    uv = np.zeros((len(geometry.position), 2), np.float32)
+    for index, instance in enumerate(scene.instances):
+        mesh = scene.meshes[instance.mesh]
+        of_instance = geometry.instance == index
+        for material in np.unique(geometry.material[of_instance]):
+            texture = textures[material]
+            if texture is None or texture.texcoord >= len(mesh.texcoord):
+                continue
+            coordinate = mesh.texcoord[texture.texcoord]
+            if coordinate is None:
+                continue
+            vertex = np.unique(geometry.triangle[of_instance & (geometry.material == material)])
+            source = coordinate[geometry.vertex_source[vertex]].astype(np.float64)
+            uv[vertex] = source @ texture.transform[:, :2].T + texture.transform[:, 2]
+    return uv
+
+
+def _vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
+    """Return (V, 3) float32 linear vertex colours, or (1, 3) ones if no mesh has any."""
+    if all(scene.meshes[i.mesh].colour is None for i in scene.instances):
+        return np.ones((1, 3), np.float32)
+    colour = np.ones((len(geometry.position), 3), np.float32)
+    for index, instance in enumerate(scene.instances):
+        source = scene.meshes[instance.mesh].colour
+        if source is not None:
+            vertex = np.unique(geometry.triangle[geometry.instance == index])
+            colour[vertex] = source[geometry.vertex_source[vertex], :3]
+    return colour
