@@ -26,7 +26,8 @@ class TexelBuffer:
         Triangles that each front texel's square touches, and their areas inside it in texels.
     chart, instance : (n,) int32
     area : (n,) float32, m2 of surface inside the texel
-    position : (n, 3) float32, metres, centroid of that surface
+    centroid : (n_front, 2) float32, of that surface in the page, texels from the texel's centre
+    position : (n, 3) float32, metres, at that centroid
     normal : (n, 3) float32, unit, shading, flipped on back entries
     albedo : (n, 3) float32, linear Rec.709
     lookup : (P * H * W,) int32, entry of each pixel or -1
@@ -44,6 +45,7 @@ class TexelBuffer:
     chart: NDArray[np.int32]
     instance: NDArray[np.int32]
     area: NDArray[np.float32]
+    centroid: NDArray[np.float32]
     position: NDArray[np.float32]
     normal: NDArray[np.float32]
     albedo: NDArray[np.float32]

@@ -77,17 +77,18 @@ def _corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None])
     if all(texture is None for texture in textures):
         return np.zeros((1, 2), np.float32)
     uv = np.zeros((len(geometry.position), 2), np.float32)
+    bound = np.searchsorted(geometry.instance, np.arange(len(scene.instances) + 1))
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
-        of_instance = geometry.instance == index
-        for material in np.unique(geometry.material[of_instance]):
+        span = slice(bound[index], bound[index + 1])
+        for material in np.unique(geometry.material[span]):
             texture = textures[material]
             if texture is None or texture.texcoord >= len(mesh.texcoord):
                 continue
             coordinate = mesh.texcoord[texture.texcoord]
             if coordinate is None:
                 continue
-            vertex = np.unique(geometry.triangle[of_instance & (geometry.material == material)])
+            vertex = np.unique(geometry.triangle[span][geometry.material[span] == material])
             source = coordinate[geometry.vertex_source[vertex]].astype(np.float64)
             uv[vertex] = source @ texture.transform[:, :2].T + texture.transform[:, 2]
     return uv
@@ -98,9 +99,10 @@ def _vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
     if all(scene.meshes[i.mesh].colour is None for i in scene.instances):
         return np.ones((1, 3), np.float32)
     colour = np.ones((len(geometry.position), 3), np.float32)
+    bound = np.searchsorted(geometry.instance, np.arange(len(scene.instances) + 1))
     for index, instance in enumerate(scene.instances):
         source = scene.meshes[instance.mesh].colour
         if source is not None:
-            vertex = np.unique(geometry.triangle[geometry.instance == index])
+            vertex = np.unique(geometry.triangle[bound[index] : bound[index + 1]])
             colour[vertex] = source[geometry.vertex_source[vertex], :3]
     return colour

@@ -1,0 +1,139 @@
+"""What each texel is made of: centre, normal, area and albedo from the triangles inside it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area
+from baker.kernels.surface import N_POINTS, _place, place_points
+from baker.kernels.textures import sample_texture
+
+
+@njit(cache=True, nogil=True)
+def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):  # type: ignore[no-untyped-def]
+    """Fill the geometry of front entries begin to end.
+
+    triangle_scale : (T,) float32, m2 of surface per texel of uv
+    area : (n,) float32, m2; centroid : (n, 2) float32, of the covered part, texels from the centre
+    position, normal : (n, 3) float32, world, at that centroid
+    """
+    corner = np.zeros((3, 2))
+    cut = np.zeros((MAX_CORNERS, 2))
+    spare = np.zeros((MAX_CORNERS, 2))
+    for i in range(begin, end):
+        rest = surface.pixel[i] % (surface.size * surface.size)
+        x0 = rest % surface.size
+        y0 = rest // surface.size
+        total = metres = cx = cy = 0.0
+        main = surface.entry[surface.first[i]]
+        most = -1.0
+        for e in range(surface.first[i], surface.first[i + 1]):
+            t = surface.entry[e]
+            inside = float(surface.entry_area[e])
+            if inside > most:
+                most, main = inside, t
+            metres += inside * triangle_scale[t]
+            mx = my = 0.5
+            if inside < 0.999999:
+                for c in range(3):
+                    corner[c, 0] = surface.uv[surface.triangle[t, c], 0] * surface.size
+                    corner[c, 1] = surface.uv[surface.triangle[t, c], 1] * surface.size
+                mx, my = _centroid(cut, clip_to_square(corner, x0, y0, cut, spare))
+            weight = max(inside, 1.0e-12)
+            total += weight
+            cx += weight * mx
+            cy += weight * my
+        centroid[i, 0] = cx / total - 0.5
+        centroid[i, 1] = cy / total - 0.5
+        area[i] = metres
+        _place(surface, main, x0 + cx / total, y0 + cy / total, False, position[i], normal[i])
+
+
+@njit(cache=True, nogil=True)
+def _centroid(polygon, n):  # type: ignore[no-untyped-def]
+    """Return the area centroid of a convex polygon; the mean of its corners if it has no area."""
+    total = polygon_area(polygon, n)
+    x = y = 0.0
+    if n == 0:
+        return 0.5, 0.5
+    if total <= 1.0e-14:
+        for i in range(n):
+            x += polygon[i, 0] / n
+            y += polygon[i, 1] / n
+        return x, y
+    for i in range(1, n - 1):
+        area = 0.5 * abs(
+            (polygon[i, 0] - polygon[0, 0]) * (polygon[i + 1, 1] - polygon[0, 1])
+            - (polygon[i + 1, 0] - polygon[0, 0]) * (polygon[i, 1] - polygon[0, 1])
+        )
+        x += area / total * (polygon[0, 0] + polygon[i, 0] + polygon[i + 1, 0]) / 3.0
+        y += area / total * (polygon[0, 1] + polygon[i, 1] + polygon[i + 1, 1]) / 3.0
+    return x, y
+
+
+@njit(cache=True, nogil=True)
+def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
+    """Interpolate a per-vertex (V, 2) uv at barycentrics of triangle t."""
+    b0 = 1.0 - b1 - b2
+    i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+    return b0 * uv[i, 0] + b1 * uv[j, 0] + b2 * uv[k, 0], b0 * uv[i, 1] + b1 * uv[j, 1] + b2 * uv[k, 1]
+
+
+@njit(cache=True, nogil=True)
+def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
+    """Return the width in image uv of the part of a texel that one of its points stands for."""
+    i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
+    lightmap = abs(
+        (surface.uv[j, 0] - surface.uv[i, 0]) * (surface.uv[k, 1] - surface.uv[i, 1])
+        - (surface.uv[k, 0] - surface.uv[i, 0]) * (surface.uv[j, 1] - surface.uv[i, 1])
+    ) * float(surface.size * surface.size)
+    image = abs(
+        (image_uv[j, 0] - image_uv[i, 0]) * (image_uv[k, 1] - image_uv[i, 1])
+        - (image_uv[k, 0] - image_uv[i, 0]) * (image_uv[j, 1] - image_uv[i, 1])
+    )
+    return np.sqrt(image / max(lightmap, 1.0e-12) / N_POINTS)
+
+
+@njit(cache=True, nogil=True)
+def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyped-def]
+    """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32."""
+    origin = np.zeros((1, N_POINTS, 3), np.float32)
+    normal = np.zeros((1, N_POINTS, 3), np.float32)
+    hit = np.zeros((1, N_POINTS), np.int32)
+    bary = np.zeros((1, N_POINTS, 2), np.float32)
+    rgba = np.zeros(4)
+    coloured = len(shading.colour) > 1
+    for i in range(begin, end):
+        first = shading.material[surface.entry[surface.first[i]]]
+        plain = not coloured
+        for e in range(surface.first[i], surface.first[i + 1]):
+            m = shading.material[surface.entry[e]]
+            plain = plain and m == first and shading.base_texture[m] < 0
+        if plain:
+            for c in range(3):
+                albedo[i, c] = shading.base[first, c]
+            continue
+        place_points(surface, i, i + 1, origin, normal, hit, bary)
+        for c in range(3):
+            albedo[i, c] = 0.0
+        for k in range(N_POINTS):
+            t = hit[0, k]
+            m = shading.material[t]
+            b1, b2 = bary[0, k, 0], bary[0, k, 1]
+            for c in range(3):
+                rgba[c] = 1.0
+            if shading.base_texture[m] >= 0:
+                u, v = uv_at(shading.base_uv, surface.triangle, t, b1, b2)
+                width = texel_footprint(surface, shading.base_uv, t)
+                sample_texture(shading.pack, shading.base_texture[m], u, v, width, rgba)
+            for c in range(3):
+                value = shading.base[m, c] * rgba[c] / N_POINTS
+                if coloured:
+                    i0, i1, i2 = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
+                    value *= (
+                        (1.0 - b1 - b2) * shading.colour[i0, c]
+                        + b1 * shading.colour[i1, c]
+                        + b2 * shading.colour[i2, c]
+                    )
+                albedo[i, c] += value

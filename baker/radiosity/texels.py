@@ -1,0 +1,131 @@
+"""From charts to texels: coverage, points, area, normal and albedo of every texel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas
+from baker.core.geometry import Geometry
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.core.texels import TexelBuffer
+from baker.kernels.sampling import sobol_reversed
+from baker.kernels.surface import N_POINTS, Surface
+from baker.kernels.texel_info import texel_albedo, texel_geometry
+from baker.kernels.texel_raster import count_overlaps, fill_overlaps, keep_main_chart, morton_keys
+from baker.radiosity.materials import Shading
+
+_TILE = 4096
+STAGE = "texels"
+
+
+def build_texels(
+    geometry: Geometry, shading: Shading, atlas: Atlas, *, seed: int, threads: int, progress: Progress
+) -> tuple[TexelBuffer, Surface]:
+    """Find the texels of all pages and what lies in them.
+
+    Returns
+    -------
+    TexelBuffer
+        Fronts first, then the backs of texels on double-sided surfaces.
+    Surface
+        The same for kernels that start rays.
+    """
+    size = atlas.resolution
+    pixel, first, entry, entry_area, chart = _overlaps(geometry, size, atlas.n_pages)
+    n_front = len(pixel)
+    two_sided = np.zeros(n_front, bool)
+    if geometry.double_sided.any():
+        owner = np.repeat(np.arange(n_front), np.diff(first))
+        two_sided[owner[geometry.double_sided[entry]]] = True
+    front = np.concatenate([np.arange(n_front), np.flatnonzero(two_sided)]).astype(np.int32)
+    back = np.arange(len(front)) >= n_front
+    surface = Surface(
+        position=geometry.position,
+        normal=geometry.normal,
+        uv=geometry.uv,
+        triangle=geometry.triangle,
+        face_normal=geometry.face_normal,
+        size=size,
+        pixel=pixel[front],
+        front=front,
+        back=back,
+        first=first,
+        entry=entry,
+        entry_area=entry_area,
+        net=sobol_reversed(N_POINTS, seed, 7),
+        least=np.float32(0.05 * geometry.diagonal),
+    )
+    area = np.zeros(n_front, np.float32)
+    centroid = np.zeros((n_front, 2), np.float32)
+    position = np.zeros((n_front, 3), np.float32)
+    normal = np.zeros((n_front, 3), np.float32)
+    albedo = np.zeros((n_front, 3), np.float32)
+    scale = _metres2_per_texel(geometry, size)
+
+    def work(begin: int, end: int) -> None:
+        texel_geometry(surface, scale, begin, end, area, centroid, position, normal)
+        texel_albedo(surface, shading, begin, end, albedo)
+
+    run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
+    lookup = np.full(atlas.n_pages * size * size, -1, np.int32)
+    lookup[pixel] = np.arange(n_front, dtype=np.int32)
+    back_entry = np.full(n_front, -1, np.int32)
+    back_entry[front[n_front:]] = np.arange(n_front, len(front), dtype=np.int32)
+    main = geometry.instance[entry[first[:-1]]] if n_front else np.zeros(0, np.int32)
+    texels = TexelBuffer(
+        resolution=size,
+        n_pages=atlas.n_pages,
+        n_front=n_front,
+        pixel=surface.pixel,
+        back=back,
+        first=first,
+        entry=entry,
+        entry_area=entry_area,
+        chart=chart[front],
+        instance=main[front],
+        area=area[front],
+        centroid=centroid,
+        position=position[front],
+        normal=np.where(back[:, None], -normal[front], normal[front]),
+        albedo=albedo[front],
+        lookup=lookup,
+        back_entry=back_entry,
+    )
+    return texels, surface
+
+
+def _overlaps(
+    geometry: Geometry, size: int, n_pages: int
+) -> tuple[
+    NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]
+]:
+    """Return pixel (n,), first (n + 1,), entry and area (m,), chart (n,) of covered texels in Morton order."""
+    count = np.zeros(n_pages * size * size, np.int32)
+    count_overlaps(geometry.uv, geometry.triangle, geometry.page, size, count)
+    pixel = np.flatnonzero(count)
+    key = np.zeros(len(pixel), np.uint64)
+    morton_keys(pixel, size, key)
+    pixel = pixel[np.argsort(key, kind="stable")]
+    first = np.zeros(len(pixel) + 1, np.int64)
+    np.cumsum(count[pixel], out=first[1:])
+    start = np.zeros(len(count), np.int64)
+    start[pixel] = first[:-1]
+    entry = np.zeros(first[-1], np.int32)
+    area = np.zeros(first[-1], np.float32)
+    fill_overlaps(geometry.uv, geometry.triangle, geometry.page, size, start, entry, area)
+    chart = np.zeros(len(pixel), np.int32)
+    kept = np.zeros(len(entry), bool)
+    keep_main_chart(first, entry, area, geometry.chart, chart, kept)
+    before = np.zeros(len(kept) + 1, np.int64)
+    np.cumsum(kept, out=before[1:])
+    return pixel, before[first], entry[kept], area[kept], chart
+
+
+def _metres2_per_texel(geometry: Geometry, size: int) -> NDArray[np.float32]:
+    """Return (T,) float32: world area over uv area in texels, 0 where a triangle has no uv area."""
+    corner = geometry.uv[geometry.triangle].astype(np.float64) * size
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    texels = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return np.where(texels > 1e-9, geometry.area / np.maximum(texels, 1e-9), 0.0).astype(np.float32)
