@@ -1,0 +1,162 @@
+"""OpenEXR: half or float numbers, ZIP, scanlines, channels R G B or Y.
+
+Those are the choices that every engine and viewer reads. Files carry no time stamp, so the same pixels
+give the same bytes.
+
+Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Standard Optional Attributes").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.encoding import ENCODINGS, DecodedImage
+from baker.core.errors import InputError, ResourceError
+
+# The largest finite half.
+HALF_MAX = 65504.0
+
+# Rec.709 primaries and the D65 white point as CIE xy: red, green, blue, white.
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+_NAMES = {1: ("Y",), 3: ("R", "G", "B")}
+
+
+def encode_exr(
+    path: Path, pixels: NDArray[np.float32], *, half: bool = True, header: Mapping[str, str] | None = None
+) -> int:
+    """Write one image and read it back to be sure that all of it reached the disk.
+
+    Parameters
+    ----------
+    path : Path
+    pixels : (H, W, C) float32, linear Rec.709 for C = 3, C is 1 or 3, row 0 on top
+    half : bool
+        16 bit numbers; otherwise 32 bit.
+    header : mapping of str to str
+        Further attributes, like quantity and unit.
+
+    Returns
+    -------
+    int
+        Texels with a channel outside the range of the number format; they are stored at its end.
+
+    Raises
+    ------
+    ValueError
+        If a pixel is not a number, or the shape is not (H, W, 1) or (H, W, 3).
+    ResourceError
+        If the file cannot be written.
+    """
+    if pixels.ndim != 3 or pixels.shape[2] not in _NAMES or 0 in pixels.shape:
+        raise ValueError(f"pixels of shape {pixels.shape} are neither (H, W, 1) nor (H, W, 3)")
+    if np.isnan(pixels).any():
+        count = int(np.isnan(pixels).any(axis=2).sum())
+        raise ValueError(f"{count} texels are not a number; {path.name} is not written")
+    top = HALF_MAX if half else float(np.finfo(np.float32).max)
+    clipped = int((np.abs(pixels) > top).any(axis=2).sum())
+    stored = np.clip(pixels, -top, top).astype(np.float16 if half else np.float32)
+    _write(path, stored, dict(header or {}))
+    return clipped
+
+
+def decode_exr(path: Path) -> DecodedImage:
+    """Read an EXR of one part.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    DecodedImage
+        Channels R, G, B, A first if there, then the others by name.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, or holds channels of several sizes.
+    """
+    import OpenEXR
+
+    if not path.is_file():
+        raise InputError("there is no such file", file=str(path))
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+            header = {str(key): _text(value) for key, value in file.header().items() if key != "channels"}
+    # OpenEXR reports every damage as a RuntimeError or ValueError with its own sentence.
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(f"this is not a readable EXR image ({_first_line(error)})", file=str(path)) from None
+    names = sorted(planes, key=lambda name: ("RGBA".find(name) if name in "RGBA" else 4, name))
+    if len({plane.shape for plane in planes.values()}) != 1:
+        raise InputError("its channels are absent or differ in size", file=str(path))
+    dtype = {"float16": "half", "float32": "float"}.get(str(planes[names[0]].dtype), "uint")
+    pixels = np.stack([planes[name].astype(np.float32) for name in names], axis=-1)
+    return DecodedImage(pixels, header, dtype, tuple(names))
+
+
+class ExrEncoding:
+    """Files `encode_exr` and `decode_exr` under the name `exr`."""
+
+    suffix = ".exr"
+
+    def encode(
+        self, path: Path, pixels: NDArray[np.float32], *, half: bool, header: Mapping[str, str]
+    ) -> int:
+        """Write pixels; see `encode_exr`."""
+        return encode_exr(path, pixels, half=half, header=header)
+
+    def decode(self, path: Path) -> DecodedImage:
+        """Read pixels; see `decode_exr`."""
+        return decode_exr(path)
+
+
+ENCODINGS.register("exr")(ExrEncoding())
+
+
+def _write(path: Path, stored: NDArray[Any], attributes: dict[str, str]) -> None:
+    import OpenEXR
+
+    header: dict[str, object] = dict(sorted(attributes.items()))
+    header["compression"] = OpenEXR.ZIP_COMPRESSION
+    header["type"] = OpenEXR.scanlineimage
+    if stored.shape[2] == 3:
+        header["chromaticities"] = REC709
+    names = _NAMES[stored.shape[2]]
+    planes = {name: np.ascontiguousarray(stored[:, :, index]) for index, name in enumerate(names)}
+    try:
+        # OpenEXR keeps the dictionary it is given and empties it, hence the copy.
+        with OpenEXR.File(header, dict(planes)) as file:
+            file.write(str(path))
+        # A disk that fills up while the file is closed raises nothing: only reading it back tells.
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            back = file.channels()
+            complete = all(np.array_equal(back[name].pixels, plane) for name, plane in planes.items())
+    except (RuntimeError, OSError) as error:
+        raise ResourceError(
+            f"the image could not be written ({_first_line(error)})", file=str(path)
+        ) from None
+    if not complete:
+        raise ResourceError("the image did not reach the disk whole; free some space", file=str(path))
+
+
+def _text(value: object) -> str:
+    """Return a header value as one line of plain text."""
+    if isinstance(value, tuple | list):
+        return ", ".join(_text(part) for part in value)
+    if isinstance(value, np.ndarray):
+        return ", ".join(f"{part:g}" for part in value.ravel())
+    if isinstance(value, float):
+        return f"{value:g}"
+    name = getattr(value, "name", None)
+    return str(name) if name is not None else str(value)
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(". ")
