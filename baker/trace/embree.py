@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, files, version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +83,7 @@ def embreex_version() -> str:
     return version("embreex")
 
 
-@dataclass(frozen=True)
-class Tracer:
+class Tracer(NamedTuple):
     """What a kernel needs to trace: plain integers, valid while its `RayScene` lives.
 
     Attributes

@@ -1,0 +1,193 @@
+"""Irradiance of texels from emissive triangles: shadow rays to sampled points, weighted for MIS.
+
+    E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
+
+The balance heuristic leaves the rest to hemisphere rays that hit the same emitters.
+Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.emitters import (
+    bounding_sphere,
+    cluster_chances,
+    emitted_radiance,
+    emitter_density,
+    sample_emitter,
+)
+from baker.kernels.hits import front_facing
+from baker.kernels.rays import FAR, aim_cosine
+from baker.kernels.sampling import hash_combine, texel_scramble
+from baker.kernels.surface import N_POINTS, drop_buried, place_points
+from baker.trace.packets import (
+    DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_packet, set_ray, trace,
+)  # fmt: skip
+
+_f = np.float32
+_u = np.uint32
+_INV_PI = 1.0 / math.pi
+# Shadow rays end this share of their length before the light.
+_SHORT = np.float32(0.9999)
+
+
+@njit(cache=True, nogil=True)
+def mis_weighted(radiance, cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+    """Return radiance * cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
+    return radiance * cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
+
+
+@njit(cache=True, nogil=True)
+def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, shared, hemisphere, out, second):  # type: ignore[no-untyped-def]
+    """Add the light-sampled share of irradiance of entries begin to end.
+
+    net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
+    hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
+    out : (n_entries, 6) float32, lx: two differently weighted estimates of RGB
+    second : (n_entries,) float32, mean square over 16 batches of the first estimate's sum
+    """
+    n_samples = len(net)
+    width = tracer.width
+    valid, floats, words = new_packet()
+    n = end - begin
+    origin = np.zeros((n, N_POINTS, 3), np.float32)
+    normal = np.zeros((n, N_POINTS, 3), np.float32)
+    hit = np.zeros((n, N_POINTS), np.int32)
+    bary = np.zeros((n, N_POINTS, 2), np.float32)
+    place_points(surface, begin, end, origin, normal, hit, bary)
+    drop_buried(mask, begin, end, origin, normal)
+    chance = np.zeros(len(emitters.power), np.float32)
+    cumulative = np.zeros(len(emitters.power), np.float32)
+    x, y, z, radius = bounding_sphere(origin.reshape(n * N_POINTS, 3), 0, n * N_POINTS)
+    if not cluster_chances(emitters, x, y, z, radius, chance, cumulative):
+        return
+    point = np.zeros(3, np.float32)
+    radiance = np.zeros(4)
+    value = np.zeros((width, 6))
+    batch = np.zeros((width, N_POINTS))
+    total = np.zeros((width, 6))
+    for group in range(0, n, width):
+        lanes = min(width, n - group)
+        total[:] = 0.0
+        batch[:] = 0.0
+        for s in range(n_samples):
+            k = s * N_POINTS // n_samples
+            any_lane = False
+            for lane in range(width):
+                valid[lane] = 0
+                if lane >= lanes:
+                    continue
+                i = group + lane
+                seed = _u(begin + i)
+                u = texel_scramble(net[s, 0], hash_combine(seed, _u(31)), shared)
+                v = texel_scramble(net[s, 1], hash_combine(seed, _u(32)), shared)
+                m, density, b1, b2 = sample_emitter(emitters, chance, cumulative, u, v, point)
+                o = origin[i, k]
+                dx, dy, dz = point[0] - o[0], point[1] - o[1], point[2] - o[2]
+                square = dx * dx + dy * dy + dz * dz
+                if square <= _f(0.0):
+                    continue
+                length = math.sqrt(square)
+                cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / length
+                light = -(dx * emitters.normal[m, 0] + dy * emitters.normal[m, 1] + dz * emitters.normal[m, 2]) / length
+                if emitters.two_sided[m]:
+                    light = abs(light)
+                if cosine <= _f(0.0) or light <= _f(1.0e-6):
+                    continue
+                emitted_radiance(shading, surface.triangle, emitters.triangle[m], b1, b2, radiance)
+                steradian = density * square / light
+                for c in range(3):
+                    value[lane, c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[0])
+                    value[lane, 3 + c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[1])
+                set_ray(floats, words, width, lane, o[0], o[1], o[2], dx, dy, dz, _f(0.0), _SHORT)
+                valid[lane] = -1
+                any_lane = True
+            if not any_lane:
+                continue
+            trace(tracer.occluded, tracer.scene, valid, floats)
+            for lane in range(lanes):
+                if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
+                    for c in range(6):
+                        total[lane, c] += value[lane, c]
+                    batch[lane, k] += value[lane, 0] + value[lane, 1] + value[lane, 2]
+        for lane in range(lanes):
+            squares = 0.0
+            for k in range(N_POINTS):
+                squares += batch[lane, k] * batch[lane, k]
+            second[begin + group + lane] = squares
+            for c in range(6):
+                out[begin + group + lane, c] += total[lane, c]
+
+
+@njit(cache=True, nogil=True)
+def hemisphere_hits(surface, mask, table, emitters, shading, tracer, begin, end, net, shared, n_light, out):  # type: ignore[no-untyped-def]
+    """Add to out[:, 3:6] the share of irradiance that cosine-weighted rays find at emitters.
+
+    The other half of `light_samples`'s second estimate; n_light is its number of shadow rays.
+    """
+    n_samples = len(net)
+    width = tracer.width
+    valid, floats, words = new_packet()
+    n = end - begin
+    origin = np.zeros((n, N_POINTS, 3), np.float32)
+    normal = np.zeros((n, N_POINTS, 3), np.float32)
+    hit = np.zeros((n, N_POINTS), np.int32)
+    bary = np.zeros((n, N_POINTS, 2), np.float32)
+    place_points(surface, begin, end, origin, normal, hit, bary)
+    drop_buried(mask, begin, end, origin, normal)
+    chance = np.zeros(len(emitters.power), np.float32)
+    cumulative = np.zeros(len(emitters.power), np.float32)
+    x, y, z, radius = bounding_sphere(origin.reshape(n * N_POINTS, 3), 0, n * N_POINTS)
+    cluster_chances(emitters, x, y, z, radius, chance, cumulative)
+    radiance = np.zeros(4)
+    for group in range(0, n, width):
+        lanes = min(width, n - group)
+        for lane in range(width):
+            valid[lane] = -1 if lane < lanes else 0
+        for s in range(n_samples):
+            k = s * N_POINTS // n_samples
+            for lane in range(lanes):
+                seed = _u(begin + group + lane)
+                u = texel_scramble(net[s, 0], hash_combine(seed, _u(41)), shared)
+                v = texel_scramble(net[s, 1], hash_combine(seed, _u(42)), shared)
+                i = group + lane
+                aim_cosine(floats, words, width, lane, origin[i, k], normal[i, k], u, v, FAR)
+            trace(tracer.intersect, tracer.scene, valid, floats)
+            for lane in range(lanes):
+                if words[GEOM_ID * width + lane] == NO_HIT:
+                    continue
+                prim = np.int64(words[PRIM_ID * width + lane])
+                m = np.int64(table.row[prim, 12])
+                if m < 0:
+                    continue
+                w = normal[group + lane, k]
+                weight = emitter_hit(
+                    table, emitters, chance, cumulative, prim, m, floats[DIR_X * width + lane],
+                    floats[DIR_Y * width + lane], floats[DIR_Z * width + lane], w, floats[TFAR * width + lane],
+                    n_light, n_samples,
+                )  # fmt: skip
+                if weight > 0.0:
+                    emitted_radiance(
+                        shading, surface.triangle, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane],
+                        radiance,
+                    )  # fmt: skip
+                    for c in range(3):
+                        out[begin + group + lane, 3 + c] += radiance[c] * weight
+
+
+@njit(cache=True, nogil=True)
+def emitter_hit(table, emitters, chance, cumulative, prim, m, dx, dy, dz, w, distance, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+    """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0 for its back)."""
+    front = front_facing(table, prim, dx, dy, dz)
+    if not front and not emitters.two_sided[m]:
+        return 0.0
+    cosine = dx * w[0] + dy * w[1] + dz * w[2]
+    light = abs(dx * emitters.normal[m, 0] + dy * emitters.normal[m, 1] + dz * emitters.normal[m, 2])
+    if cosine <= 0.0 or light <= 1.0e-6:
+        return 0.0
+    density = emitter_density(emitters, chance, cumulative, m) * distance * distance / light
+    return mis_weighted(1.0, cosine, density, n_light, n_hemisphere)

@@ -1,0 +1,149 @@
+"""Emissive triangles: which one to sample from where, and with what density.
+
+Triangles are grouped into clusters of neighbours. For a tile of texels each cluster gets a chance
+that bounds its contribution (power, distance, facing); inside a cluster the chance follows power.
+
+Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
+Conty Estevez and Kulla, Importance sampling of many lights with adaptive tree splitting, 2018.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from baker.kernels.sampling import triangle_barycentric
+from baker.kernels.texel_info import uv_at
+from baker.kernels.textures import sample_texture
+
+
+class Emitters(NamedTuple):
+    """M emissive triangles in C clusters.
+
+    triangle (M,) int32, numbers in the scene, cluster after cluster; corner (M, 9) float32; normal
+    (M, 3) float32; area (M,) float32; two_sided (M,) bool; share (M,) float32, chance inside its
+    cluster; cumulative (M,) float32, running sum of `share` inside the cluster; cluster (M,) int32;
+    first (C + 1,) int32; centre (C, 3), radius (C,), power (C,), axis (C, 3) float32; spread (C,)
+    float32, radians, pi for clusters with two-sided triangles.
+    """
+
+    triangle: NDArray[np.int32]
+    corner: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    area: NDArray[np.float32]
+    two_sided: NDArray[np.bool_]
+    share: NDArray[np.float32]
+    cumulative: NDArray[np.float32]
+    cluster: NDArray[np.int32]
+    first: NDArray[np.int32]
+    centre: NDArray[np.float32]
+    radius: NDArray[np.float32]
+    power: NDArray[np.float32]
+    axis: NDArray[np.float32]
+    spread: NDArray[np.float32]
+
+
+@njit(cache=True, nogil=True)
+def bounding_sphere(position, begin, end):  # type: ignore[no-untyped-def]
+    """Return x, y, z, radius of a sphere around position[begin:end]: its box's centre and half diagonal."""
+    low = np.full(3, 1.0e30)
+    high = np.full(3, -1.0e30)
+    for i in range(begin, end):
+        for a in range(3):
+            low[a] = min(low[a], position[i, a])
+            high[a] = max(high[a], position[i, a])
+    half = 0.5 * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2 + (high[2] - low[2]) ** 2)
+    return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]), half
+
+
+@njit(cache=True, nogil=True)
+def cluster_chances(emitters, x, y, z, radius, chance, cumulative):  # type: ignore[no-untyped-def]
+    """Fill `chance` and `cumulative` (C,) float32 for points within a sphere.
+
+    A cluster's chance is zero only if no point of the sphere can see the front of its triangles.
+    """
+    total = 0.0
+    n = len(chance)
+    for c in range(n):
+        dx = x - emitters.centre[c, 0]
+        dy = y - emitters.centre[c, 1]
+        dz = z - emitters.centre[c, 2]
+        distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+        reach = radius + emitters.radius[c]
+        weight = emitters.power[c] / max(distance * distance, reach * reach + 1.0e-12)
+        if distance > reach and emitters.spread[c] < 3.0:
+            facing = (dx * emitters.axis[c, 0] + dy * emitters.axis[c, 1] + dz * emitters.axis[c, 2]) / distance
+            angle = math.acos(min(max(facing, -1.0), 1.0)) - emitters.spread[c] - math.asin(reach / distance)
+            if angle >= 0.5 * math.pi:
+                weight = 0.0
+            elif angle > 0.0:
+                # Never let a chance fall far below the others': the bound is rough.
+                weight *= max(math.cos(angle), 0.05)
+        chance[c] = weight
+        total += weight
+    lit = 0
+    for c in range(n):
+        lit += chance[c] > 0.0
+    running = 0.0
+    for c in range(n):
+        if total > 0.0 and chance[c] > 0.0:
+            chance[c] = 0.95 * chance[c] / total + 0.05 / lit
+        running += chance[c]
+        cumulative[c] = running
+    return total > 0.0
+
+
+@njit(cache=True, nogil=True)
+def _find(cumulative, begin, end, u):  # type: ignore[no-untyped-def]
+    """Return the first index in [begin, end) whose running sum exceeds u (the last one otherwise)."""
+    low = begin
+    high = end - 1
+    while low < high:
+        middle = (low + high) // 2
+        if cumulative[middle] > u:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit(cache=True, nogil=True)
+def sample_emitter(emitters, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
+    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2."""
+    total = cumulative[len(cumulative) - 1]
+    u *= total
+    c = _find(cumulative, 0, len(cumulative), u)
+    u = min(max((u - (cumulative[c] - chance[c])) / chance[c], 0.0), 0.9999999)
+    m = _find(emitters.cumulative, emitters.first[c], emitters.first[c + 1], u)
+    share = emitters.share[m]
+    u = min(max((u - (emitters.cumulative[m] - share)) / share, 0.0), 0.9999999)
+    b1, b2 = triangle_barycentric(np.float32(u), np.float32(v))
+    b0 = np.float32(1.0) - b1 - b2
+    for a in range(3):
+        point[a] = b0 * emitters.corner[m, a] + b1 * emitters.corner[m, 3 + a] + b2 * emitters.corner[m, 6 + a]
+    return m, chance[c] / total * share / emitters.area[m], b1, b2
+
+
+@njit(cache=True, nogil=True)
+def emitter_density(emitters, chance, cumulative, m):  # type: ignore[no-untyped-def]
+    """Return the density per m2 with which `sample_emitter` picks a point of emitter m."""
+    total = cumulative[len(cumulative) - 1]
+    if total <= 0.0:
+        return 0.0
+    return chance[emitters.cluster[m]] / total * emitters.share[m] / emitters.area[m]
+
+
+@njit(cache=True, nogil=True)
+def emitted_radiance(shading, triangle, t, b1, b2, out):  # type: ignore[no-untyped-def]
+    """Write the radiance (cd/m2) that triangle t emits at barycentrics to `out` (4,)."""
+    m = shading.material[t]
+    out[0] = out[1] = out[2] = 1.0
+    if shading.emission_texture[m] >= 0:
+        u, v = uv_at(shading.emission_uv, triangle, t, b1, b2)
+        sample_texture(shading.pack, shading.emission_texture[m], u, v, 0.0, out)
+    for c in range(3):
+        out[c] *= shading.emission[m, c]

@@ -1,0 +1,200 @@
+"""Form factors of patches by cosine-weighted rays, and the sweeps that solve with them.
+
+    F_ij = share of what leaves patch i that arrives at j = share of i's cosine rays that hit j
+
+Based on: Malley, A shading method for computer generated images, 1988; Goral et al., Modeling the
+interaction of light between diffuse surfaces, 1984; Cohen and Wallace, Radiosity and realistic image
+synthesis, 1993, ch. 5.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.hits import front_facing, hit_entry
+from baker.kernels.rays import FAR, aim_cosine
+from baker.kernels.sampling import hash_combine, texel_scramble
+from baker.kernels.surface import N_POINTS, drop_buried, place_points
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, new_packet, trace
+
+_f = np.float32
+_u = np.uint32
+
+
+@njit(cache=True, nogil=True)
+def cast_form_factors(surface, mask, table, patch, member_first, member, weight, tracer, begin, end, net, shared, target, tally):  # type: ignore[no-untyped-def]
+    """Cast the rays of patches begin to end.
+
+    patch : (n_entries,) int32, patch of each texel entry
+    member_first : (P + 1,) int64; member : (n_entries,) int32, texel entries patch by patch
+    weight : (n_entries,) float32, running share of the patch's area, 1 at its last member
+    net : (R, 2) uint32
+    target : (P_tile, R) int32 output, rows relative to `begin`: patch hit, or -1
+    tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
+    """
+    n_rays = len(net)
+    width = tracer.width
+    valid, floats, words = new_packet()
+    origin = np.zeros((width, 1, N_POINTS, 3), np.float32)
+    normal = np.zeros((width, 1, N_POINTS, 3), np.float32)
+    hit = np.zeros((1, N_POINTS), np.int32)
+    bary = np.zeros((1, N_POINTS, 2), np.float32)
+    placed = np.zeros(width, np.int64)
+    for group in range(begin, end, width):
+        lanes = min(width, end - group)
+        placed[:] = -1
+        for lane in range(width):
+            valid[lane] = -1 if lane < lanes else 0
+        for r in range(n_rays):
+            for lane in range(lanes):
+                p = group + lane
+                # The ray's number walks over the patch's area: every texel starts its share of rays.
+                share = (r + 0.5) / n_rays
+                if placed[lane] < 0:
+                    placed[lane] = member_first[p]
+                    _place_one(surface, mask, member[placed[lane]], origin[lane], normal[lane], hit, bary)
+                moved = False
+                while placed[lane] < member_first[p + 1] - 1 and weight[placed[lane]] < share:
+                    placed[lane] += 1
+                    moved = True
+                if moved:
+                    _place_one(surface, mask, member[placed[lane]], origin[lane], normal[lane], hit, bary)
+                seed = _u(p)
+                u = texel_scramble(net[r, 0], hash_combine(seed, _u(61)), shared)
+                v = texel_scramble(net[r, 1], hash_combine(seed, _u(62)), shared)
+                k = np.int64(hash_combine(seed, _u(r)) & _u(N_POINTS - 1))
+                aim_cosine(floats, words, width, lane, origin[lane, 0, k], normal[lane, 0, k], u, v, FAR)
+            trace(tracer.intersect, tracer.scene, valid, floats)
+            for lane in range(lanes):
+                p = group + lane
+                target[p - begin, r] = -1
+                if words[GEOM_ID * width + lane] == NO_HIT:
+                    tally[p, 0] += 1
+                    continue
+                prim = np.int64(words[PRIM_ID * width + lane])
+                front = front_facing(
+                    table, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
+                    floats[DIR_Z * width + lane],
+                )  # fmt: skip
+                entry = hit_entry(table, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane], front)
+                if entry < 0:
+                    tally[p, 1] += 1
+                else:
+                    target[p - begin, r] = patch[entry]
+
+
+@njit(cache=True, nogil=True)
+def _place_one(surface, mask, entry, origin, normal, hit, bary):  # type: ignore[no-untyped-def]
+    place_points(surface, entry, entry + 1, origin, normal, hit, bary)
+    drop_buried(mask, entry, entry + 1, origin, normal)
+
+
+@njit(cache=True, nogil=True)
+def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-def]
+    """Merge equal targets of each row: sorted columns, how often each, and how many differ."""
+    for i in range(len(target)):
+        row = np.sort(target[i])
+        m = 0
+        for r in range(len(row)):
+            if row[r] < 0:
+                continue
+            if m and columns[i, m - 1] == row[r]:
+                counts[i, m - 1] += 1
+            else:
+                columns[i, m] = row[r]
+                counts[i, m] = 1
+                m += 1
+        lengths[i] = m
+
+
+@njit(cache=True, nogil=True)
+def jacobi_step(first, column, value, source, exitance, albedo, irradiance):  # type: ignore[no-untyped-def]
+    """Write irradiance = F (source + albedo * irradiance_before), `exitance` being that bracket."""
+    for i in range(len(first) - 1):
+        for c in range(3):
+            exitance[i, c] = source[i, c] + albedo[i, c] * irradiance[i, c]
+    for i in range(len(first) - 1):
+        a = b = c3 = 0.0
+        for k in range(first[i], first[i + 1]):
+            j = column[k]
+            f = value[k]
+            a += f * exitance[j, 0]
+            b += f * exitance[j, 1]
+            c3 += f * exitance[j, 2]
+        irradiance[i, 0] = a
+        irradiance[i, 1] = b
+        irradiance[i, 2] = c3
+
+
+@njit(cache=True, nogil=True)
+def gauss_seidel_step(first, column, value, albedo, exitance, irradiance):  # type: ignore[no-untyped-def]
+    """Sweep E_i = sum_j F_ij M_j once, in place; return the sum of squared changes and of squares of E.
+
+    exitance : (P, 3) float64 = source + albedo * irradiance, kept up to date
+    """
+    change = 0.0
+    size = 0.0
+    for i in range(len(first) - 1):
+        a = b = c3 = 0.0
+        for k in range(first[i], first[i + 1]):
+            j = column[k]
+            f = value[k]
+            a += f * exitance[j, 0]
+            b += f * exitance[j, 1]
+            c3 += f * exitance[j, 2]
+        for c in range(3):
+            new = a if c == 0 else (b if c == 1 else c3)
+            step = new - irradiance[i, c]
+            change += step * step
+            size += new * new
+            irradiance[i, c] = new
+            exitance[i, c] += albedo[i, c] * step
+    return change, size
+
+
+@njit(cache=True, nogil=True)
+def weigh_reciprocal(first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value):  # type: ignore[no-untyped-def]
+    """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
+
+    `other` is the transpose of F in CSR: row i has the entries F_ji. The variance of A_i F_ij is
+    proportional to A_i, so the best weights are A_j for the own estimate and A_i for the other's.
+    """
+    at = 0
+    for i in range(len(first) - 1):
+        out_first[i] = at
+        a = first[i]
+        b = other_first[i]
+        while a < first[i + 1] or b < other_first[i + 1]:
+            ca = column[a] if a < first[i + 1] else 2147483647
+            cb = other_column[b] if b < other_first[i + 1] else 2147483647
+            j = min(ca, cb)
+            both = area[i] + area[j]
+            f = 0.0
+            if ca == j:
+                f += value[a] * area[j] / both
+                a += 1
+            if cb == j:
+                f += other_value[b] * area[j] / both
+                b += 1
+            out_column[at] = j
+            out_value[at] = f
+            at += 1
+    out_first[len(first) - 1] = at
+
+
+@njit(cache=True, nogil=True)
+def scale_symmetric(first, column, value, area, goal, factor, steps):  # type: ignore[no-untyped-def]
+    """Find factors d (P,) so that d_i F_ij d_j has row sums `goal`, keeping A_i F_ij symmetric.
+
+    Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008 (damped form).
+    """
+    for _ in range(steps):
+        for i in range(len(first) - 1):
+            total = 0.0
+            for k in range(first[i], first[i + 1]):
+                total += value[k] * factor[column[k]]
+            if total > 0.0:
+                factor[i] = math.sqrt(factor[i] * goal[i] / total)
