@@ -1,0 +1,135 @@
+"""Denoises a lightmap page without darkening chart borders and without inventing light.
+
+1. Every chart's picture is continued into the gaps by reflection, since the filter takes the page for a
+   photograph and would draw the empty texels' black over the borders.
+2. Open Image Denoise's lightmap filter runs over the part of the page that has charts.
+3. The result is held to the samples: see `baker.kernels.page_guard`.
+
+Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the page filling follows from what
+the filter does at gaps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.progress import Progress, silent
+from baker.finish.noise import estimate_error
+from baker.finish.oidn import MEMORY_MB, denoiser_name, filter_lightmap
+from baker.finish.page import check_page
+from baker.finish.tiles import over_rows
+from baker.kernels.page_fill import nearest_texel, reflect_outwards
+from baker.kernels.page_guard import hold_to_samples
+
+__all__ = ["denoise_page", "denoiser_name", "surround_charts"]
+
+# The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
+REACH = 96
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+
+def denoise_page(
+    value: NDArray[np.float32],
+    covered: NDArray[np.bool_],
+    chart: NDArray[np.int32],
+    *,
+    standard_error: NDArray[np.float32] | None = None,
+    threads: int = 1,
+    memory_mb: int = MEMORY_MB,
+    progress: Progress = silent,
+) -> NDArray[np.float32]:
+    """Remove Monte Carlo noise from the covered texels of a page.
+
+    Parameters
+    ----------
+    value : (H, W, C) float32
+        Linear light, C = 3, or C = 1 (AO; filtered as grey). Buried texels filled before this.
+    covered : (H, W) bool
+    chart : (H, W) int32
+    standard_error : (H, W) float32, optional
+        Standard error of each texel's mean luminance (of the value itself if C = 1), in its unit. It limits
+        how far a texel may move; without it the noise is estimated from the page.
+    threads : int
+    memory_mb : int
+        Limit of the filter's scratch memory.
+    progress : Progress
+
+    Returns
+    -------
+    value : (H, W, C) float32
+        A new page; texels that are not covered are unchanged.
+
+    Raises
+    ------
+    ValueError
+        If the arrays do not belong together or C is neither 1 nor 3.
+    ResourceError
+        If Open Image Denoise cannot be loaded or runs out of memory.
+    Cancelled
+        If `progress` asked to stop.
+    """
+    check_page(value, chart, covered=covered)
+    if value.shape[2] not in (1, 3):
+        raise ValueError(f"a page to denoise has 1 or 3 channels, this one has {value.shape[2]}")
+    if standard_error is not None:
+        check_page(value, chart, standard_error=standard_error)
+    result = np.array(value)
+    if not covered.any():
+        return result
+    window = _window(covered)
+    inside, charts = covered[window], chart[window]
+    noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
+    picture = surround_charts(noisy, inside, charts, threads=threads)
+    filtered = filter_lightmap(picture, threads=threads, memory_mb=memory_mb, progress=progress)
+    if standard_error is None:
+        error = estimate_error(noisy @ LUMINANCE, charts, inside, threads=threads)
+    else:
+        error = np.ascontiguousarray(standard_error[window], np.float32)
+    held = np.array(filtered)
+    over_rows(
+        lambda first, end: hold_to_samples(noisy, filtered, charts, inside, error, held, first, end),
+        len(held),
+        threads,
+    )
+    result[window][inside] = held[inside][:, : value.shape[2]]
+    return result
+
+
+def surround_charts(
+    value: NDArray[np.float32], covered: NDArray[np.bool_], chart: NDArray[np.int32], *, threads: int = 1
+) -> NDArray[np.float32]:
+    """Fill every empty texel of a page with the reflection of the nearest chart.
+
+    This is the place for surroundings that know more: the texels across a chart's seam, resampled from the
+    neighbouring chart on the surface, belong here instead of the reflection.
+
+    Parameters
+    ----------
+    value : (H, W, C) float32
+    covered : (H, W) bool
+        At least one texel set.
+    chart : (H, W) int32
+    threads : int
+
+    Returns
+    -------
+    picture : (H, W, C) float32
+        Covered texels as they are, no texel empty.
+    """
+    nearest = np.zeros(covered.shape, np.int32)
+    nearest_texel(covered, nearest)
+    picture = np.array(value)
+    over_rows(
+        lambda first, end: reflect_outwards(picture, chart, covered, nearest, REACH, first, end),
+        len(picture),
+        threads,
+    )
+    return picture
+
+
+def _window(covered: NDArray[np.bool_]) -> tuple[slice, slice]:
+    # Smallest rectangle with all charts: the last page of an atlas is often nearly empty.
+    rows = np.flatnonzero(covered.any(axis=1))
+    columns = np.flatnonzero(covered.any(axis=0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -1,0 +1,72 @@
+"""Estimates a page's noise from the page itself, for callers that have no error bars.
+
+The filter is blind to planes, and the median over a block to the few texels on a shadow's edge; what is left
+is the texel-to-texel noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.finish.tiles import over_rows
+from baker.kernels.page_guard import high_pass
+
+BLOCK = 16
+# Fewer texels than this in a block say too little: the chart's (then the page's) median stands in.
+FEWEST = 12
+# Median of |x| of a standard normal variable.
+NORMAL_MEDIAN = 0.6744898
+
+
+def estimate_error(
+    grey: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_], *, threads: int = 1
+) -> NDArray[np.float32]:
+    """Estimate the standard deviation of the noise of each covered texel.
+
+    Parameters
+    ----------
+    grey : (H, W) float32
+    chart : (H, W) int32
+    covered : (H, W) bool
+    threads : int
+
+    Returns
+    -------
+    error : (H, W) float32
+        Constant over the texels of one chart in one block of 16 x 16; 0 where not covered.
+    """
+    passed = np.full(grey.shape, np.nan, np.float32)
+    over_rows(lambda first, end: high_pass(grey, chart, covered, passed, first, end), len(grey), threads)
+    rows, columns = np.nonzero(covered)
+    error = np.zeros(grey.shape, np.float32)
+    if len(rows) == 0:
+        return error
+    own = chart[rows, columns].astype(np.int64)
+    n_across = grey.shape[1] // BLOCK + 1
+    n_blocks = n_across * (grey.shape[0] // BLOCK + 1)
+    block = (rows // BLOCK) * n_across + columns // BLOCK
+    group = own * n_blocks + block
+    size = np.abs(passed[rows, columns])
+    known = np.isfinite(size)
+    everywhere = float(np.median(size[known])) if known.any() else 0.0
+    by_chart = _grouped_median(own, size, known, np.full(len(rows), everywhere))
+    by_block = _grouped_median(group, size, known, by_chart)
+    error[rows, columns] = (by_block / NORMAL_MEDIAN).astype(np.float32)
+    return error
+
+
+def _grouped_median(
+    group: NDArray[np.int64],
+    size: NDArray[np.float32],
+    known: NDArray[np.bool_],
+    otherwise: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    # Upper median of the known sizes of each element's group, `otherwise` where the group knows too few.
+    _, index = np.unique(group, return_inverse=True)
+    count = np.bincount(index[known], minlength=int(index.max()) + 1)
+    order = np.lexsort((size[known], index[known]))
+    start = np.concatenate(([0], np.cumsum(count)[:-1]))
+    ordered = np.append(size[known][order].astype(np.float64), 0.0)
+    median = ordered[np.minimum(start + count // 2, len(ordered) - 1)]
+    return np.where(count[index] >= FEWEST, median[index], otherwise)

@@ -1,0 +1,31 @@
+"""Checks of the page arrays that every finishing stage takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: NDArray[Any]) -> None:
+    """Refuse page arrays that do not belong together.
+
+    Parameters
+    ----------
+    value : (H, W, C) float32
+    chart : (H, W) int32, -1 = empty
+    masks : (H, W) or (H, W, n) arrays by name
+
+    Raises
+    ------
+    ValueError
+        If shapes or types do not fit; this is a mistake in the calling code, not in a scene.
+    """
+    if value.ndim != 3 or value.dtype != np.float32:
+        raise ValueError(f"value must be (H, W, C) float32, it is {value.shape} {value.dtype}")
+    if chart.shape != value.shape[:2] or chart.dtype != np.int32:
+        raise ValueError(f"chart must be {value.shape[:2]} int32, it is {chart.shape} {chart.dtype}")
+    for name, mask in masks.items():
+        if mask.shape[:2] != value.shape[:2]:
+            raise ValueError(f"{name} must cover {value.shape[:2]} texels, it covers {mask.shape[:2]}")

@@ -1,0 +1,103 @@
+"""Kernels that hold a denoised page to what its noisy samples allow.
+
+A denoiser may remove noise, not light: over a small in-chart window the difference between noisy and denoised
+page must vanish within its own standard error, and no texel may move by more than a few of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+RADIUS = 2
+# Share of the residual's standard error that is believed to be noise, in standard errors.
+MEAN_SIGMAS = 1.5
+# How far one texel may move, in standard errors of the texel.
+TEXEL_SIGMAS = 4.0
+
+
+@njit(cache=True, nogil=True)
+def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no-untyped-def]
+    """Filter a page by the kernel that is blind to planes, [1 -2 1; -2 4 -2; 1 -2 1] / 6.
+
+    For white noise the result has the noise's own standard deviation.
+
+    Parameters
+    ----------
+    grey : (H, W) float32
+    chart : (H, W) int32
+    covered : (H, W) bool
+    out : (H, W) float32
+        Receives the filtered page where all nine texels are covered ones of one chart; untouched elsewhere.
+
+    Notes
+    -----
+    Immerkaer, Fast Noise Variance Estimation, 1996.
+    """
+    height, width = grey.shape
+    for r in range(max(first_row, 1), min(end_row, height - 1)):
+        for c in range(1, width - 1):
+            inside = True
+            total = 0.0
+            for a in range(-1, 2):
+                for b in range(-1, 2):
+                    if not covered[r + a, c + b] or chart[r + a, c + b] != chart[r, c]:
+                        inside = False
+                    weight = (1.0 if a != 0 else -2.0) * (1.0 if b != 0 else -2.0)
+                    total += weight * grey[r + a, c + b]
+            if inside:
+                out[r, c] = total / 6.0
+
+
+@njit(cache=True, nogil=True)
+def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):  # type: ignore[no-untyped-def]
+    """Correct a denoised page where its in-chart mean leaves the noisy page by more than noise explains.
+
+    Parameters
+    ----------
+    noisy, denoised : (H, W, 3) float32
+    chart : (H, W) int32
+    covered : (H, W) bool
+    error : (H, W) float32
+        Standard error of each noisy texel's luminance.
+    out : (H, W, 3) float32, changed at covered texels of rows first_row to end_row - 1
+    """
+    height, width = chart.shape
+    residual = np.zeros(3, np.float64)
+    for r in range(first_row, end_row):
+        for c in range(width):
+            if not covered[r, c]:
+                continue
+            sw = sww = se = 0.0
+            residual[:] = 0.0
+            for rr in range(max(r - RADIUS, 0), min(r + RADIUS + 1, height)):
+                for cc in range(max(c - RADIUS, 0), min(c + RADIUS + 1, width)):
+                    if not covered[rr, cc] or chart[rr, cc] != chart[r, c]:
+                        continue
+                    w = 1.0 / (1.0 + float((rr - r) * (rr - r) + (cc - c) * (cc - c)))
+                    sw += w
+                    sww += w * w
+                    e = float(error[rr, cc])
+                    se += w * e * e
+                    for j in range(3):
+                        residual[j] += w * (float(noisy[rr, cc, j]) - float(denoised[rr, cc, j]))
+            # Pooled over the window: a texel that missed all rare bright samples underrates its own error.
+            texel_error = np.sqrt(max(se / sw, float(error[r, c]) ** 2))
+            mean_error = texel_error * np.sqrt(sww) / sw
+            grey = (
+                0.2126 * float(denoised[r, c, 0])
+                + 0.7152 * float(denoised[r, c, 1])
+                + 0.0722 * float(denoised[r, c, 2])
+            )
+            for j in range(3):
+                # A channel's noise stands to its value as the luminance's does to the luminance.
+                scale = 1.0
+                if grey > 0.0:
+                    scale = min(max(float(denoised[r, c, j]) / grey, 0.0), 8.0)
+                believed = MEAN_SIGMAS * mean_error * scale
+                mean = residual[j] / sw
+                excess = max(abs(mean) - believed, 0.0)
+                value = float(denoised[r, c, j]) + (excess if mean > 0.0 else -excess)
+                far = TEXEL_SIGMAS * texel_error * scale
+                own = float(noisy[r, c, j])
+                out[r, c, j] = min(max(value, own - far), own + far)
