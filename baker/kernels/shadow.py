@@ -1,0 +1,45 @@
+"""Sums light over a texel's points where the shadow ray meets nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.surface import N_POINTS
+from baker.trace.packets import TFAR, new_packet, set_ray, trace
+
+_f = np.float32
+
+
+@njit(cache=True, nogil=True)
+def add_visible(tracer, origin, ray, weight, colour, begin, out):  # type: ignore[no-untyped-def]
+    """Add colour * mean over a texel's 16 points of weight * visibility to out[begin:], both column blocks.
+
+    origin : (n, 16, 3) float32; ray : (n, 16, 4) float32, direction and reach in units of its length
+    weight : (n, 16) float32, irradiance for colour 1 if nothing is in the way; 0 casts no ray
+    colour : (3,) float32; out : (n_entries, 6) float32
+    """
+    valid, floats, words = new_packet()
+    width = tracer.width
+    for group in range(0, len(origin), width):
+        lanes = min(width, len(origin) - group)
+        for k in range(N_POINTS):
+            any_lane = False
+            for lane in range(width):
+                valid[lane] = 0
+                if lane < lanes and weight[group + lane, k] > _f(0.0):
+                    o = origin[group + lane, k]
+                    d = ray[group + lane, k]
+                    set_ray(floats, words, width, lane, o[0], o[1], o[2], d[0], d[1], d[2], _f(0.0), d[3])
+                    valid[lane] = -1
+                    any_lane = True
+            if not any_lane:
+                continue
+            trace(tracer.occluded, tracer.scene, valid, floats)
+            for lane in range(lanes):
+                if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
+                    i = group + lane
+                    for c in range(3):
+                        share = colour[c] * weight[i, k] / _f(N_POINTS)
+                        out[begin + i, c] += share
+                        out[begin + i, 3 + c] += share

@@ -1,0 +1,46 @@
+"""Point light: I candela from a point without size.
+
+    E = I cos(theta) / r^2
+
+Based on: KHR_lights_punctual, "Point"; Lambert's cosine and inverse-square laws.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from baker.core.scene import PunctualLight
+from baker.lights.family import LIGHT_FAMILIES
+
+# Shadow rays end this share of their length before the light's position.
+_SHORT = np.float32(0.99999)
+
+
+@LIGHT_FAMILIES.register("point")
+def point_light(
+    light: PunctualLight,
+    origin: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    ray: NDArray[np.float32],
+    weight: NDArray[np.float32],
+) -> None:
+    """Fill rays and weights of a point light (see `LightFamily`)."""
+    inverse_square(np.array(light.position, np.float64), origin, normal, ray, weight)
+
+
+@njit(cache=True, nogil=True)
+def inverse_square(position, origin, normal, ray, weight):  # type: ignore[no-untyped-def]
+    """Fill rays to a position and weights cos / r^2."""
+    for i in range(origin.shape[0]):
+        for k in range(origin.shape[1]):
+            dx = position[0] - origin[i, k, 0]
+            dy = position[1] - origin[i, k, 1]
+            dz = position[2] - origin[i, k, 2]
+            square = max(dx * dx + dy * dy + dz * dz, 1.0e-20)
+            cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / math.sqrt(square)
+            ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3] = dx, dy, dz, _SHORT
+            weight[i, k] = max(cosine, 0.0) / square

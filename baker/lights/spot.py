@@ -1,0 +1,45 @@
+"""Spot light: a point light inside a cone with glTF's fall-off.
+
+    E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
+
+Based on: KHR_lights_punctual, "Inner and Outer Cone Angles".
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from baker.core.scene import PunctualLight
+from baker.lights.family import LIGHT_FAMILIES
+from baker.lights.point import inverse_square
+
+
+@LIGHT_FAMILIES.register("spot")
+def spot_light(
+    light: PunctualLight,
+    origin: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    ray: NDArray[np.float32],
+    weight: NDArray[np.float32],
+) -> None:
+    """Fill rays and weights of a spot light (see `LightFamily`)."""
+    inverse_square(np.array(light.position, np.float64), origin, normal, ray, weight)
+    outer = math.cos(light.outer_cone)
+    scale = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
+    _cone(np.array(light.direction, np.float64), outer, scale, ray, weight)
+
+
+@njit(cache=True, nogil=True)
+def _cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
+    """Multiply weights by the cone's fall-off."""
+    for i in range(ray.shape[0]):
+        for k in range(ray.shape[1]):
+            dx, dy, dz = ray[i, k, 0], ray[i, k, 1], ray[i, k, 2]
+            length = math.sqrt(max(dx * dx + dy * dy + dz * dz, 1.0e-20))
+            cosine = -(dx * direction[0] + dy * direction[1] + dz * direction[2]) / length
+            share = min(max((cosine - outer) * scale, 0.0), 1.0)
+            weight[i, k] *= share * share

@@ -1,0 +1,80 @@
+"""Which points of which texels lie inside other geometry.
+
+A point is buried if most of its rays hit the back of a one-sided surface. A few rays from every
+texel find suspects; suspects and their neighbours are then examined point by point, so that a texel
+half under a box keeps its free half.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.core.texels import TexelBuffer
+from baker.kernels.hits import HitTable
+from baker.kernels.probe import back_face_hits
+from baker.kernels.sampling import sobol_reversed
+from baker.kernels.surface import N_POINTS, Surface
+from baker.trace.embree import Tracer
+
+STAGE = "buried texels"
+_TILE = 2048
+# First look: every 4th of the 16 points, one ray each. Second look: every point.
+_STRIDE = 4
+_RAYS_PER_POINT = 8
+# A point is buried if more than this share of its rays hits backs.
+_SHARE = 0.5
+
+
+def find_buried(
+    texels: TexelBuffer,
+    surface: Surface,
+    table: HitTable,
+    tracer: Tracer,
+    *,
+    seed: int,
+    threads: int,
+    progress: Progress,
+) -> tuple[NDArray[np.uint16], int]:
+    """Return (n,) uint16 masks of good points (bit k: point k is free), and the rays cast."""
+    n = texels.n
+    mask = np.full(n, 0xFFFF, np.uint16)
+    if not n or not (table.row[:, 7] == 0).any():
+        return mask, 0
+
+    def look(chosen: NDArray[np.int64], rays_per_point: int, stride: int, pair: int) -> NDArray[np.uint8]:
+        hits = np.zeros((len(chosen), N_POINTS), np.uint8)
+        rays = N_POINTS // stride * rays_per_point
+        net = sobol_reversed(rays, seed, pair)
+
+        def work(begin: int, end: int) -> None:
+            back_face_hits(surface, table, tracer, chosen, begin, end, net, rays_per_point, stride, hits)
+
+        run_tiles(len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
+        return hits
+
+    suspect = look(np.arange(n), 1, _STRIDE, 3).any(axis=1)
+    suspect = _with_neighbours(texels, suspect)
+    chosen = np.flatnonzero(suspect)
+    hits = look(chosen, _RAYS_PER_POINT, 1, 4)
+    good = hits <= _SHARE * _RAYS_PER_POINT
+    mask[chosen] = (good.astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)).sum(axis=1).astype(np.uint16)
+    return mask, n * N_POINTS // _STRIDE + len(chosen) * N_POINTS * _RAYS_PER_POINT
+
+
+def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add to suspects the texels around them in their page (fronts and backs apart)."""
+    out = suspect.copy()
+    for back in (False, True):
+        side = np.flatnonzero(texels.back == back)
+        if not suspect[side].any():
+            continue
+        image = np.zeros(texels.n_pages * texels.resolution**2, bool)
+        image[texels.pixel[side]] = suspect[side]
+        pages = image.reshape(texels.n_pages, texels.resolution, texels.resolution)
+        grown = binary_dilation(pages, np.ones((1, 3, 3), bool))
+        out[side] |= grown.reshape(-1)[texels.pixel[side]]
+    return out

@@ -1,0 +1,121 @@
+"""Direct light of every texel: lights without area, then emissive triangles.
+
+Two estimates come out. The first leaves to the final gather what its rays find at emitters (MIS);
+the second is complete and lights the surfaces that later bounces start from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.core.scene import PunctualLight
+from baker.kernels.area_light import hemisphere_hits, light_samples
+from baker.kernels.emitters import Emitters
+from baker.kernels.hits import HitTable
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.shadow import add_visible
+from baker.kernels.surface import N_POINTS, Surface, drop_buried, place_points
+from baker.lights.family import LIGHT_FAMILIES
+from baker.trace.embree import Tracer
+
+# Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
+TILE = 256
+STAGE = "direct light"
+# Hemisphere rays that complete the second estimate close to emitters.
+N_HEMISPHERE = 4
+
+
+@dataclass(frozen=True)
+class DirectLight:
+    """Direct irradiance of all texel entries.
+
+    Attributes
+    ----------
+    weighted : (n, 3) float32, lx, without what gather rays find at emitters
+    complete : (n, 3) float32, lx
+    variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
+    rays : int, shadow and hemisphere rays cast at most
+    """
+
+    weighted: NDArray[np.float32]
+    complete: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    rays: int
+
+
+def direct_light(
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    table: HitTable,
+    lights: tuple[PunctualLight, ...],
+    emitters: Emitters,
+    shading: Any,
+    tracer: Tracer,
+    *,
+    n_light: int,
+    n_gather: int,
+    seed: int,
+    threads: int,
+    progress: Progress,
+) -> DirectLight:
+    """Light every texel entry directly.
+
+    Parameters
+    ----------
+    mask : (n,) uint16
+        Bit k is set if point k of the texel is not buried.
+    n_light, n_gather : int
+        Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
+    """
+    n = len(surface.pixel)
+    out = np.zeros((n, 6), np.float32)
+    second = np.zeros(n, np.float32)
+    area = np.zeros(n, np.float32)
+    net = sobol_reversed(n_light, seed, 1)
+    shared = shared_bits_mask(n_light)
+    few = sobol_reversed(N_HEMISPHERE, seed, 2)
+    weigh = np.array([n_gather, N_HEMISPHERE], np.float64)
+    families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
+
+    def work(begin: int, end: int) -> None:
+        if len(emitters.power):
+            light_samples(surface, mask, emitters, shading, tracer, begin, end, net, shared, weigh, out, second)
+            area[begin:end] = out[begin:end, :3].sum(axis=1)
+            few_mask = shared_bits_mask(N_HEMISPHERE)
+            hemisphere_hits(
+                surface, mask, table, emitters, shading, tracer, begin, end, few, few_mask, n_light, out
+            )  # fmt: skip
+        if families:
+            origin, normal = points_of(surface, mask, begin, end)
+            ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
+            weight = np.zeros((end - begin, N_POINTS), np.float32)
+            for light, family in families:
+                if family is not None:
+                    family(light, origin, normal, ray, weight)
+                    add_visible(tracer, origin, ray, weight, np.array(light.intensity, np.float32), begin, out)
+
+    area_rays = (n_light + N_HEMISPHERE) * bool(len(emitters.power))
+    rays = area_rays + N_POINTS * len(families)
+    run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
+    spread = np.maximum(second - area * area / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
+    return DirectLight(out[:, :3].copy(), out[:, 3:].copy(), spread.astype(np.float32), rays * n)
+
+
+def points_of(
+    surface: Surface, mask: NDArray[np.uint16], begin: int, end: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return origins and normals (n, 16, 3) float32 of the points of entries begin to end, buried ones replaced."""
+    n = end - begin
+    origin = np.zeros((n, N_POINTS, 3), np.float32)
+    normal = np.zeros((n, N_POINTS, 3), np.float32)
+    place_points(
+        surface, begin, end, origin, normal, np.zeros((n, N_POINTS), np.int32), np.zeros((n, N_POINTS, 2), np.float32)
+    )
+    drop_buried(mask, begin, end, origin, normal)
+    return origin, normal
