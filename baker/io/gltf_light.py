@@ -1,0 +1,69 @@
+"""Reads KHR_lights_punctual: point, spot and directional lights placed by their nodes.
+
+A light shines along its node's -Z; intensity is in cd (point, spot) or lx (directional); the node's scale
+changes neither.
+
+Based on: Khronos Group, KHR_lights_punctual.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baker.core.scene import PunctualLight, SceneWarning
+from baker.io.gltf_json import JsonObject
+from baker.io.gltf_node import Placed
+
+_KINDS = ("point", "spot", "directional")
+
+
+def read_light(light: JsonObject, node: Placed, warnings: list[SceneWarning]) -> PunctualLight | None:
+    """Return a light in world space, or None with a warning if its node leaves it no direction.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind, a negative colour or intensity, or cone angles out of range.
+    """
+    kind = light.string("type")
+    if kind not in _KINDS:
+        light.fail(f"'{kind[:20]}' is none of {', '.join(_KINDS)}", "type")
+    name = node.json.string("name", light.string("name", f"light_{node.index}"))
+    strength = light.number("intensity", 1.0, low=0.0)
+    colour = light.numbers("color", 3, (1.0, 1.0, 1.0))
+    if min(colour) < 0:
+        light.fail("a colour is negative", "color")
+    if "range" in light:
+        message = "the light's range is not applied: it falls off with the square of the distance only"
+        warnings.append(SceneWarning("light-range", message, name))
+    inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
+    axis = -node.matrix[:3, 2]
+    length = float(np.linalg.norm(axis))
+    if kind != "point" and not length > 0:
+        message = "the node's scale leaves the light no direction; it is left out"
+        warnings.append(SceneWarning("flat-light", message, name))
+        return None
+    x, y, z = (float(v) for v in (axis / length if length > 0 else np.array([0.0, 0.0, -1.0])))
+    px, py, pz = (float(v) for v in node.matrix[:3, 3])
+    return PunctualLight(
+        kind=kind,
+        name=name,
+        node=node.index,
+        intensity=(colour[0] * strength, colour[1] * strength, colour[2] * strength),
+        position=(px, py, pz),
+        direction=(x, y, z),
+        inner_cone=inner,
+        outer_cone=outer,
+    )
+
+
+def _cone(light: JsonObject) -> tuple[float, float]:
+    spot = light.child_or_empty("spot")
+    # Exporters write pi/2 in single precision, a little over the limit.
+    outer = spot.number("outerConeAngle", math.pi / 4, low=0.0, high=math.pi / 2 + 1e-3)
+    inner = spot.number("innerConeAngle", 0.0, low=0.0)
+    if inner > outer * (1 + 1e-6):
+        spot.fail(f"the inner angle {inner:g} is larger than the outer angle {outer:g}", "innerConeAngle")
+    return min(inner, outer), min(outer, math.pi / 2)

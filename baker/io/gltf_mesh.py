@@ -1,0 +1,167 @@
+"""Reads the primitives of a glTF mesh: triangles, strips and fans, with or without indices.
+
+Positions stay in object space, in the file's winding. A node whose matrix has a negative determinant turns
+the winding over in world space only (glTF 2.0, section 3.7.4); `core.geometry` does that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import SceneWarning
+from baker.io.gltf_accessor import FLOAT, component_type, read_accessor, read_indices
+from baker.io.gltf_document import GltfDocument
+from baker.io.gltf_json import JsonObject
+from baker.io.gltf_material import MOST_TEXCOORDS
+from baker.io.mesh_build import PrimitiveArrays
+
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_DRACO = "KHR_draco_mesh_compression"
+
+
+def read_primitives(
+    document: GltfDocument, mesh: JsonObject, name: str, default_material: int
+) -> tuple[list[PrimitiveArrays], list[SceneWarning]]:
+    """Return the triangle primitives of a mesh; points and lines are left out with a warning.
+
+    Parameters
+    ----------
+    document : GltfDocument
+    mesh : JsonObject
+    name : str
+        The mesh's name, for warnings.
+    default_material : int
+        Index of the material of primitives that name none.
+
+    Raises
+    ------
+    InputError
+        For a missing POSITION, arrays of different length, or an index out of range.
+    """
+    arrays: list[PrimitiveArrays] = []
+    warnings: list[SceneWarning] = []
+    skipped = 0
+    for i, primitive in enumerate(mesh.children("primitives")):
+        mode = primitive.integer("mode", _TRIANGLES)
+        if mode > _FAN:
+            primitive.fail(f"{mode} is not a primitive mode; known are 0 to 6", "mode")
+        if mode < _TRIANGLES:
+            skipped += 1
+            continue
+        if primitive.children("targets"):
+            message = f"primitive {i} has morph targets; its base shape is baked"
+            warnings.append(SceneWarning("morphed", message, name))
+        arrays.append(_primitive(document, primitive, i, mode, default_material))
+        left = _corner_count(document, primitive, arrays[-1]) % 3
+        if mode == _TRIANGLES and left:
+            warnings.append(
+                SceneWarning("odd-indices", f"primitive {i} ends with {left} spare indices", name)
+            )
+    if skipped:
+        some = "1 primitive" if skipped == 1 else f"{skipped} primitives"
+        warnings.append(SceneWarning("not-triangles", f"{some} of points or lines left out", name))
+    return arrays, warnings
+
+
+def _corner_count(document: GltfDocument, primitive: JsonObject, arrays: PrimitiveArrays) -> int:
+    if "indices" not in primitive:
+        return len(arrays.position)
+    accessors = document.root.children("accessors")
+    return accessors[primitive.integer("indices")].integer("count")
+
+
+def _primitive(
+    document: GltfDocument, primitive: JsonObject, number: int, mode: int, default_material: int
+) -> PrimitiveArrays:
+    accessors = document.root.children("accessors")
+    attributes = primitive.child("attributes")
+    _refuse_draco(primitive, attributes, accessors)
+    if "POSITION" not in attributes:
+        primitive.fail("the primitive has no POSITION")
+    at = attributes.index("POSITION", len(accessors), "accessors")
+    if component_type(document, at) != FLOAT and "KHR_mesh_quantization" not in document.root.strings(
+        "extensionsUsed"
+    ):
+        accessors[at].fail("POSITION must hold floats (componentType 5126)", "componentType")
+    position = read_accessor(document, at, types=("VEC3",))
+
+    def optional(key: str, types: tuple[str, ...]) -> NDArray[np.float32] | None:
+        if key not in attributes:
+            return None
+        where = attributes.index(key, len(accessors), "accessors")
+        value = read_accessor(document, where, types=types)
+        if len(value) != len(position):
+            attributes.fail(f"the accessor has {len(value)} rows, POSITION has {len(position)}", key)
+        return value
+
+    texcoord = {k: optional(f"TEXCOORD_{k}", ("VEC2",)) for k in range(MOST_TEXCOORDS)}
+    colour = optional("COLOR_0", ("VEC3", "VEC4"))
+    if colour is not None:
+        colour = _colour(document, attributes.integer("COLOR_0"), colour)
+    n_materials = len(document.root.children("materials"))
+    return PrimitiveArrays(
+        index=number,
+        material=primitive.index("material", n_materials, "materials")
+        if "material" in primitive
+        else default_material,
+        position=position,
+        triangle=triangles_of(_corners(document, primitive, len(position)), mode),
+        normal=optional("NORMAL", ("VEC3",)),
+        texcoord={k: value for k, value in texcoord.items() if value is not None},
+        colour=colour,
+        stitched=mode == _STRIP,
+    )
+
+
+def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list[JsonObject]) -> None:
+    """Raise if the primitive's data exists only in Draco's form; with a plain copy beside it all is well."""
+    if primitive.extension(_DRACO) is None:
+        return
+    used = [attributes.index(key, len(accessors), "accessors") for key in attributes.value]
+    if not all("bufferView" in accessors[k] or "sparse" in accessors[k] for k in used):
+        primitive.fail(f"the data is compressed with {_DRACO}, which is not understood; export without it")
+
+
+def _colour(document: GltfDocument, accessor: int, colour: NDArray[np.float32]) -> NDArray[np.float32]:
+    code = component_type(document, accessor)
+    if code != FLOAT and not document.root.children("accessors")[accessor].boolean("normalized", False):
+        # Integer colours have no meaning but 0 to 1; some exporters forget to say "normalized".
+        colour = colour / np.float32(255 if code == 5121 else 65535)
+    if colour.shape[1] == 3:
+        colour = np.concatenate([colour, np.ones((len(colour), 1), np.float32)], axis=1)
+    return colour
+
+
+def _corners(document: GltfDocument, primitive: JsonObject, n_vertices: int) -> NDArray[np.int64]:
+    if "indices" not in primitive:
+        return np.arange(n_vertices, dtype=np.int64)
+    accessors = document.root.children("accessors")
+    at = primitive.index("indices", len(accessors), "accessors")
+    corner = read_indices(document, at)
+    largest = int(corner.max())
+    if largest >= n_vertices:
+        primitive.fail(
+            f"index {largest} in accessor {at} is out of range: POSITION has {n_vertices} vertices", "indices"
+        )
+    return corner
+
+
+def triangles_of(corner: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """Return the (T, 3) triangles that a row of (N,) corners stands for.
+
+    Parameters
+    ----------
+    corner : (N,) int64
+    mode : int
+        4 triangles, 5 strip, 6 fan. Spare corners at the end of mode 4 are left out.
+    """
+    n = len(corner)
+    if mode == _TRIANGLES:
+        return corner[: n - n % 3].reshape(-1, 3)
+    i = np.arange(max(0, n - 2))
+    if mode == _STRIP:
+        # Every second triangle of a strip lists its corners the other way round.
+        odd = i % 2
+        return np.stack([corner[i], corner[i + 1 + odd], corner[i + 2 - odd]], axis=1)
+    return np.stack([corner[i + 1], corner[i + 2], np.full(len(i), corner[0] if n else 0)], axis=1)

@@ -1,0 +1,169 @@
+"""Imports glTF 2.0 scenes (.glb, .gltf): nodes, instances, lights.
+
+world_from_object = product of the node matrices from the root down; M = T R S.
+
+Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctual.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from baker.core.errors import InputError
+from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
+from baker.io.gltf_document import GltfDocument, open_document
+from baker.io.gltf_json import JsonObject
+from baker.io.gltf_light import read_light
+from baker.io.gltf_material import DEFAULT_MATERIAL, read_materials
+from baker.io.gltf_mesh import read_primitives
+from baker.io.gltf_node import Placed, place_nodes
+from baker.io.load import SceneFile, importers
+from baker.io.mesh_build import build_mesh
+from baker.io.triangle_check import LARGEST_COORDINATE
+
+# Smallest over largest stretch of a node: below it a mesh is squashed flat.
+_FLATTEST = 1e-7
+
+
+@importers.register(".glb")
+@importers.register(".gltf")
+def import_gltf(source: SceneFile) -> Scene:
+    """Read a glTF file.
+
+    Parameters
+    ----------
+    source : SceneFile
+        `up` and `scale` do not apply: glTF is +Y up and in metres.
+
+    Raises
+    ------
+    InputError
+        If the file is malformed, needs what is not understood, or holds nothing to bake.
+    """
+    document = open_document(source.path, source.data)
+    warnings = list(document.warnings)
+    if source.up != "y" or source.scale != 1.0:
+        message = "up axis and scale are not applied: glTF is +Y up and in metres"
+        warnings.append(SceneWarning("up-and-scale-ignored", message))
+    number, placed = _choose_scene(document, source.scene_index, warnings)
+    materials = read_materials(document)
+    meshes, instances = _instances(document, placed, materials, warnings)
+    lights = _lights(placed, document, warnings)
+    if not instances:
+        where = f"scenes[{number}]" if number is not None else None
+        detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
+        raise InputError(
+            f"there is nothing to bake: the scene holds no usable triangle{f' ({detail})' if detail else ''}",
+            file=str(source.path),
+            object=where,
+        )
+    return Scene(
+        name=source.path.name.split(".")[0],
+        path=source.path,
+        meshes=tuple(meshes),
+        materials=tuple(materials),
+        instances=tuple(instances),
+        lights=tuple(lights),
+        warnings=tuple(warnings),
+        source=SourceDocument(document.root.value, document.buffers, Path(document.folder)),
+        sha256=document.sha256,
+    )
+
+
+def _choose_scene(
+    document: GltfDocument, asked: int | None, warnings: list[SceneWarning]
+) -> tuple[int | None, list[Placed]]:
+    """Return the number of the chosen scene (None if the file has none) and its nodes."""
+    root = document.root
+    scenes, nodes = root.children("scenes"), root.children("nodes")
+    if asked is not None and not 0 <= asked < len(scenes):
+        raise InputError(f"there is no scene {asked}: the file has {len(scenes)} scenes", file=root.file)
+    if not scenes:
+        inside = {k for node in nodes for k in node.indices("children", len(nodes), "nodes")}
+        return None, place_nodes(nodes, [k for k in range(len(nodes)) if k not in inside])
+    number = asked if asked is not None else root.index("scene", len(scenes), "scenes", 0)
+    if len(scenes) > 1 and asked is None:
+        message = f"the file has {len(scenes)} scenes; scene {number} is taken"
+        warnings.append(SceneWarning("several-scenes", message, scenes[number].string("name", "")))
+    roots = scenes[number].indices("nodes", len(nodes), "nodes")
+    if not roots:
+        scenes[number].fail("there is nothing to bake: the scene has no nodes")
+    return number, place_nodes(nodes, roots)
+
+
+def _instances(
+    document: GltfDocument, placed: list[Placed], materials: list[Material], warnings: list[SceneWarning]
+) -> tuple[list[Mesh], list[Instance]]:
+    """Return the meshes that are used, each once, and where they stand. May append the default material."""
+    sources = document.root.children("meshes")
+    default = len(materials)
+    built: dict[int, int | None] = {}
+    meshes: list[Mesh] = []
+    instances: list[Instance] = []
+    for node in placed:
+        if "mesh" not in node.json:
+            continue
+        number = node.json.index("mesh", len(sources), "meshes")
+        name = sources[number].string("name", f"mesh_{number}")
+        if number not in built:
+            arrays, found = read_primitives(document, sources[number], name, default)
+            if len(materials) == default and any(a.material == default for a in arrays):
+                materials.append(DEFAULT_MATERIAL)
+            mesh, defects = build_mesh(name, arrays, materials)
+            warnings += found + defects
+            if mesh is None:
+                warnings.append(
+                    SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
+                )
+            built[number] = None if mesh is None else len(meshes)
+            meshes += [] if mesh is None else [mesh]
+        at = built[number]
+        label = node.json.string("name", name)
+        if at is None or not _stands(node, meshes[at], label, warnings):
+            continue
+        if "skin" in node.json:
+            message = "the mesh is skinned; its bind pose is baked, placed by its node"
+            warnings.append(SceneWarning("skinned", message, label))
+        instances.append(Instance(node.index, label, at, node.matrix))
+    return _drop_unused(meshes, instances)
+
+
+def _stands(node: Placed, mesh: Mesh, label: str, warnings: list[SceneWarning]) -> bool:
+    """Tell whether the instance has an extent that can be baked."""
+    stretch = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
+    if not stretch[2] > _FLATTEST * stretch[0]:
+        message = "the node's scale is zero along an axis; the instance is left out"
+        warnings.append(SceneWarning("flat-instance", message, label))
+        return False
+    low, high = mesh.position.min(axis=0).astype(np.float64), mesh.position.max(axis=0).astype(np.float64)
+    reach = np.abs(node.matrix[:3, :3]) @ np.maximum(np.abs(low), np.abs(high)) + np.abs(node.matrix[:3, 3])
+    if not (reach <= LARGEST_COORDINATE).all():
+        node.json.fail(f"the node places its mesh further than {LARGEST_COORDINATE:g} m away")
+    return True
+
+
+def _drop_unused(meshes: list[Mesh], instances: list[Instance]) -> tuple[list[Mesh], list[Instance]]:
+    used = sorted({instance.mesh for instance in instances})
+    if len(used) == len(meshes):
+        return meshes, instances
+    renumbered = {old: new for new, old in enumerate(used)}
+    moved = [Instance(i.node, i.name, renumbered[i.mesh], i.world_from_object) for i in instances]
+    return [meshes[k] for k in used], moved
+
+
+def _lights(
+    placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning]
+) -> list[PunctualLight]:
+    extension = document.root.extension("KHR_lights_punctual")
+    known: list[JsonObject] = extension.children("lights") if extension is not None else []
+    lights = []
+    for node in placed:
+        reference = node.json.extension("KHR_lights_punctual")
+        if reference is None:
+            continue
+        light = known[reference.index("light", len(known), "lights")]
+        made = read_light(light, node, warnings)
+        lights += [] if made is None else [made]
+    return lights

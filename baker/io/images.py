@@ -1,0 +1,68 @@
+"""Decodes image files (PNG, JPEG, WebP and others) to RGBA; the only file that knows Pillow's reader."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+
+_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+_LARGEST = 16384
+
+
+def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
+    """Return an image's pixels as stored: RGB sRGB-encoded, alpha linear, row 0 on top.
+
+    Parameters
+    ----------
+    data : bytes
+        The content of an image file.
+    file, object : str
+        The file and the image, for messages.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        Sixteen-bit images are rounded to eight.
+
+    Raises
+    ------
+    InputError
+        If the data is not an image that can be decoded, or is larger than 16384 texels a side.
+    """
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            # Size is checked here, by side; Pillow's own warning about many pixels would only be noise.
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                width, height = image.size
+                if max(width, height) > _LARGEST:
+                    message = f"the image has {width} x {height} texels; at most {_LARGEST} a side are read"
+                    raise InputError(message, file=file, object=object)
+                return _to_rgba(image)
+    except InputError:
+        raise
+    except MemoryError:
+        raise
+    except Exception as error:  # Pillow's decoders raise nearly anything on broken data
+        name = type(error).__name__
+        raise InputError(
+            f"the image cannot be decoded ({name}); save it again as PNG or JPEG", file=file, object=object
+        ) from None
+
+
+def _to_rgba(image: object) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    assert isinstance(image, Image.Image)
+    if image.mode.startswith("I;16") or image.mode == "I":
+        # Pillow clips 16-bit grey at 255 where it should scale: (v + 128) // 257 rounds 65535 to 255.
+        grey = np.clip((np.asarray(image).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
+        return np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
+    return np.array(image.convert("RGBA"), np.uint8)

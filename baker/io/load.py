@@ -1,0 +1,111 @@
+"""Opens a scene file of any known format as a `Scene`.
+
+An importer is one file of this package that registers a function for its suffixes. This file holds what
+they share: which file, which errors, which options.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from baker.core.errors import InputError, ResourceError, SettingsError
+from baker.core.registry import Registry
+from baker.core.scene import Scene
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file as its importer gets it.
+
+    Attributes
+    ----------
+    path : Path
+    data : bytes
+        The file's content, never empty.
+    up : str
+        "y" or "z": the up axis of formats that do not fix one themselves.
+    scale : float
+        Metres per unit of formats that do not fix one themselves.
+    scene_index : int or None
+        Which glTF scene to take; None takes the file's default.
+    """
+
+    path: Path
+    data: bytes
+    up: str = "y"
+    scale: float = 1.0
+    scene_index: int | None = None
+
+
+Importer = Callable[[SceneFile], Scene]
+importers: Registry[Importer] = Registry("baker.io")
+
+
+def load_scene(
+    path: Path | str, *, up: str = "y", scale: float = 1.0, scene_index: int | None = None
+) -> Scene:
+    """Read a scene file into metres, +Y up, linear Rec.709.
+
+    Parameters
+    ----------
+    path : Path or str
+        A file whose suffix one of the `importers` knows.
+    up : str
+        "y" or "z", the up axis of OBJ, PLY, STL and OFF files. glTF is always +Y up.
+    scale : float
+        Metres per unit of OBJ, PLY, STL and OFF files. glTF is always in metres.
+    scene_index : int or None
+        glTF scene to load; None loads the default one.
+
+    Returns
+    -------
+    Scene
+        With at least one triangle. What was left out is in `Scene.warnings`.
+
+    Raises
+    ------
+    InputError
+        If the file, or one it names, is missing, unreadable, malformed, needs an extension that is not
+        understood, or holds nothing to bake.
+    SettingsError
+        If `up` or `scale` is out of range.
+    ResourceError
+        If the scene does not fit into memory.
+    """
+    path = Path(path)
+    if up not in ("y", "z"):
+        raise SettingsError(f"up axis '{up}' is neither y nor z", object="up")
+    if not (math.isfinite(scale) and scale > 0):
+        raise SettingsError(f"scale {scale} is not a positive number of metres per unit", object="scale")
+    data = _read(path)
+    importer = importers.get(path.suffix.lower())
+    if importer is None:
+        known = ", ".join(importers.names())
+        what = (
+            f"'{path.suffix}' is not a known scene format" if path.suffix else "the file name has no suffix"
+        )
+        raise InputError(f"{what}; known are {known}", file=str(path))
+    if not data:
+        raise InputError("the file is empty; export it again", file=str(path))
+    try:
+        return importer(SceneFile(path, data, up, scale, scene_index))
+    except MemoryError:
+        raise ResourceError("the scene does not fit into memory", file=str(path)) from None
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        message = "the file does not exist; check its name and folder"
+    except IsADirectoryError:
+        message = "this is a folder; name the scene file inside it"
+    except (OSError, ValueError) as error:
+        message = f"the file cannot be read: {getattr(error, 'strerror', None) or error}"
+    # Windows reports a folder as a permission error.
+    raise InputError(
+        "this is a folder; name the scene file inside it" if path.is_dir() else message, file=str(path)
+    )
