@@ -1,0 +1,5 @@
+"""Lets `python -m baker.cli` be the command too."""
+
+from baker.cli.app import main
+
+main()

@@ -1,0 +1,103 @@
+"""The `baker` command: finds the subcommand, runs it, turns failures into exit codes.
+
+Nothing heavy is imported here: `baker --help` has to answer at once, so a subcommand's module (and with it
+the settings) is imported only when it is the one that was asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any, TextIO
+
+from baker.cli.supervise import INTERRUPTED, supervise
+
+# Subcommand -> the line shown in the list; the module of the same name in this package defines it.
+COMMANDS = {
+    "bake": "Bake a scene: unwrap, trace, solve, write lightmaps and scene.glb.",
+    "ao": "Bake ambient occlusion only.",
+    "inspect": "Tell what is in a scene, a bake or an EXR.",
+}
+
+
+def main() -> None:
+    """Run the command line of this process; never returns."""
+    argv = sys.argv[1:]
+    stop, notes = supervise(argv)
+    try:
+        out = _reserve_stdout() if _asks_json(argv) else sys.stdout
+        code = run(argv, out=out, stop=stop, notes=notes)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    _leave(code)
+
+
+def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: int | None = None) -> int:
+    """Run one command line and return its exit code.
+
+    Parameters
+    ----------
+    argv : list of str
+        Arguments without the program's name.
+    out : TextIO or None
+        Standard output.
+    stop : StopFlag or None
+        Set by a signal; None for a run that nobody stops.
+    notes : int or None
+        See `supervise`.
+    """
+    out = out if out is not None else sys.stdout
+    try:
+        from baker.cli.session import Session
+
+        session = Session(out=out, notes=notes)
+        if stop is not None:
+            session.stop = stop
+        return _dispatch(argv, session)
+    except BrokenPipeError:
+        # The reader (`| head`) has seen enough.
+        _silence(out)
+        return 0
+    except (Exception, KeyboardInterrupt) as error:
+        from baker.cli.failures import tell
+
+        return tell(error, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
+
+
+def _dispatch(argv: list[str], session: Any) -> int:
+    from baker.cli.group import make_app
+
+    code = make_app().main(args=argv, prog_name="baker", standalone_mode=False, obj=session)
+    return code if isinstance(code, int) else 0
+
+
+def _asks_json(argv: list[str]) -> bool:
+    return "--json" in argv
+
+
+def _verbosity(argv: list[str]) -> int:
+    # Read before parsing: a usage error must honour it too.
+    count = argv.count("--verbose")
+    return count + sum(len(word) - 1 for word in argv if word[:1] == "-" and set(word[1:]) == {"v"})
+
+
+def _reserve_stdout() -> TextIO:
+    # Native libraries print to descriptor 1 as they please; with --json it may carry one object only.
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    return out
+
+
+def _silence(stream: TextIO) -> None:
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    except (OSError, ValueError):
+        return
+
+
+def _leave(code: int) -> None:
+    if code == INTERRUPTED:
+        # A normal exit would wait for kernels still running in worker threads.
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)

@@ -1,0 +1,74 @@
+"""`baker bake SCENE -o OUT`: the main job."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from baker.cli.app import COMMANDS
+from baker.cli.options import build, common_flags, flag, given, setting_flags
+
+if TYPE_CHECKING:
+    from baker.cli.session import Session
+
+
+def command() -> Any:
+    """Return the subcommand."""
+    return build("bake", COMMANDS["bake"], work, [*job_flags(), *setting_flags(), *common_flags()])
+
+
+def job_flags() -> list[inspect.Parameter]:
+    """Return the arguments of a bake that are no settings."""
+    return [
+        inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context),
+        inspect.Parameter(
+            "scene",
+            inspect.Parameter.KEYWORD_ONLY,
+            annotation=Annotated[
+                Path, typer.Argument(metavar="SCENE", help="glb, gltf, obj, ply, stl or off file.")
+            ],
+        ),
+        inspect.Parameter(
+            "out",
+            inspect.Parameter.KEYWORD_ONLY,
+            annotation=Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")],
+        ),
+        flag("config", Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")),
+        flag(
+            "force", bool, typer.Option("--force", help="Replace OUT even if baker did not write it."), False
+        ),
+    ]
+
+
+def work(
+    *,
+    ctx: typer.Context,
+    scene: Path,
+    out: Path,
+    config: Path | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: int,
+    **settings: Any,
+) -> None:
+    """Bake, show progress, and tell what was made."""
+    from baker.cli.config import resolve
+    from baker.cli.report import bake_json, write_summary
+
+    session: Session = ctx.obj
+    as_json = as_json or session.as_json
+    resolved = resolve(given(settings), config)
+    session.will_write(str(out))
+    with session.reporter(quiet=quiet) as progress:
+        # Inside: importing the kernels takes a moment, and the bar is there meanwhile.
+        progress("start", 0.0)
+        from baker.pipeline import bake
+
+        result = bake(scene, out=out, settings=resolved, progress=progress, force=force)
+    if not quiet:
+        write_summary(result, session.text_stream(as_json=as_json), verbose=verbose)
+    if as_json:
+        session.write_json(bake_json(result))

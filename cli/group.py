@@ -1,0 +1,70 @@
+"""The list of subcommands, each imported when it is called for."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from baker.cli.app import COMMANDS
+from typer.core import TyperCommand, TyperGroup
+
+if TYPE_CHECKING:
+    from baker.cli.session import Session
+
+
+class LazyGroup(TyperGroup):
+    """Knows every subcommand's name and summary, and imports only the one that runs."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names in the order of the table."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the subcommand; while help is made, a stand-in with its summary."""
+        if cmd_name not in COMMANDS:
+            return None
+        if self._listing:
+            return self.commands[cmd_name]
+        return importlib.import_module(f"baker.cli.{cmd_name}").command()
+
+    _listing = False
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help without importing any subcommand."""
+        self._listing = True
+        super().format_help(ctx, formatter)
+        self._listing = False
+
+
+def make_app() -> Any:
+    """Return the whole command line."""
+    app = typer.Typer(
+        cls=LazyGroup, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
+    )
+    app.callback(invoke_without_command=True)(_root)
+    group = typer.main.get_command(app)
+    for name, summary in COMMANDS.items():
+        group.add_command(TyperCommand(name=name, help=summary))  # type: ignore[attr-defined]
+    return group
+
+
+def _root(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> None:
+    """Radiosity lightmaps and ambient occlusion for game assets, on a CPU."""
+    session: Session = ctx.obj
+    session.as_json = as_json
+    if version:
+        from importlib.metadata import version as installed
+
+        number = installed("baker")
+        if as_json:
+            session.write_json({"version": number})
+        else:
+            session.out.write(f"baker {number}\n")
+        raise typer.Exit
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())

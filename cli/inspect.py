@@ -1,0 +1,103 @@
+"""`baker inspect PATH`: what is in a scene, a bake or an image."""
+
+from __future__ import annotations
+
+import inspect as signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+from baker.cli.app import COMMANDS
+from baker.cli.options import build, common_flags, setting_flags
+
+if TYPE_CHECKING:
+    from baker.cli.session import Session
+
+# Longest list shown item by item; the rest is counted (all of it with -v and with --json).
+SHOWN = 20
+
+
+def command() -> Any:
+    """Return the subcommand."""
+    path = Annotated[
+        Path, typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json or EXR.")
+    ]
+    keyword = signature.Parameter.KEYWORD_ONLY
+    flags = [
+        signature.Parameter("ctx", keyword, annotation=typer.Context),
+        signature.Parameter("path", keyword, annotation=path),
+        # Nothing here traces rays; taken so that scripts can pass the same flags to every command.
+        *setting_flags(only={"threads", "seed"}),
+        *common_flags(),
+    ]
+    return build("inspect", COMMANDS["inspect"], work, flags)
+
+
+def work(
+    *, ctx: typer.Context, path: Path, as_json: bool, quiet: bool, verbose: int, **settings: Any
+) -> None:
+    """Look into `path` and tell."""
+    from baker.cli.config import resolve
+    from baker.cli.options import given
+
+    resolve(given(settings), None)
+    from baker.io.inspect import inspect_path
+
+    session: Session = ctx.obj
+    found = inspect_path(path)
+    if as_json:
+        session.write_json(found)
+    elif not quiet:
+        write_tree(found, session.out, limit=None if verbose else SHOWN)
+
+
+def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None = SHOWN) -> None:
+    """Write nested dicts and lists as indented lines.
+
+    Parameters
+    ----------
+    value : dict or list
+    stream : TextIO
+    depth : int
+        Levels of indentation.
+    limit : int or None
+        Most entries shown of one list; None for all.
+    """
+    pad = "  " * depth
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if _plain(item):
+                stream.write(f"{pad}{key}: {_words(item)}\n")
+            else:
+                stream.write(f"{pad}{key} ({len(item)}):\n" if isinstance(item, list) else f"{pad}{key}:\n")
+                write_tree(item, stream, depth=depth + 1, limit=limit)
+        return
+    for item in value[:limit]:
+        if isinstance(item, dict) and all(_plain(part) for part in item.values()):
+            stream.write(pad + "- " + ", ".join(f"{key} {_words(part)}" for key, part in item.items()) + "\n")
+        elif _plain(item):
+            stream.write(f"{pad}- {_words(item)}\n")
+        else:
+            stream.write(f"{pad}-\n")
+            write_tree(item, stream, depth=depth + 1, limit=limit)
+    if limit is not None and len(value) > limit:
+        stream.write(f"{pad}... and {len(value) - limit} more (-v shows all)\n")
+
+
+def _plain(value: Any) -> bool:
+    # Short rows of numbers or words (a colour, a list of names) stay on one line.
+    if isinstance(value, list | tuple):
+        return len(value) <= 4 and all(not isinstance(part, dict | list | tuple) for part in value)
+    return not (isinstance(value, dict) and value)
+
+
+def _words(value: Any) -> str:
+    if value is None or value in ([], (), {}):
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return " ".join(_words(part) for part in value)
+    return str(value)

@@ -1,0 +1,104 @@
+"""Shows how far the work is: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as RichProgress
+
+# Seconds between two plain lines; a log of a long bake stays readable.
+PLAIN_INTERVAL = 3.0
+
+
+class Reporter:
+    """Is the progress callback of a command, and its context.
+
+    Parameters
+    ----------
+    quiet : bool
+        Show nothing.
+    stopped : callable
+        Tells whether the work was asked to stop; its answer is what the callback answers.
+    stream : TextIO
+        Where to show; stderr unless a test says otherwise.
+    """
+
+    def __init__(
+        self,
+        *,
+        quiet: bool,
+        stopped: Callable[[], bool],
+        stream: TextIO | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._stream = stream if stream is not None else sys.stderr
+        self._quiet = quiet
+        self._stopped = stopped
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._stage = ""
+        self._started = 0.0
+        self._told = clock()
+        self._bar: RichProgress | None = None
+        self._task: Any = None
+
+    def __enter__(self) -> Reporter:
+        if not self._quiet and self._stream.isatty():
+            self._bar = _make_bar(self._stream)
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def __call__(self, stage: str, fraction: float, detail: str = "", /) -> bool:
+        """Show that `fraction` of `stage` is done; answer whether to stop."""
+        if not self._quiet:
+            # Tiles may report from several threads.
+            with self._lock:
+                self._show(stage, min(max(fraction, 0.0), 1.0), detail)
+        return self._stopped()
+
+    def _show(self, stage: str, fraction: float, detail: str) -> None:
+        now = self._clock()
+        fresh = stage != self._stage
+        if fresh:
+            self._stage, self._started = stage, now
+        if self._bar is not None:
+            if fresh:
+                if self._task is not None:
+                    self._bar.remove_task(self._task)
+                self._task = self._bar.add_task(stage, total=1.0, detail=detail)
+            self._bar.update(self._task, completed=fraction, detail=detail)
+        elif now - self._told >= PLAIN_INTERVAL:
+            self._told = now
+            spent = now - self._started
+            left = f"{spent * (1 - fraction) / fraction:.0f} s left" if fraction > 0 and spent > 0 else ""
+            words = [f"{stage}:", f"{100 * fraction:.0f} %", detail, left]
+            self._stream.write("  ".join(word for word in words if word) + "\n")
+            self._stream.flush()
+
+
+def _make_bar(stream: TextIO) -> RichProgress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    return Progress(
+        TextColumn("{task.description:<14}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[detail]}"),
+        TimeRemainingColumn(),
+        console=Console(file=stream),
+        transient=True,
+    )

@@ -1,0 +1,194 @@
+"""Runs the work in a child process, so that stopping never waits for a library.
+
+Some C++ libraries keep Python's lock for as long as they work (xatlas does, for minutes on a large
+mesh): a signal handler or a thread written in Python cannot run meanwhile. The parent process here
+does nothing but wait, so it always hears Ctrl-C. It passes the signal on, gives the child a moment to
+stop by itself, then ends it and every process it started, and removes what was half written.
+The same parent turns a crash of native code or a kill for want of memory into one sentence.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+from types import FrameType
+
+# Seconds that the child gets to stop by itself. The promise is one second for everything.
+GRACE = 0.6
+INTERRUPTED = 130
+RESOURCE = 4
+
+_STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class StopFlag:
+    """Remembers that a signal asked the work to stop.
+
+    Attributes
+    ----------
+    requested : bool
+        What a progress callback answers.
+    """
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Set the flag; the first signal also interrupts Python code where it stands."""
+        if not self.requested:
+            self.requested = True
+            raise KeyboardInterrupt
+
+    def install(self) -> None:
+        """Handle the stopping signals in this process."""
+        for name in _STOPPING:
+            number = getattr(signal, name, None)
+            # `nohup` ignores the hang-up on purpose; an ignored SIGINT only means a background job.
+            if number is not None and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
+                signal.signal(number, self.handle)
+
+
+def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
+    """Fork: the child returns and does the work, the parent waits and never returns.
+
+    Parameters
+    ----------
+    argv : list of str
+        The command line, to know whether a failure must be told as JSON.
+
+    Returns
+    -------
+    stop : StopFlag
+        Set by a stopping signal in the working process.
+    notes : int or None
+        File descriptor for `announce`; None where there is no `fork` and this process does the work.
+    """
+    stop = StopFlag()
+    if not hasattr(os, "fork"):
+        stop.install()
+        return stop, None
+    sys.stdout.flush()
+    sys.stderr.flush()
+    inlet, outlet = os.pipe()
+    blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
+    # No signal may fall between the fork and the handlers.
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
+    parent = os.getpid()
+    child = os.fork()
+    if child == 0:
+        os.close(inlet)
+        _settle_child(parent)
+        stop.install()
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+        return stop, outlet
+    os.close(outlet)
+    watch = _Watch(child, inlet, "--json" in argv)
+    watch.install()
+    signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+    os._exit(watch.wait())
+
+
+def announce(notes: int | None, out: str) -> None:
+    """Tell the parent which output folder is about to be written."""
+    if notes is not None:
+        os.write(notes, os.path.abspath(out).encode("utf-8", "surrogateescape") + b"\0")  # noqa: PTH100
+
+
+def _settle_child(parent: int) -> None:
+    # A group of its own: the terminal's Ctrl-C reaches the parent only, which passes it on once,
+    # and the parent can end helpers that the child started.
+    os.setpgid(0, 0)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    if sys.platform == "linux":
+        import ctypes
+
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)
+    if os.getppid() != parent:
+        os._exit(INTERRUPTED)
+
+
+class _Watch:
+    """Is the parent's side: passes signals on, waits, and tidies up after a hard end."""
+
+    def __init__(self, child: int, notes: int, as_json: bool) -> None:
+        self.child = child
+        self.notes = notes
+        self.as_json = as_json
+        self.stopping = False
+
+    def install(self) -> None:
+        with contextlib.suppress(OSError):  # the child was quicker, or is gone
+            os.setpgid(self.child, self.child)
+        for name in _STOPPING:
+            number = getattr(signal, name)
+            if not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
+                signal.signal(number, self._stop)
+        signal.signal(signal.SIGALRM, self._end)
+        signal.signal(signal.SIGTSTP, self._pause)
+        signal.signal(signal.SIGCONT, self._resume)
+
+    def _send(self, number: int) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.child, number)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        if self.stopping:
+            return
+        self.stopping = True
+        # Only the child itself is asked: helpers of it would answer with messages of their own.
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.child, signal.SIGINT)
+        signal.setitimer(signal.ITIMER_REAL, GRACE)
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self._send(signal.SIGKILL)
+
+    def _pause(self, number: int, frame: FrameType | None) -> None:
+        self._send(signal.SIGSTOP)
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+    def _resume(self, number: int, frame: FrameType | None) -> None:
+        self._send(signal.SIGCONT)
+
+    def wait(self) -> int:
+        """Wait for the child and return the exit code of the command."""
+        _, status = os.waitpid(self.child, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        if os.WIFEXITED(status):
+            return os.WEXITSTATUS(status)
+        self._send(signal.SIGKILL)  # helpers that outlived it
+        self._tidy()
+        number = os.WTERMSIG(status)
+        if self.stopping:
+            return self._tell("cancelled", "interrupted; nothing was written", INTERRUPTED)
+        if number == signal.SIGKILL:
+            why = "the work was killed from outside, most likely for want of memory"
+        else:
+            why = f"native code crashed ({signal.Signals(number).name})"
+        hint = "try a smaller --resolution or fewer --threads; the output folder was left as it was"
+        return self._tell("resource", f"{why}; {hint}", RESOURCE)
+
+    def _tidy(self) -> None:
+        os.set_blocking(self.notes, False)
+        try:
+            named = os.read(self.notes, 1 << 16).split(b"\0")
+        except BlockingIOError:
+            return
+        from baker.cli.leftovers import remove_leftovers
+
+        for out in filter(None, named):
+            remove_leftovers(os.fsdecode(out), self.child)
+
+    def _tell(self, kind: str, message: str, code: int) -> int:
+        sys.stderr.write(f"baker: {message}\n")
+        sys.stderr.flush()
+        if self.as_json:
+            import json
+
+            error = {"kind": kind, "message": message, "file": None, "object": None}
+            sys.stdout.write(json.dumps({"error": error}) + "\n")
+            sys.stdout.flush()
+        return code
