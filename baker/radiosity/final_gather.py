@@ -1,0 +1,116 @@
+"""The final gather of all texels: sharp first bounce, smooth further bounces, AO from the same rays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.kernels.emitters import Emitters
+from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
+from baker.kernels.hits import HitTable
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.surface import N_POINTS, Surface
+from baker.radiosity.direct import TILE
+from baker.trace.embree import Tracer
+
+STAGE = "final gather"
+AO_STAGE = "ambient occlusion"
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the gather rays of front texels brought.
+
+    Attributes
+    ----------
+    indirect, direct : (n_front, 3) float32, lx; `direct` is sky and the gather's half of emitters
+    open : (n_front,) float32, AO within the distance asked
+    variance : (n_front,) float32, lx2, of the mean of RGB of indirect + direct
+    rays : int
+    """
+
+    indirect: NDArray[np.float32]
+    direct: NDArray[np.float32]
+    open: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    rays: int
+
+
+def final_gather(
+    n_front: int,
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    table: HitTable,
+    exitance: NDArray[np.float32],
+    emitters: Emitters,
+    shading: Any,
+    tracer: Tracer,
+    *,
+    n_samples: int,
+    n_light: int,
+    sky: tuple[float, float, float],
+    ao_distance: float,
+    seed: int,
+    threads: int,
+    progress: Progress,
+) -> Gathered:
+    """Cast `n_samples` cosine-weighted rays from every front texel.
+
+    Parameters
+    ----------
+    exitance : (n, 3) float32, lx
+        Light that each texel entry reflects; emission is found by MIS with `n_light` shadow rays.
+    sky : radiance, cd/m2
+    ao_distance : metres, may be inf
+    """
+    out = np.zeros((n_front, N_COLUMNS), np.float32)
+    net = sobol_reversed(n_samples, seed, 6)
+    shared = shared_bits_mask(n_samples)
+    limits = np.array([ao_distance, n_light], np.float64)
+    radiance = np.array(sky, np.float32)
+
+    def work(begin: int, end: int) -> None:
+        gather(
+            surface, mask, table, exitance, emitters, shading, tracer, begin, end, net, shared, radiance, limits, out
+        )
+
+    run_tiles(n_front, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_samples)
+    total = out[:, INDIRECT : DIRECT + 3].sum(axis=1)
+    spread = np.maximum(out[:, SQUARE] - total * total / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
+    return Gathered(
+        indirect=out[:, INDIRECT : INDIRECT + 3].copy(),
+        direct=out[:, DIRECT : DIRECT + 3].copy(),
+        open=out[:, OPEN].copy(),
+        variance=spread.astype(np.float32),
+        rays=n_front * n_samples,
+    )
+
+
+def ambient_occlusion(
+    n_front: int,
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    tracer: Tracer,
+    *,
+    n_samples: int,
+    distance: float,
+    seed: int,
+    threads: int,
+    progress: Progress,
+) -> NDArray[np.float32]:
+    """Return the open share (n_front,) float32 of the hemisphere within `distance` metres."""
+    out = np.zeros(n_front, np.float32)
+    net = sobol_reversed(n_samples, seed, 6)
+    shared = shared_bits_mask(n_samples)
+    reach = np.float32(min(distance, 1.0e30))
+
+    def work(begin: int, end: int) -> None:
+        open_share(surface, mask, tracer, begin, end, net, shared, reach, out)
+
+    run_tiles(n_front, TILE, work, threads=threads, stage=AO_STAGE, progress=progress, rays_per_item=n_samples)
+    return out

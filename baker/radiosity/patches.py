@@ -1,0 +1,91 @@
+"""Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
+
+Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
+far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity
+in complex environments, 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.texels import TexelBuffer
+
+# The most patches a solve may have; larger pages get larger blocks.
+MAX_PATCHES = 32768
+
+
+@dataclass(frozen=True)
+class PatchSet:
+    """Patches over all texel entries (fronts and backs).
+
+    Attributes
+    ----------
+    patch : (n,) int32, patch of each entry
+    first : (P + 1,) int64, `member` : (n,) int32, entries patch by patch, in rising order
+    cumulative : (n,) float32, running share of the patch's area along `member`
+    area : (P,) float64, m2
+    block : int, side of a block in texels
+    """
+
+    patch: NDArray[np.int32]
+    first: NDArray[np.int64]
+    member: NDArray[np.int32]
+    cumulative: NDArray[np.float32]
+    area: NDArray[np.float64]
+    block: int
+
+    @property
+    def n(self) -> int:
+        """Count the patches."""
+        return len(self.area)
+
+    def mean(self, value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return the weighted mean over each patch of per-entry values (n, C), as (P, C) float64."""
+        total = np.bincount(self.patch, weight, self.n)
+        columns = [np.bincount(self.patch, weight * value[:, c].astype(np.float64), self.n) for c in range(value.shape[1])]
+        return np.stack(columns, axis=1) / np.maximum(total, 1e-300)[:, None]
+
+
+def build_patches(texels: TexelBuffer, *, max_patches: int = MAX_PATCHES) -> PatchSet:
+    """Group texels into blocks: the smallest power of two that keeps to `max_patches`.
+
+    Charts smaller than a block still need a patch each, so a page of very many charts may have more.
+    """
+    block = 1
+    while True:
+        number, n_patches = _blocks(texels, block)
+        if n_patches <= max_patches or block >= 256:
+            break
+        block *= 2
+    order = np.argsort(number, kind="stable").astype(np.int32)
+    first = np.zeros(n_patches + 1, np.int64)
+    np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
+    # A texel without area (a sliver) still needs a share, however small, so that its patch has one.
+    weight = np.maximum(texels.area, 1e-12).astype(np.float64)
+    area = np.bincount(number, weight, n_patches)
+    running = np.cumsum(weight[order])
+    before = np.concatenate([[0.0], running])[first[:-1]]
+    owner = np.repeat(np.arange(n_patches), np.diff(first))
+    cumulative = (running - before[owner]) / area[owner]
+    return PatchSet(number, first, order, cumulative.astype(np.float32), area, block)
+
+
+def _blocks(texels: TexelBuffer, block: int) -> tuple[NDArray[np.int32], int]:
+    """Number the blocks of one size in Morton order of their first texel."""
+    size = texels.resolution
+    page, rest = np.divmod(texels.pixel, size * size)
+    row, column = np.divmod(rest, size)
+    # 26 directions: an axis-aligned or diagonal surface is never split by rounding.
+    facing = np.rint(texels.normal.astype(np.float64) * 1.2).astype(np.int64) + 1
+    direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
+    per_side = -(-size // block)
+    key = (page * per_side + row // block) * per_side + column // block
+    key = (key * (int(texels.chart.max(initial=0)) + 1) + texels.chart) * 54 + direction * 2 + texels.back
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    rank = np.zeros(len(first), np.int32)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(first), dtype=np.int32)
+    return rank[inverse.reshape(-1)], len(first)
