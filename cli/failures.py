@@ -45,7 +45,9 @@ def explain(error: BaseException) -> BakerError | None:
     except ImportError:
         return None
     if isinstance(error, typer.TyperException):
-        return SettingsError(_sentence(error.format_message()))
+        context = getattr(error, "ctx", None)
+        hint = f"; see `{context.command_path} --help`" if context is not None else ""
+        return SettingsError(_sentence(error.format_message()).rstrip(".") + hint)
     return None
 
 
@@ -74,7 +76,7 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
         kind = "internal"
     else:
         kind = known.kind
-    sys.stderr.write(f"baker: {_sentence(str(known))}\n")
+    sys.stderr.write(f"baker: {_line(known)}\n")
     if as_json:
         body: dict[str, Any] = {
             "kind": kind,
@@ -84,6 +86,13 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
         }
         out.write(json.dumps({"error": body}) + "\n")
     return known.exit_code
+
+
+def _line(error: BakerError) -> str:
+    text = _sentence(str(error))
+    # A setting's message may begin with its name, which is the object too: once is enough.
+    doubled = f"{error.object}: {error.object}: "
+    return text.replace(doubled, f"{error.object}: ", 1)
 
 
 def _sentence(text: str) -> str:

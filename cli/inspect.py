@@ -45,7 +45,7 @@ def work(
 
     session: Session = ctx.obj
     found = inspect_path(path)
-    if as_json:
+    if as_json or session.as_json:
         session.write_json(found)
     elif not quiet:
         write_tree(found, session.out, limit=None if verbose else SHOWN)

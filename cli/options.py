@@ -32,7 +32,9 @@ def common_flags() -> list[inspect.Parameter]:
         flag(
             "verbose",
             int,
-            typer.Option("--verbose", "-v", count=True, help="Say more; -vv shows tracebacks."),
+            typer.Option(
+                "--verbose", "-v", count=True, show_default=False, help="Say more; -vv shows tracebacks."
+            ),
             0,
         ),
     ]
