@@ -1,0 +1,63 @@
+"""Makes PNG files in memory; the only file that knows Pillow's writer.
+
+No time is stored, so the same pixels give the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def encode_png(pixels: NDArray[np.uint8]) -> bytes:
+    """Return a PNG of (H, W) grey, (H, W, 3) RGB or (H, W, 4) RGBA uint8 pixels, row 0 on top."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def encode_palette_png(
+    index: NDArray[np.uint8], colours: Mapping[int, tuple[int, int, int]], text: Mapping[str, str]
+) -> bytes:
+    """Return a PNG whose pixels are palette numbers.
+
+    Parameters
+    ----------
+    index : (H, W) uint8
+        Row 0 on top.
+    colours : mapping of palette number to sRGB red, green, blue (0 to 255)
+    text : mapping of str to str
+        Text chunks.
+    """
+    from PIL import Image, PngImagePlugin
+
+    palette = np.zeros((max(colours) + 1, 3), np.uint8)
+    for number, colour in colours.items():
+        palette[number] = colour
+    image = Image.fromarray(index)
+    image.putpalette(palette.ravel().tolist())
+    info = PngImagePlugin.PngInfo()
+    for key, value in text.items():
+        info.add_text(key, value)
+    stream = io.BytesIO()
+    # Eight bits a texel, so that a reader of raw bytes finds the number itself.
+    image.save(stream, "PNG", pnginfo=info, bits=8)
+    return stream.getvalue()
+
+
+def grey_levels(value: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return numbers from 0 to 1 as 0 to 255, rounded; what is outside is clamped."""
+    rounded: NDArray[np.uint8] = np.rint(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)
+    return rounded
+
+
+def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return linear light from 0 to 1 as sRGB-encoded 0 to 255 (IEC 61966-2-1)."""
+    clipped = np.clip(linear.astype(np.float64), 0.0, 1.0)
+    encoded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+    return np.rint(encoded * 255.0).astype(np.uint8)
