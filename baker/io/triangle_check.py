@@ -14,7 +14,8 @@ _FLATTEST = 1e-7
 def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Tell which (V, 3) positions are finite and within single precision's safe range, (V,) bool."""
     # A comparison with NaN is false, so this one test covers NaN, inf and huge values.
-    return np.logical_and.reduce(np.abs(position) <= LARGEST_COORDINATE, axis=1)
+    usable: NDArray[np.bool_] = np.asarray((np.abs(position) <= LARGEST_COORDINATE).all(axis=1))
+    return usable
 
 
 def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -34,7 +35,8 @@ def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
     squared = np.maximum(np.maximum((ab * ab).sum(axis=1), (ac * ac).sum(axis=1)), (bc * bc).sum(axis=1))
     normal = _cross(ab, ac)
     flat = np.sqrt((normal * normal).sum(axis=1)) <= _FLATTEST * squared
-    return np.logical_or(flat, longest == 0)
+    found: NDArray[np.bool_] = np.asarray(flat | (longest == 0))
+    return found
 
 
 def face_normal(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:

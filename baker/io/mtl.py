@@ -1,0 +1,171 @@
+"""Reads Wavefront material libraries: the few lines of them that matter to diffuse light.
+
+Reflectance = Kd x map_Kd, emission = Ke x map_Ke (cd/m2), opacity = d or 1 - Tr.
+
+Based on: Alias|Wavefront, Advanced Visualizer manual, appendix B.1; `Ke` and `map_Ke` as commonly written.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Material, Texture
+from baker.io.images import decode_image
+
+# How many values follow each option of a map statement.
+_OPTION_VALUES = {
+    "-blendu": 1,
+    "-blendv": 1,
+    "-bm": 1,
+    "-boost": 1,
+    "-cc": 1,
+    "-clamp": 1,
+    "-imfchan": 1,
+    "-mm": 2,
+    "-texres": 1,
+    "-type": 1,
+    "-colorspace": 1,
+}
+_VECTOR_OPTIONS = ("-o", "-s", "-t")
+
+
+def read_mtl(text: str, *, file: str, folder: Path, read_file: Callable[[Path], bytes]) -> list[Material]:
+    """Return the materials of one library, in its order.
+
+    Parameters
+    ----------
+    text : str
+        The library's content.
+    file : str
+        Its name, for messages.
+    folder : Path
+        Where its image names begin.
+    read_file : callable
+        Returns the content of a file; raises OSError or ValueError if it cannot.
+
+    Raises
+    ------
+    InputError
+        For a value that is not a number, or an image that is missing or cannot be decoded.
+    """
+    images: dict[str, NDArray[np.uint8]] = {}
+    materials: list[dict[str, list[str]]] = []
+    for line in text.splitlines():
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        if words[0] == "newmtl":
+            materials.append({"name": words[1:]})
+        elif materials:
+            materials[-1][words[0].lower()] = words[1:]
+
+    def image(material: str, words: list[str], names: list[str]) -> NDArray[np.uint8]:
+        for name in names:
+            if name in images:
+                return images[name]
+            try:
+                data = read_file(folder / name.replace("\\", "/"))
+            except FileNotFoundError:
+                continue
+            except (OSError, ValueError) as error:
+                why = getattr(error, "strerror", None) or error
+                raise InputError(
+                    f"the image '{name}' cannot be read: {why}", file=file, object=material
+                ) from None
+            images[name] = decode_image(data, file=file, object=name)
+            return images[name]
+        message = f"the image '{' '.join(words)}' is missing; put it beside the scene"
+        raise InputError(message, file=file, object=material)
+
+    def texture(material: str, words: list[str] | None) -> Texture | None:
+        if not words:
+            return None
+        names, transform, clamp = _map_options(words, file, material)
+        pixels = image(material, words, names)
+        return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
+
+    return [_material(m, file, texture) for m in materials]
+
+
+def _material(
+    words: dict[str, list[str]], file: str, texture: Callable[[str, list[str] | None], Texture | None]
+) -> Material:
+    name = " ".join(words["name"])
+
+    def colour(key: str, default: float) -> tuple[float, float, float]:
+        values = words.get(key, [])
+        if values[:1] and values[0].lower() in ("xyz", "spectral"):
+            raise InputError(f"{key} is given as {values[0]}; only R G B is read", file=file, object=name)
+        numbers = [_number(v, key, file, name) for v in values[:3]] or [default]
+        numbers += numbers[:1] * (3 - len(numbers))  # G and B follow R where they are left out
+        return (numbers[0], numbers[1], numbers[2])
+
+    red, green, blue = colour("kd", 0.8)
+    glow = texture(name, words.get("map_ke"))
+    opacity = 1.0
+    if words.get("d"):
+        opacity = _number(words["d"][-1], "d", file, name)
+    elif words.get("tr"):
+        opacity = 1.0 - _number(words["tr"][-1], "Tr", file, name)
+    opacity = min(max(opacity, 0.0), 1.0)
+    return Material(
+        name=name,
+        base_colour=(red, green, blue, opacity),
+        base_colour_texture=texture(name, words.get("map_kd")),
+        emission=colour("ke", 1.0 if glow is not None and "ke" not in words else 0.0),
+        emission_texture=glow,
+        alpha_mode="OPAQUE" if opacity == 1.0 else "BLEND",
+        metallic=0.0,
+    )
+
+
+def _map_options(words: list[str], file: str, material: str) -> tuple[list[str], NDArray[np.float64], bool]:
+    """Return (possible file names, image uv from mesh uv, clamped) of a map statement."""
+    shift, stretch, clamp = [0.0, 0.0], [1.0, 1.0], False
+    k = 0
+    while k < len(words) - 1 and words[k].lower() in (*_OPTION_VALUES, *_VECTOR_OPTIONS):
+        option = words[k].lower()
+        k += 1
+        if option in _OPTION_VALUES:
+            clamp = words[k].lower() == "on" if option == "-clamp" else clamp
+            k += _OPTION_VALUES[option]
+            continue
+        values: list[float] = []
+        while k < len(words) - 1 and len(values) < 3 and _is_number(words[k]):
+            values.append(_number(words[k], option, file, material))
+            k += 1
+        if option == "-o":
+            shift[: len(values[:2])] = values[:2]
+        elif option == "-s":
+            stretch[: len(values[:2])] = values[:2]
+    # OBJ's v points up and ours down, both from 0 to 1: v' = 1 - (s (1 - v) + o).
+    transform = np.array(
+        [[stretch[0], 0.0, shift[0]], [0.0, stretch[1], 1.0 - stretch[1] - shift[1]]], np.float64
+    )
+    rest = words[k:]
+    # Exporters write names with blanks as they are; an old absolute path may still lie beside the scene.
+    name = " ".join(rest)
+    return list(dict.fromkeys((name, name.replace("\\", "/").rsplit("/", 1)[-1]))), transform, clamp
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(word: str, key: str, file: str, material: str) -> float:
+    if not _is_number(word) or not math.isfinite(float(word)):
+        raise InputError(f"{key} holds '{word[:20]}' instead of a number", file=file, object=material)
+    value = float(word)
+    if value < 0 and not key.startswith("-"):
+        raise InputError(f"{key} is negative ({word})", file=file, object=material)
+    return value

@@ -1,0 +1,231 @@
+"""Imports Wavefront OBJ scenes with their MTL libraries; the only file that knows tinyobjloader.
+
+Each object or group becomes a mesh with one instance, each material of it a primitive. OBJ's v = 0 is the
+last image row; it is turned over here, so that v = 0 is the first row as everywhere in baker.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Material, Scene, SceneWarning
+from baker.io.images import linear_from_srgb
+from baker.io.load import SceneFile, importers
+from baker.io.mesh_build import PrimitiveArrays
+from baker.io.mesh_scene import scene_of_meshes, to_world
+from baker.io.mtl import read_mtl
+
+# Grey instead of the white of glTF: a white room would never let go of its light.
+GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
+_NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
+
+
+@importers.register(".obj")
+def import_obj(source: SceneFile) -> Scene:
+    """Read an OBJ file and the MTL files and images that it names.
+
+    Parameters
+    ----------
+    source : SceneFile
+        `up` and `scale` bring the positions to metres, +Y up.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be parsed, an index is out of range, an image is missing, or no triangle is left.
+    """
+    file = str(source.path)
+    digest = hashlib.sha256(source.data)
+    warnings: list[SceneWarning] = []
+    text = _decode(source.data)
+    materials = _read_libraries(text, source.path, digest, warnings)
+    reader = _parse(text, materials, file)
+    attributes = reader.GetAttrib()
+    position = np.array(attributes.vertices, np.float64).reshape(-1, 3)
+    position = _restore_nan(source.data, position)
+    corners = _Corners(
+        position=to_world(position, source.up, source.scale),
+        normal=to_world(np.array(attributes.normals, np.float64).reshape(-1, 3), source.up, 1.0),
+        texcoord=np.array(attributes.texcoords, np.float64).reshape(-1, 2),
+        colour=_colours(attributes, len(position)),
+        file=file,
+    )
+    groups: list[tuple[str, list[PrimitiveArrays]]] = []
+    for number, shape in enumerate(reader.GetShapes()):
+        name = shape.name or f"shape_{number}"
+        groups.append((name, _primitives(shape.mesh, name, corners, len(materials))))
+    if any(p.material == len(materials) for _, primitives in groups for p in primitives):
+        if materials:
+            message = f"faces without a known material are grey; MTL names {len(materials)}"
+            warnings.append(SceneWarning("no-material", message, source.path.name))
+        materials.append(GREY)
+    return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
+
+
+def _decode(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _read_libraries(
+    text: str, path: Path, digest: hashlib._Hash, warnings: list[SceneWarning]
+) -> list[Material]:
+    def read_file(file: Path) -> bytes:
+        data = file.read_bytes()
+        digest.update(data)
+        return data
+
+    materials: list[Material] = []
+    lines = re.findall(r"^[ \t]*mtllib[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
+    for line in dict.fromkeys(lines):
+        # The rest of the line is one name with blanks, or several names.
+        names = [line] if (path.parent / line).is_file() else line.split()
+        for name in names:
+            file = path.parent / name.replace("\\", "/")
+            try:
+                content = _decode(read_file(file))
+            except (OSError, ValueError):
+                message = f"the material library '{name}' is missing or unreadable; its surfaces are grey"
+                warnings.append(SceneWarning("missing-mtl", message, path.name))
+                continue
+            materials += read_mtl(content, file=str(file), folder=file.parent, read_file=read_file)
+    return materials
+
+
+def _parse(text: str, materials: list[Material], file: str) -> Any:
+    import tinyobjloader
+
+    config = tinyobjloader.ObjReaderConfig()
+    config.triangulate = True
+    reader = tinyobjloader.ObjReader()
+    # The binding does not show `Ke`: our own reader takes the values, and this one only needs the names.
+    names = "".join(f"newmtl {material.name}\n" for material in materials)
+    if not reader.ParseFromString(text, names, config):
+        why = " ".join(reader.Error().split()).rstrip(".") or "it is not an OBJ file"
+        raise InputError(f"the file cannot be parsed: {why[:200]}", file=file)
+    return reader
+
+
+def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put NaN where a `v` line holds no numbers: the parser reads such words as 0 and says nothing."""
+    if _NOT_NUMBERS.search(data) is None:
+        return position
+    position = position.copy()
+    for row, match in enumerate(_VERTEX.finditer(data)):
+        if row < len(position) and not all(_is_number(word) for word in match.group(1).split()[:3]):
+            position[row] = np.nan
+    return position
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
+    """Return the vertex colours if the file has any: the parser makes up white ones."""
+    colour = np.array(attributes.colors, np.float32).reshape(-1, 3)
+    if len(colour) != count or (colour == 1).all():
+        return None
+    return np.concatenate([linear_from_srgb(colour), np.ones((count, 1), np.float32)], axis=1)
+
+
+class _Corners:
+    """The arrays that all shapes of the file share."""
+
+    def __init__(
+        self,
+        *,
+        position: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        texcoord: NDArray[np.float64],
+        colour: NDArray[np.float32] | None,
+        file: str,
+    ) -> None:
+        self.position = position
+        self.normal = normal
+        self.texcoord = (texcoord * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
+        self.colour = colour
+        self.file = file
+
+    def check(self, index: NDArray[np.int64], count: int, what: str, shape: str) -> None:
+        if len(index) and index.max() >= count:
+            message = f"a face names {what} {index.max() + 1}, but the file has {count}"
+            raise InputError(message, file=self.file, object=shape)
+
+
+def _primitives(mesh: Any, name: str, corners: _Corners, grey: int) -> list[PrimitiveArrays]:
+    """Split a shape by material and give each part its own vertices."""
+    # The numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13), so lists it is.
+    vertex, normal, texcoord = (
+        np.array(values, np.int64)
+        for values in (mesh.vertex_indices(), mesh.normal_indices(), mesh.texcoord_indices())
+    )
+    corners.check(vertex, len(corners.position), "vertex", name)
+    corners.check(normal, len(corners.normal), "normal", name)
+    corners.check(texcoord, len(corners.texcoord), "texture vertex", name)
+    if len(vertex) and vertex.min() < 0:
+        raise InputError("a face has an index of zero or less", file=corners.file, object=name)
+    n = len(vertex) // 3
+    material = np.array(mesh.material_ids, np.int64)[:n]
+    material = np.where((material < 0) | (material >= grey), grey, material)
+    primitives = []
+    for number, used in enumerate(np.unique(material)):
+        mine = np.repeat(material == used, 3)
+        primitives.append(
+            _primitive(
+                number,
+                int(used),
+                vertex[: 3 * n][mine],
+                normal[: 3 * n][mine],
+                texcoord[: 3 * n][mine],
+                corners,
+            )
+        )
+    return primitives
+
+
+def _primitive(
+    number: int,
+    material: int,
+    vertex: NDArray[np.int64],
+    normal: NDArray[np.int64],
+    texcoord: NDArray[np.int64],
+    corners: _Corners,
+) -> PrimitiveArrays:
+    # One vertex for each combination of indices that occurs; two steps keep the key within 64 bits.
+    _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
+    _, row, index = np.unique(
+        first * (len(corners.normal) + 1) + normal + 1, return_index=True, return_inverse=True
+    )
+    v, n, t = vertex[row], normal[row], texcoord[row]
+    given = None
+    if (n >= 0).any():
+        given = np.full((len(n), 3), np.nan, np.float32)
+        given[n >= 0] = corners.normal[n[n >= 0]]
+    uv = {}
+    if (t >= 0).any():
+        uv[0] = np.zeros((len(t), 2), np.float32)
+        uv[0][t >= 0] = corners.texcoord[t[t >= 0]]
+    return PrimitiveArrays(
+        index=number,
+        material=material,
+        position=corners.position[v],
+        triangle=index.reshape(-1, 3),
+        normal=given,
+        texcoord=uv,
+        colour=None if corners.colour is None else corners.colour[v],
+    )
