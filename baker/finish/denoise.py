@@ -21,11 +21,14 @@ from baker.finish.page import check_page
 from baker.finish.tiles import over_rows
 from baker.kernels.page_fill import nearest_texel, reflect_outwards
 from baker.kernels.page_guard import hold_to_samples
+from baker.kernels.page_slope import border_planes
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
 # The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
 REACH = 96
+# Half window of the slopes at chart borders, texels.
+SLOPE_RADIUS = 4
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -119,9 +122,20 @@ def surround_charts(
     """
     nearest = np.zeros(covered.shape, np.int32)
     nearest_texel(covered, nearest)
+    border = np.unique(nearest[~covered])
+    plane = np.zeros((len(border), 3, value.shape[2]), np.float32)
+    over_rows(
+        lambda begin, end: border_planes(value, chart, covered, border, SLOPE_RADIUS, plane, begin, end),
+        len(border),
+        threads,
+    )
+    plane_row = np.zeros(covered.shape, np.int32)
+    plane_row.reshape(-1)[border] = np.arange(len(border), dtype=np.int32)
     picture = np.array(value)
     over_rows(
-        lambda first, end: reflect_outwards(picture, chart, covered, nearest, REACH, first, end),
+        lambda first, end: reflect_outwards(
+            picture, chart, covered, nearest, plane_row, plane, REACH, first, end
+        ),
         len(picture),
         threads,
     )

@@ -12,6 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+# A reflected picture follows its border's slope this far, texels, and never by more than this factor.
+SLOPE_REACH = 6.0
+MOST = 4.0
+
 
 @njit(cache=True, nogil=True)
 def nearest_texel(mask, out):  # type: ignore[no-untyped-def]
@@ -151,11 +155,13 @@ def _touches_known(chart, known, r, c):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def reflect_outwards(value, chart, covered, nearest, reach, first_row, end_row):  # type: ignore[no-untyped-def]
+def reflect_outwards(value, chart, covered, nearest, slope_row, slope, reach, first_row, end_row):  # type: ignore[no-untyped-def]
     """Continue every chart's picture into the empty texels by reflection at its border, in place.
 
-    An empty texel p with the nearest covered texel q takes the value as far inside the chart as it lies
-    outside. Where the chart is thinner than that, the way back and forth through it is folded.
+    An empty texel p with the nearest covered texel q takes the value m as far inside the chart as p lies
+    outside, times (plane at p) / (plane at m), where the plane is fitted at q: noise looks the same on both
+    sides of the border, and a slope goes on where a plain mirror would put a crease. Where the chart is
+    thinner than needed, the way back and forth through it is folded.
 
     Parameters
     ----------
@@ -163,6 +169,10 @@ def reflect_outwards(value, chart, covered, nearest, reach, first_row, end_row):
     chart : (H, W) int32
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
+    slope_row : (H, W) int32
+        Row of `slope` for each covered texel that is some empty texel's nearest.
+    slope : (n, 3, C) float32
+        Plane at these texels: value, slope per column, slope per row.
     reach : int
         Largest depth looked at, in texels.
     """
@@ -194,8 +204,18 @@ def reflect_outwards(value, chart, covered, nearest, reach, first_row, end_row):
                     step = 2 * depth - step
             rr = qr + _round_ratio(dr * step, distance)
             cc = qc + _round_ratio(dc * step, distance)
+            # Beyond SLOPE_REACH texels the plane stays what it is there.
+            outside = min(1.0, SLOPE_REACH / distance)
+            inside = min(1.0, SLOPE_REACH / step) if step > 0 else 1.0
+            plane = slope[slope_row[qr, qc]]
             for j in range(channels):
-                value[r, c, j] = value[rr, cc, j]
+                rise_out = -(plane[1, j] * dc + plane[2, j] * dr) * outside
+                rise_in = (plane[1, j] * (cc - qc) + plane[2, j] * (rr - qr)) * inside
+                at_mirror = plane[0, j] + rise_in
+                factor = 1.0
+                if at_mirror > 0.0:
+                    factor = min(max((plane[0, j] + rise_out) / at_mirror, 1.0 / MOST), MOST)
+                value[r, c, j] = value[rr, cc, j] * factor
 
 
 @njit(cache=True, nogil=True)

@@ -16,6 +16,8 @@ RIDGE = 1e-3
 HEADROOM = 0.5
 # Extrapolation stops growing this many texels outside the chart.
 MAX_STEP = 2.0
+# A noisy slope counts by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
+DOUBT = 3.0
 
 
 @njit(cache=True, nogil=True)
@@ -156,3 +158,70 @@ def move_to_centre(value, chart, covered, offset, smallest, out, first_row, end_
             for j in range(channels):
                 estimate = float(value[r, c, j]) - plane[1, j] * x - plane[2, j] * y
                 out[r, c, j] = _limit(estimate, plane[3, j], plane[4, j])
+
+
+@njit(cache=True, nogil=True)
+def border_planes(value, chart, covered, texel, radius, out, begin, end):  # type: ignore[no-untyped-def]
+    """Fit a plane per channel around chosen texels of a noisy page, slopes shrunk by how sure they are.
+
+    Parameters
+    ----------
+    value : (H, W, C) float32
+    chart : (H, W) int32
+    covered : (H, W) bool
+    texel : (n,) int32
+        Row * W + column of covered texels.
+    radius : int
+        Half window; wider than for clean pages, since a slope has to rise above the noise.
+    out : (n, 3, C) float32
+        Receives value, slope per column and slope per row at entries begin to end - 1.
+    """
+    height, width, channels = value.shape
+    moment = np.zeros((4, channels), np.float64)
+    for k in range(begin, end):
+        r, c = texel[k] // width, texel[k] % width
+        sw = sx = sy = sxx = sxy = syy = 0.0
+        n = 0
+        moment[:] = 0.0
+        for rr in range(max(r - radius, 0), min(r + radius + 1, height)):
+            for cc in range(max(c - radius, 0), min(c + radius + 1, width)):
+                if not covered[rr, cc] or chart[rr, cc] != chart[r, c]:
+                    continue
+                x = float(cc - c)
+                y = float(rr - r)
+                w = 1.0 / (4.0 + x * x + y * y)
+                n += 1
+                sw += w
+                sx += w * x
+                sy += w * y
+                sxx += w * x * x
+                sxy += w * x * y
+                syy += w * y * y
+                for j in range(channels):
+                    v = float(value[rr, cc, j])
+                    moment[0, j] += w * v
+                    moment[1, j] += w * x * v
+                    moment[2, j] += w * y * v
+                    moment[3, j] += w * v * v
+        mx = sx / sw
+        my = sy / sw
+        cxx = sxx - sx * mx + RIDGE * sw
+        cyy = syy - sy * my + RIDGE * sw
+        cxy = sxy - sx * my
+        det = cxx * cyy - cxy * cxy
+        for j in range(channels):
+            mean = moment[0, j] / sw
+            bx = moment[1, j] - sx * mean
+            by = moment[2, j] - sy * mean
+            slope_x = (cyy * bx - cxy * by) / det
+            slope_y = (cxx * by - cxy * bx) / det
+            # Explained against unexplained spread, per degree of freedom: the F ratio of the slope.
+            spread = max(moment[3, j] - mean * moment[0, j], 0.0)
+            explained = min(max(slope_x * bx + slope_y * by, 0.0), spread)
+            trust = 0.0
+            if n > 3 and explained > 0.0:
+                left = (spread - explained) / (n - 3)
+                trust = max(1.0 - DOUBT * left / (explained / 2.0), 0.0)
+            out[k, 0, j] = mean - trust * (slope_x * mx + slope_y * my)
+            out[k, 1, j] = trust * slope_x
+            out[k, 2, j] = trust * slope_y

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import finish_pages as pages
+import numpy as np
+import pytest
+
+from baker.finish.border import recentre
+from baker.finish.dilate import dilate
+from baker.kernels.page_fill import nearest_texel
+from baker.kernels.page_slope import fit_plane
+
+
+@pytest.mark.parametrize("density", [0.0, 0.002, 0.05, 0.5, 1.0])
+def test_nearest_texel_is_exactly_nearest(density):
+    rng = np.random.default_rng(int(density * 1000))
+    for shape in ((1, 1), (1, 17), (19, 1), (33, 40)):
+        mask = rng.random(shape) < density
+        out = np.zeros(shape, np.int32)
+        nearest_texel(mask, out)
+        if not mask.any():
+            assert (out == -1).all()
+            continue
+        assert mask.reshape(-1)[out].all()
+        r, c = np.indices(shape)
+        np.testing.assert_array_equal(
+            (out // shape[1] - r) ** 2 + (out % shape[1] - c) ** 2, pages.slow_nearest(mask)
+        )
+
+
+def test_planes_agree_with_a_dense_solve():
+    value, chart, offset = pages.make_page(pages.contact)
+    covered = chart >= 0
+    plane = np.zeros((5, 1))
+    for r, c in np.argwhere(covered)[::37]:
+        fit_plane(value, chart, covered, offset, r, c, plane)
+        slow = pages.slow_plane(value[..., 0].astype(float), chart, covered, offset.astype(float), r, c)
+        np.testing.assert_allclose(plane[:3, 0], slow, rtol=1e-6, atol=1e-7)
+
+
+def test_each_empty_texel_within_reach_belongs_to_the_nearest_chart():
+    chart = np.repeat(np.arange(5, dtype=np.int32)[None], 40, 0)
+    chart = np.repeat(chart, 8, 1)
+    covered = np.zeros(chart.shape, bool)
+    covered[8:32, 2::8] = covered[8:32, 3::8] = True
+    chart = np.where(covered, chart, -1).astype(np.int32)
+    value = np.where(covered, chart + 1.0, 99.0)[..., None].astype(np.float32)
+    grown, dilated = dilate(value, covered, chart, 2)
+    # Charts of one value each stay of one value, whatever lies beside them.
+    for k in range(5):
+        assert (grown[10:30, 8 * k : 8 * k + 6, 0] == k + 1).all()
+    assert (grown[~covered & ~dilated] == 0.0).all()
+    assert not (dilated & covered).any()
+    assert dilated[6:8].any()
+    assert not dilated[:6].any()
+
+
+@pytest.mark.parametrize("pixels", [0, 1, 4])
+def test_dilation_reaches_every_neighbour_and_no_further(pixels):
+    _, chart, _ = pages.make_page(pages.smooth, 2)
+    covered = chart >= 0
+    _, dilated = dilate(np.ones((*chart.shape, 3), np.float32), covered, chart, pixels)
+    distance = pages.slow_nearest(covered)
+    np.testing.assert_array_equal(dilated, (distance > 0) & (distance <= 2 * pixels**2) & dilated)
+    assert dilated[(distance > 0) & (distance <= pixels**2)].all()
+    assert not dilated[distance > 2 * pixels**2].any()
+
+
+def test_a_plane_is_reproduced_at_and_beyond_borders():
+    def ramp(k, x, y):
+        return 10.0 + 0.3 * x - 0.2 * y
+
+    value, chart, offset = pages.make_page(ramp)
+    covered = chart >= 0
+    page, _ = dilate(recentre(value, chart, offset), covered, chart, 2)
+    plain, _ = dilate(value, covered, chart, 2)
+    # What is left is the limit on leaving the window's range, on the outermost slivers.
+    assert pages.border_error(page, ramp, 0.5) < 0.0005
+    assert pages.border_error(page, ramp, 0.5) < 0.1 * pages.border_error(plain, ramp, 0.5)
+
+
+@pytest.mark.parametrize("field", [pages.smooth, pages.contact])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_recentring_brings_border_lookups_nearer_to_the_truth(field, noise):
+    value, chart, offset = pages.make_page(field)
+    covered = chart >= 0
+    value = (value * (1.0 + noise * np.random.default_rng(1).standard_normal(value.shape))).astype(np.float32)
+    before, _ = dilate(value, covered, chart, 2)
+    after, _ = dilate(recentre(value, chart, offset), covered, chart, 2)
+    wrong_before, wrong_after = pages.border_error(before, field, 0.5), pages.border_error(after, field, 0.5)
+    if noise == 0.0:
+        assert wrong_after < 0.4 * wrong_before
+    else:
+        # A slope read off noisy texels may cost a little where there is next to no slope to correct.
+        assert wrong_after < 1.12 * wrong_before
+
+
+def test_recentring_stays_in_bounds_and_leaves_whole_texels_alone():
+    rng = np.random.default_rng(2)
+    chart = np.zeros((24, 24), np.int32)
+    value = (rng.random((24, 24, 3)) ** 8).astype(np.float32)
+    offset = rng.uniform(-0.7, 0.7, (24, 24, 2)).astype(np.float32)
+    offset[5:9] = 0.0
+    moved = recentre(value, chart, offset)
+    assert moved.min() >= 0.0
+    assert moved.max() <= 1.5 * value.max()
+    np.testing.assert_array_equal(moved[5:9], value[5:9])
+    assert (moved[0:5] != value[0:5]).any()
+
+
+def test_same_bytes_for_any_number_of_threads():
+    value, chart, offset = pages.make_page(pages.contact)
+    covered = chart >= 0
+    one = dilate(recentre(value, chart, offset), covered, chart, 4)
+    two = dilate(recentre(value, chart, offset, threads=2), covered, chart, 4, threads=2)
+    assert one[0].tobytes() == two[0].tobytes()
+    assert one[1].tobytes() == two[1].tobytes()
+
+
+def test_single_texels_and_wrong_arguments():
+    chart = np.full((5, 5), -1, np.int32)
+    chart[2, 2] = 0
+    value = np.where(chart >= 0, 7.0, 0.0)[..., None].astype(np.float32)
+    offset = np.full((5, 5, 2), 0.4, np.float32)
+    page, dilated = dilate(recentre(value, chart, offset), chart >= 0, chart, 1)
+    assert (page[1:4, 1:4] == 7.0).all()
+    assert dilated.sum() == 8
+    with pytest.raises(ValueError, match="negative"):
+        dilate(value, chart >= 0, chart, -1)
+    with pytest.raises(ValueError, match="centroid_offset must cover"):
+        recentre(value, chart, offset[:4])
