@@ -1,1 +1,102 @@
-"""Baker: radiosity lightmaps and ambient occlusion for game assets."""
+"""Baker: radiosity lightmaps and ambient occlusion for game assets.
+
+>>> import baker
+>>> result = baker.bake("level.glb", out="out", resolution=1024)  # doctest: +SKIP
+>>> result.lightmaps["irradiance"].value.shape  # doctest: +SKIP
+(1, 1024, 1024, 3)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from baker.core.errors import BakerError, Cancelled, InputError, ResourceError, SettingsError
+from baker.core.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from baker.core.atlas import Atlas
+    from baker.core.lightmap import BakeResult
+    from baker.core.scene import Scene
+
+__all__ = [
+    "BakerError", "Cancelled", "InputError", "ResourceError", "SettingsError", "bake", "load", "unwrap",
+]  # fmt: skip
+__version__ = "0.1.0"
+
+
+def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+        .glb, .gltf, .obj, .ply, .stl or .off.
+    up, scale : str, float
+        Up axis and metres per unit of formats other than glTF.
+
+    Raises
+    ------
+    InputError
+        If the file is unreadable, malformed, or holds nothing to bake.
+    """
+    from baker.io.load import load_scene
+
+    return load_scene(path, up=up, scale=scale)
+
+
+def unwrap(scene: Scene, *, progress: Progress = silent, **settings: Any) -> Atlas:
+    """Give every instance of a scene its place in the lightmap pages.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : Progress
+    settings
+        Any of `baker.core.settings.BakeSettings`: resolution, density, padding, uv ...
+
+    Raises
+    ------
+    SettingsError, InputError, Cancelled
+    """
+    from baker.core.settings import make_settings
+    from baker.unwrap.unwrap import unwrap_scene
+
+    return unwrap_scene(scene, make_settings(settings), progress)
+
+
+def bake(
+    scene: Scene | str | Path,
+    *,
+    out: str | Path | None = None,
+    progress: Progress = silent,
+    force: bool = False,
+    **settings: Any,
+) -> BakeResult:
+    """Bake a scene.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+    out : str or Path, optional
+        Folder to write; None keeps everything in memory.
+    progress : Progress
+        Is told stage and fraction; a truthy answer cancels.
+    force : bool
+        Replace an `out` that baker did not write.
+    settings
+        Any of `baker.core.settings.BakeSettings`: channels, resolution, samples ...
+
+    Returns
+    -------
+    BakeResult
+        `result.lightmaps["irradiance"].value` is (pages, H, W, 3) float32, lx.
+
+    Raises
+    ------
+    SettingsError, InputError, ResourceError, Cancelled
+    """
+    from baker.core.settings import make_settings
+    from baker.pipeline import bake as run
+
+    return run(scene, settings=make_settings(settings), out=out, progress=progress, force=force)

@@ -1,0 +1,385 @@
+"""The stages of a bake, in order; the only place that wires them together.
+
+    scene -> atlas -> texels -> buried points -> direct light -> patches -> form factors -> solve
+          -> final gather -> finished pages -> output folder
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.channels.channel import CHANNELS, Channel, Transport
+from baker.core.atlas import Atlas
+from baker.core.errors import ResourceError, SettingsError
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
+from baker.core.parallel import thread_count
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import Scene, SceneWarning
+from baker.core.settings import BakeSettings
+from baker.core.texels import TexelBuffer
+from baker.finish.finish import PagePlan, finish_page
+from baker.io.load import load_scene
+from baker.kernels.emitters import Emitters
+from baker.kernels.hits import HitTable
+from baker.kernels.surface import Surface
+from baker.lights.emissive import build_emitters
+from baker.radiosity.buried import find_buried
+from baker.radiosity.direct import direct_light
+from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
+from baker.radiosity.form_factors import build_form_factors
+from baker.radiosity.hit_table import build_hit_table
+from baker.radiosity.materials import Shading, resolve_materials
+from baker.radiosity.patches import build_patches
+from baker.radiosity.solve import energy_audit, solve_radiosity
+from baker.radiosity.texels import build_texels
+from baker.trace.embree import RayScene
+from baker.unwrap.unwrap import unwrap_scene
+
+# Rays from each patch for its form factors, by hemisphere samples per texel.
+MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
+# A texel counts as not converged if its standard error before denoising exceeds this share of its value.
+UNCONVERGED = 0.25
+
+
+@dataclass
+class Record:
+    """Collects what a bake tells about itself while it runs."""
+
+    progress: Progress
+    timings: dict[str, float] = field(default_factory=dict)
+    rays: dict[str, int] = field(default_factory=dict)
+    solve: dict[str, Any] = field(default_factory=dict)
+    warnings: list[SceneWarning] = field(default_factory=list)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage; several visits add up."""
+        report(self.progress, name, 0.0)
+        start = time.perf_counter()
+        yield
+        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class World:
+    """Everything that rays of a bake need, ready to be traced."""
+
+    geometry: Geometry
+    shading: Shading
+    texels: TexelBuffer
+    surface: Surface
+    rays: RayScene
+    emitters: Emitters
+    table: HitTable
+    mask: NDArray[np.uint16]
+
+
+def bake(
+    scene: Scene | str | Path,
+    *,
+    settings: BakeSettings,
+    out: Path | str | None = None,
+    progress: Progress = silent,
+    force: bool = False,
+) -> BakeResult:
+    """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
+
+    Parameters
+    ----------
+    scene : Scene or path
+    settings : BakeSettings
+    out : path, optional
+        Folder to write; None keeps everything in memory.
+    progress : Progress
+    force : bool
+        Replace an `out` that baker did not write.
+
+    Raises
+    ------
+    InputError, SettingsError, ResourceError, Cancelled
+    """
+    channels = _channels(settings)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        from baker.io.output import check_out
+
+        check_out(folder, force=force)
+    record = Record(progress)
+    try:
+        with record.stage("load"):
+            if not isinstance(scene, Scene):
+                scene = load_scene(scene, up=settings.up, scale=settings.scale)
+        record.warnings.extend(scene.warnings)
+        with record.stage("unwrap"):
+            atlas = unwrap_scene(scene, settings, progress)
+        record.warnings.extend(atlas.warnings)
+        world = prepare(scene, atlas, settings, record)
+        transport = trace_transport(scene, world, channels, settings, record)
+        world.rays.close()
+        result = _finish(scene, atlas, world, transport, channels, settings, record)
+        if folder is not None:
+            from baker.io.output import write_bake
+
+            with record.stage("write"):
+                write_bake(result, folder, force=force)
+            result = replace(result, out=folder)
+    except MemoryError:
+        raise ResourceError("memory ran out; lower --resolution or --samples, or bake fewer objects") from None
+    return result
+
+
+def _channels(settings: BakeSettings) -> dict[str, Channel]:
+    """Look up the channels asked for, in the order asked."""
+    found: dict[str, Channel] = {}
+    for name in settings.channels:
+        channel = CHANNELS.get(name)
+        if channel is None:
+            raise SettingsError(f"there is no channel '{name}'; known are {', '.join(CHANNELS.names())}")
+        found[name] = channel
+    return found
+
+
+def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) -> World:
+    """Build texels, ray tree and tables, and find the buried points."""
+    threads = thread_count(settings.threads)
+    with record.stage("texels"):
+        geometry = world_geometry(scene, atlas)
+        shading = resolve_materials(scene, geometry)
+        texels, surface = build_texels(
+            geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
+        )
+    with record.stage("ray tree"):
+        rays = RayScene(geometry.position, geometry.triangle, threads=threads)
+        emitters = build_emitters(geometry, shading, shading.emission)
+        table = build_hit_table(geometry, texels, emitters)
+    with record.stage("buried texels"):
+        mask, cast = find_buried(
+            texels, surface, table, rays.tracer, seed=settings.seed, threads=threads, progress=record.progress
+        )
+        record.rays["buried texels"] = cast
+    return World(geometry, shading, texels, surface, rays, emitters, table, mask)
+
+
+def trace_transport(
+    scene: Scene, world: World, channels: dict[str, Channel], settings: BakeSettings, record: Record
+) -> Transport:
+    """Cast the rays of all stages that the channels need."""
+    transport = Transport()
+    n_samples = settings.hemisphere_samples
+    ao_samples = settings.ao_samples or n_samples
+    distance = settings.ao_reach(world.geometry.diagonal)
+    if any(channel.needs_light for channel in channels.values()):
+        transport = _light(scene, world, settings, distance, record)
+    if any(channel.needs_open for channel in channels.values()):
+        share = transport.gathered
+        if share is not None and ao_samples == n_samples:
+            return replace(transport, open=share.open, ao_samples=ao_samples)
+        with record.stage("ambient occlusion"):
+            n_front = world.texels.n_front
+            opened = ambient_occlusion(
+                n_front,
+                world.surface,
+                world.mask,
+                world.rays.tracer,
+                n_samples=ao_samples,
+                distance=distance,
+                seed=settings.seed,
+                threads=thread_count(settings.threads),
+                progress=record.progress,
+            )
+            record.rays["ambient occlusion"] = n_front * ao_samples
+        transport = replace(transport, open=opened, ao_samples=ao_samples)
+    return transport
+
+
+def _light(scene: Scene, world: World, settings: BakeSettings, ao_distance: float, record: Record) -> Transport:
+    """Direct light, radiosity and final gather."""
+    threads, seed, progress = thread_count(settings.threads), settings.seed, record.progress
+    n_samples = settings.hemisphere_samples
+    n_light = settings.light_samples or n_samples
+    texels, sky = world.texels, np.array(settings.sky_radiance)
+    if not scene.lights and not len(world.emitters.power) and not sky.any():
+        record.warnings.append(
+            SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use --sky")
+        )
+    with record.stage("direct light"):
+        direct = direct_light(
+            world.surface,
+            world.mask,
+            world.table,
+            scene.lights,
+            world.emitters,
+            world.shading,
+            world.rays.tracer,
+            n_light=n_light,
+            n_gather=n_samples,
+            seed=seed,
+            threads=threads,
+            progress=progress,
+        )
+        record.rays["direct light"] = direct.rays
+    exitance = np.zeros((texels.n, 3), np.float32)
+    if settings.bounces != 0:
+        exitance = _reflected(world, direct.complete, sky, settings, record)
+    with record.stage("final gather"):
+        gathered: Gathered = final_gather(
+            texels.n_front,
+            world.surface,
+            world.mask,
+            world.table,
+            exitance,
+            world.emitters,
+            world.shading,
+            world.rays.tracer,
+            n_samples=n_samples,
+            n_light=n_light,
+            sky=settings.sky_radiance,
+            ao_distance=ao_distance,
+            seed=seed,
+            threads=threads,
+            progress=progress,
+        )
+        record.rays["final gather"] = gathered.rays
+    return Transport(direct=direct, gathered=gathered)
+
+
+def _reflected(
+    world: World,
+    complete: NDArray[np.float32],
+    sky: NDArray[np.float64],
+    settings: BakeSettings,
+    record: Record,
+) -> NDArray[np.float32]:
+    """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own."""
+    texels = world.texels
+    with record.stage("form factors"):
+        patches = build_patches(texels)
+        matrix = build_form_factors(
+            patches,
+            world.surface,
+            world.mask,
+            world.table,
+            world.rays.tracer,
+            n_rays=min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS),
+            seed=settings.seed,
+            threads=thread_count(settings.threads),
+            progress=record.progress,
+        )
+        record.rays["form factors"] = matrix.rays
+    with record.stage("solve"):
+        weight = np.maximum(texels.area, 1e-12)
+        albedo = patches.mean(texels.albedo, weight)
+        from_sky = np.pi * matrix.sky[:, None] * sky
+        direct = patches.mean(complete, weight) + from_sky
+        # Direct light meets the albedo of its own texel; the sky's share is known per patch.
+        source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
+        solution = solve_radiosity(
+            matrix, source, albedo, bounces=settings.bounces, progress=record.progress
+        )
+        record.solve.update(
+            patches=patches.n,
+            nonzeros=len(matrix.value),
+            iterations=solution.iterations,
+            residual=solution.residual,
+            energy=energy_audit(matrix, patches.area, direct, source, solution.irradiance, albedo),
+            row_error=matrix.row_error,
+            reciprocity_error=matrix.reciprocity_error,
+        )
+        indirect = (solution.irradiance + from_sky).astype(np.float32)
+    return texels.albedo * (complete + indirect[patches.patch])
+
+
+def _finish(
+    scene: Scene,
+    atlas: Atlas,
+    world: World,
+    transport: Transport,
+    channels: dict[str, Channel],
+    settings: BakeSettings,
+    record: Record,
+) -> BakeResult:
+    """Turn texel values into finished pages and gather what is to be told about them."""
+    texels = world.texels
+    n_front = texels.n_front
+    good = world.mask[:n_front] != 0
+    chart = texels.page_image(texels.chart[:n_front], fill=-1)
+    valid = texels.page_image(good, fill=False)
+    centroid = texels.page_image(texels.centroid)
+    status = np.where(chart >= 0, np.uint8(TexelStatus.COVERED), np.uint8(TexelStatus.EMPTY))
+    noisy = np.zeros(n_front, bool)
+    lightmaps: dict[str, Lightmap] = {}
+    statistics: dict[str, dict[str, Any]] = {}
+    with record.stage("finish"):
+        for name, channel in channels.items():
+            layers = channel.layers(transport)
+            value = np.zeros((atlas.n_pages, atlas.resolution, atlas.resolution, channel.components), np.float32)
+            images = [(texels.page_image(part.value), texels.page_image(part.error)) for part in layers]
+            for page in range(atlas.n_pages):
+                plan = PagePlan(chart[page], valid[page], centroid[page])
+                value[page], grown = finish_page(
+                    plan,
+                    [(image[page], error[page]) for image, error in images],
+                    upper=channel.upper,
+                    denoise=settings.denoise,
+                    dilation=max(2 * settings.padding, 8),
+                    threads=thread_count(settings.threads),
+                    progress=record.progress,
+                )
+                status[page][grown] = TexelStatus.DILATED
+            noisy |= _unconverged(layers)
+            lightmaps[name] = Lightmap(name, channel.unit, value)
+            statistics[name] = _statistics(value[chart >= 0], int((~good).sum()))
+    flat = status.reshape(-1)
+    flat[texels.pixel[:n_front][noisy & good]] = TexelStatus.UNCONVERGED
+    flat[texels.pixel[:n_front][~good]] = TexelStatus.INVALID
+    denoiser: dict[str, Any] = {}
+    if settings.denoise:
+        from baker.finish.denoise import denoiser_name
+
+        denoiser = denoiser_name()
+    return BakeResult(
+        scene=scene,
+        atlas=atlas,
+        settings=settings,
+        lightmaps=lightmaps,
+        status=status,
+        texel_count=np.bincount(texels.instance[:n_front], minlength=len(scene.instances)).astype(np.int64),
+        statistics=statistics,
+        timings=record.timings,
+        rays=record.rays,
+        solve=record.solve,
+        denoise=denoiser,
+        warnings=tuple(record.warnings),
+    )
+
+
+def _unconverged(layers: tuple[Any, ...]) -> NDArray[np.bool_]:
+    """Return the texels whose summed standard error exceeds a share of their value."""
+    value = sum(layer.value.mean(axis=1) for layer in layers)
+    error = np.sqrt(sum(np.square(layer.error) for layer in layers))
+    lit = value > 0
+    floor = 0.05 * float(np.median(value[lit])) if lit.any() else 0.0
+    noisy: NDArray[np.bool_] = error > UNCONVERGED * np.maximum(value, floor)
+    return noisy & lit
+
+
+def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:
+    """Return the figures of one channel over its covered texels (n, C)."""
+    if not value.size:
+        return {"min": 0.0, "max": 0.0, "mean": 0.0, "clipped": 0, "invalid": invalid}
+    return {
+        "min": float(value.min()),
+        "max": float(value.max()),
+        "mean": float(value.mean(dtype=np.float64)),
+        "clipped": int((value > 65504.0).any(axis=-1).sum()),
+        "invalid": invalid,
+    }
