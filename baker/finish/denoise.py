@@ -5,6 +5,14 @@
 2. Open Image Denoise's lightmap filter runs over the part of the page that has charts.
 3. The result is held to the samples: see `baker.kernels.page_guard`.
 
+Call it for direct and indirect light apart and add the results, after `recentre` and before `dilate`.
+*Measured* on a sharp shadow edge over noisy indirect light, RMS error together and apart: 1.5 and 0.9 % with
+exact direct light and 5 % noise, 4.0 and 3.0 % with 10 and 20 % noise; at the edge itself 2.5 and 0.6 %,
+7.7 and 4.8 %.
+*Measured* with 20 % noise and contact shadows, outermost ring of charts: 16 % too dark with black gaps;
+RMS error 11.6 % with the nearest texel's value in the gaps, 8.7 % (bias +2.7 %) with a plain reflection,
+6.1 % (bias +0.2 %) with the reflection along the slope.
+
 Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the page filling follows from what
 the filter does at gaps.
 """

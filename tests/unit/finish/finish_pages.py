@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 Field = Callable[[int, NDArray, NDArray], NDArray]
 
@@ -88,6 +89,11 @@ def lookup(page: NDArray, x: NDArray, y: NDArray) -> NDArray:
     upper = page[row, column, 0] * (1 - u) + page[row, column + 1, 0] * u
     lower = page[row + 1, column, 0] * (1 - u) + page[row + 1, column + 1, 0] * u
     return upper * (1 - v) + lower * v
+
+
+def squared_distance(mask: NDArray) -> NDArray:
+    """Return the squared distance to the nearest set texel by another library's transform."""
+    return np.rint(distance_transform_edt(~mask) ** 2).astype(int)
 
 
 def slow_nearest(mask: NDArray) -> NDArray:

@@ -59,7 +59,7 @@ def test_dilation_reaches_every_neighbour_and_no_further(pixels):
     _, chart, _ = pages.make_page(pages.smooth, 2)
     covered = chart >= 0
     _, dilated = dilate(np.ones((*chart.shape, 3), np.float32), covered, chart, pixels)
-    distance = pages.slow_nearest(covered)
+    distance = pages.squared_distance(covered)
     np.testing.assert_array_equal(dilated, (distance > 0) & (distance <= 2 * pixels**2) & dilated)
     assert dilated[(distance > 0) & (distance <= pixels**2)].all()
     assert not dilated[distance > 2 * pixels**2].any()

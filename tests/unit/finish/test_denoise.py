@@ -34,7 +34,7 @@ def wrong(value, truth, mask):
 
 def rings(chart):
     """Return the two outermost rings of covered texels, and the rest."""
-    distance = pages.slow_nearest(chart < 0)
+    distance = pages.squared_distance(chart < 0)
     return (chart >= 0) & (distance <= 4), (chart >= 0) & (distance > 4)
 
 
@@ -103,7 +103,7 @@ def test_surroundings_continue_a_chart_by_its_slope_and_leave_charts_alone():
     np.testing.assert_array_equal(picture[covered], value[covered])
     x = np.arange(pages.SIZE) + 0.5
     expected = ramp(0, x[None, :], x[:, None])
-    distance = pages.slow_nearest(covered)
+    distance = pages.squared_distance(covered)
     near = (distance > 0) & (distance <= 9)
     # A plain mirror would be off by twice the slope times the distance, up to 8 %; partly covered texels
     # hold the value of their centroid, half a texel aside.
