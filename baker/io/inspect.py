@@ -1,0 +1,163 @@
+"""Says what is in a scene file, a bake's folder or an EXR image, as plain JSON values."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baker.core.encoding import ENCODINGS
+from baker.core.errors import InputError
+from baker.core.scene import Scene
+from baker.io.output_folder import MANIFEST_NAME, own_files
+
+
+def inspect_path(path: Path | str) -> dict[str, Any]:
+    """Describe a scene file, an output folder (or its bake.json), or an image that baker can read.
+
+    Parameters
+    ----------
+    path : Path or str
+
+    Returns
+    -------
+    dict
+        `kind` is "scene", "bake" or "image"; the other keys depend on it.
+
+    Raises
+    ------
+    InputError
+        If there is nothing at `path`, or it is none of the three.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("there is no such file or folder", file=str(path))
+    if path.name == MANIFEST_NAME:
+        path = path.parent
+    if path.is_dir():
+        return _bake(path)
+    for name in ENCODINGS.names():
+        encoding = ENCODINGS.get(name)
+        if encoding is not None and path.suffix.lower() == encoding.suffix:
+            return _image(path, encoding.decode(path))
+    from baker.io.load import load_scene
+
+    return _scene(path, load_scene(path))
+
+
+def _bake(folder: Path) -> dict[str, Any]:
+    """Sum a manifest up and compare every file with its hash."""
+    if own_files(folder) is None:
+        raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
+    manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+    files = [
+        {**entry, "state": _state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
+    ]
+    settings = manifest.get("settings", {})
+    return {
+        "kind": "bake",
+        "path": str(folder),
+        "whole": all(entry["state"] == "as baked" for entry in files),
+        "baker": manifest["versions"]["baker"],
+        "created": manifest.get("created"),
+        "input": manifest.get("input"),
+        "pages": manifest.get("pages", []),
+        "files": files,
+        "instances": manifest.get("instances", []),
+        "texels": sum(entry["texels"] for entry in manifest.get("instances", [])),
+        "lights": manifest.get("lights", []),
+        "statistics": manifest.get("statistics", {}),
+        "warnings": manifest.get("warnings", []),
+        "seconds": sum(v for v in manifest.get("timings", {}).values() if isinstance(v, int | float)),
+        "settings": settings,
+    }
+
+
+def _state(path: Path, sha256: str) -> str:
+    if not path.is_file():
+        return "missing"
+    with path.open("rb") as file:
+        same = hashlib.file_digest(file, "sha256").hexdigest() == sha256
+    return "as baked" if same else "changed"
+
+
+def _image(path: Path, image: Any) -> dict[str, Any]:
+    height, width, _ = image.pixels.shape
+    figures = []
+    for index, name in enumerate(image.channels):
+        plane = image.pixels[:, :, index]
+        finite = plane[np.isfinite(plane)]
+        empty = not finite.size
+        figures.append(
+            {
+                "channel": name,
+                "min": None if empty else float(finite.min()),
+                "max": None if empty else float(finite.max()),
+                "mean": None if empty else float(finite.mean(dtype=np.float64)),
+                "not_finite": int(plane.size - finite.size),
+            }
+        )
+    return {
+        "kind": "image",
+        "path": str(path),
+        "width": width,
+        "height": height,
+        "type": image.dtype,
+        "channels": figures,
+        "header": image.header,
+    }
+
+
+def _scene(path: Path, scene: Scene) -> dict[str, Any]:
+    uses = Counter(instance.mesh for instance in scene.instances)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for instance in scene.instances:
+        matrix = instance.world_from_object
+        mesh = scene.meshes[instance.mesh]
+        used = mesh.position[np.unique(mesh.triangle)].astype(np.float64)
+        world = used @ matrix[:3, :3].T + matrix[:3, 3]
+        low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+    return {
+        "kind": "scene",
+        "path": str(path),
+        "name": scene.name,
+        "sha256": scene.sha256,
+        "triangles": scene.n_triangles,
+        "box": {"min": low.tolist(), "max": high.tolist(), "diagonal": float(np.linalg.norm(high - low))},
+        "meshes": [
+            {
+                "name": mesh.name,
+                "triangles": len(mesh.triangle),
+                "vertices": len(mesh.position),
+                "instances": uses[index],
+                "texcoords": [number for number, uv in enumerate(mesh.texcoord) if uv is not None],
+                "vertex_colours": mesh.colour is not None,
+            }
+            for index, mesh in enumerate(scene.meshes)
+        ],
+        "instances": [
+            {"node": i.node, "name": i.name, "mesh": i.mesh, "triangles": len(scene.meshes[i.mesh].triangle)}
+            for i in scene.instances
+        ],
+        "materials": [
+            {
+                "name": m.name,
+                "base_colour": list(m.base_colour),
+                "base_colour_texture": m.base_colour_texture is not None,
+                "emission": list(m.emission),
+                "emission_texture": m.emission_texture is not None,
+                "double_sided": m.double_sided,
+                "alpha_mode": m.alpha_mode,
+            }
+            for m in scene.materials
+        ],
+        "lights": [
+            {"kind": light.kind, "name": light.name, "node": light.node, "intensity": list(light.intensity)}
+            for light in scene.lights
+        ],
+        "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in scene.warnings],
+    }

@@ -1,0 +1,245 @@
+"""An output folder that is either the old one or the new one, never a half of each.
+
+All files go to a temporary folder beside the output folder, which takes its place by renaming at the end.
+Renames are kept in a journal, so that whatever goes wrong is put back. Where the output folder itself cannot
+be renamed (a mount point, the current folder) the files are exchanged one by one under the same journal.
+"""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+import secrets
+import shutil
+from pathlib import Path
+from types import TracebackType
+
+from baker.core.errors import ResourceError, SettingsError
+
+MANIFEST_NAME = "bake.json"
+
+
+def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
+    """Make sure, before the long work, that a bake may be written to `out`.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder; neither it nor its parents need to exist.
+    force : bool
+        Also accept a folder with files that baker did not write (they stay there).
+    scene_path : Path or None
+        The input, which must not be among the files to be replaced.
+
+    Raises
+    ------
+    SettingsError
+        If `out` is a file, a folder that baker did not write, or holds the input.
+    ResourceError
+        If nothing can be written there.
+    """
+    folder = out.resolve()
+    if folder.exists() and not folder.is_dir():
+        raise SettingsError("the output is a file; name a folder", file=str(out))
+    parent = next(path for path in folder.parents if path.exists())
+    if not parent.is_dir():
+        raise SettingsError(f"'{parent}' is a file; the output cannot lie in it", file=str(out))
+    if not folder.exists() or not _cannot_move(folder):
+        _check_writable(parent, out)
+    if not folder.exists():
+        return
+    try:
+        _check_writable(folder, out)
+        ours = own_files(folder)
+        if ours is None and not force and any(folder.iterdir()):
+            message = "the folder holds files that baker did not write; name another one, or add --force"
+            raise SettingsError(f"{message} (they are kept)", file=str(out))
+    except OSError as error:
+        raise ResourceError(f"the folder cannot be read ({error.strerror})", file=str(out)) from None
+    if scene_path is not None and scene_path.resolve().is_relative_to(folder):
+        name = scene_path.resolve().relative_to(folder).as_posix()
+        if name == "scene.glb" or name in (ours or ()):
+            message = f"the bake would replace its own input '{name}'; name another output folder"
+            raise SettingsError(message, file=str(out))
+
+
+def own_files(folder: Path) -> set[str] | None:
+    """List the files of a bake, as paths relative to its folder; None if it is not baker's."""
+    try:
+        manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+        manifest["versions"]["baker"]
+        return {MANIFEST_NAME, *(str(entry["file"]) for entry in manifest["files"])}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+class OutputFolder:
+    """Collects the files of a bake in `path` until `commit` puts them in place.
+
+    Use it as a context manager: leaving it without `commit`, by whatever exception, removes the temporary
+    folder. `abort` may also be called from elsewhere (a second Ctrl-C) and more than once.
+
+    Parameters
+    ----------
+    out : Path
+        Where the files end up; see `check_out`.
+
+    Attributes
+    ----------
+    path : Path
+        The temporary folder to write into.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self.out = out.resolve()
+        self._in_place = self.out.is_dir() and _cannot_move(self.out)
+        suffix = f"baker-{os.getpid()}-{secrets.token_hex(4)}"
+        if self._in_place:
+            self.path = self.out / f".{suffix}"
+        else:
+            self.path = self.out.with_name(f".{self.out.name}.{suffix}")
+        self._aside = self.path.with_name(self.path.name + "-old")
+        self._journal: list[tuple[Path, Path]] = []
+        self._made: list[Path] = []
+
+    def __enter__(self) -> OutputFolder:
+        """Make the temporary folder, and the parents of the output folder."""
+        try:
+            for parent in reversed([p for p in self.path.parents if not p.exists()]):
+                parent.mkdir()
+                self._made.append(parent)
+            self.path.mkdir()
+        except BaseException:
+            self.abort()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove what was not committed."""
+        self.abort()
+
+    def commit(self) -> None:
+        """Put the files in the place of the old ones; files that baker did not write stay.
+
+        Raises
+        ------
+        OSError
+            If the system refuses; the old folder is then as it was.
+        """
+        try:
+            if self._in_place:
+                self._exchange_files()
+            else:
+                self._exchange_folders()
+        except BaseException:
+            self.abort()
+            raise
+        self._journal.clear()
+        self._made.clear()
+        for leftover in (self._aside, self.path):
+            shutil.rmtree(leftover, ignore_errors=True)
+
+    def abort(self) -> None:
+        """Put the old folder back as it was and remove everything temporary."""
+        while self._journal:
+            source, target = self._journal[-1]
+            if os.path.lexists(target) and not os.path.lexists(source):
+                target.rename(source)
+            self._journal.pop()
+        for leftover in (self._aside, self.path):
+            shutil.rmtree(leftover, ignore_errors=True)
+        while self._made:
+            try:
+                self._made.pop().rmdir()
+            except OSError:
+                # Someone else has put something there meanwhile: it is theirs.
+                self._made.clear()
+
+    def _exchange_folders(self) -> None:
+        if self.out.exists():
+            _carry_over(self.out, self.path, own_files(self.out) or set())
+            shutil.copymode(self.out, self.path)
+            self._rename(self.out, self._aside)
+        self._rename(self.path, self.out)
+
+    def _exchange_files(self) -> None:
+        new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
+        old = {Path(name) for name in own_files(self.out) or ()} | set(new)
+        # The old manifest goes first and the new one last: a folder with a manifest is whole.
+        for name in sorted(old, key=lambda n: (n.as_posix() != MANIFEST_NAME, n)):
+            if (self.out / name).exists():
+                (self._aside / name).parent.mkdir(parents=True, exist_ok=True)
+                self._rename(self.out / name, self._aside / name)
+        for name in sorted(new, key=lambda n: (n.as_posix() == MANIFEST_NAME, n)):
+            (self.out / name).parent.mkdir(parents=True, exist_ok=True)
+            self._rename(self.path / name, self.out / name)
+
+    def _rename(self, source: Path, target: Path) -> None:
+        # Written down first: an interruption between the two lines must still find its way back.
+        self._journal.append((source, target))
+        try:
+            source.rename(target)
+        except OSError:
+            self._journal.pop()
+            raise
+
+
+def remove_leftovers(out: Path, process: int) -> None:
+    """Clean up after a process that was killed while it wrote: the old bake comes back, if it was moved.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder it wrote to.
+    process : int
+        Its id; what other processes are writing is left alone.
+    """
+    folder = out.resolve()
+    for home, prefix in ((folder.parent, f".{folder.name}"), (folder, "")):
+        if not home.is_dir():
+            continue
+        for path in sorted(home.glob(f"{glob.escape(prefix)}.baker-{process}-*"), reverse=True):
+            if path.name.endswith("-old") and not (folder / MANIFEST_NAME).exists():
+                if home != folder and not folder.exists():
+                    path.rename(folder)
+                elif home == folder:
+                    for file in [p for p in path.rglob("*") if p.is_file()]:
+                        file.replace(folder / file.relative_to(path))
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _cannot_move(folder: Path) -> bool:
+    """Say whether a folder must stay where it is: mounted, or the one we stand in."""
+    return os.path.ismount(folder) or Path.cwd().is_relative_to(folder)
+
+
+def _check_writable(folder: Path, out: Path) -> None:
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ResourceError(
+            f"nothing can be written to '{folder}'; name another output folder", file=str(out)
+        )
+
+
+def _carry_over(old: Path, new: Path, own: set[str], prefix: str = "") -> None:
+    """Bring the files that are not baker's from the old folder into the new, linked where possible."""
+    for entry in sorted(os.scandir(old), key=lambda e: e.name):
+        name, target = prefix + entry.name, new / entry.name
+        if name in own or (os.path.lexists(target) and not entry.is_dir(follow_symlinks=False)):
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            was_empty = not any(Path(entry.path).iterdir())
+            target.mkdir(exist_ok=True)
+            _carry_over(Path(entry.path), target, own, f"{name}/")
+            if not was_empty and not any(target.iterdir()):
+                target.rmdir()
+            else:
+                shutil.copystat(entry.path, target)
+        else:
+            try:
+                os.link(entry.path, target, follow_symlinks=False)
+            except OSError:
+                # Not every file system has hard links.
+                shutil.copy2(entry.path, target, follow_symlinks=False)
