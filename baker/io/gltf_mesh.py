@@ -80,11 +80,11 @@ def _primitive(
     if "POSITION" not in attributes:
         primitive.fail("the primitive has no POSITION")
     at = attributes.index("POSITION", len(accessors), "accessors")
+    position = read_accessor(document, at, types=("VEC3",))
     if component_type(document, at) != FLOAT and "KHR_mesh_quantization" not in document.root.strings(
         "extensionsUsed"
     ):
         accessors[at].fail("POSITION must hold floats (componentType 5126)", "componentType")
-    position = read_accessor(document, at, types=("VEC3",))
 
     def optional(key: str, types: tuple[str, ...]) -> NDArray[np.float32] | None:
         if key not in attributes:

@@ -78,7 +78,9 @@ def _check_tree(nodes: Sequence[JsonObject], children: Sequence[Sequence[int]]) 
         while at is not None and at not in good:
             if at in path:
                 ring = [*path][[*path].index(at) :]
-                shown = " -> ".join(map(str, [*reversed(ring), ring[-1]][:6]))
+                # The walk went upwards; people read downwards.
+                downwards = [str(k) for k in (ring[0], *reversed(ring[1:]), ring[0])]
+                shown = " -> ".join(downwards if len(ring) < 8 else [*downwards[:7], "..."])
                 nodes[at].fail(f"the nodes form a cycle ({shown}); a node may not be below itself")
             path[at] = None
             at = parent.get(at)

@@ -1,0 +1,181 @@
+"""Nodes, instances, lights, scenes and what the importer says about them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+import pytest
+from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, quad_builder, write
+
+from baker.core.errors import InputError, SettingsError
+from baker.io.load import importers, load_scene
+
+
+def load(tmp_path, builder, **options):
+    return load_scene(write(tmp_path / "room.v2.glb", builder), **options)
+
+
+def codes(scene):
+    return [warning.code for warning in scene.warnings]
+
+
+def turn(axis, angle):
+    """Return a rotation by Rodrigues' formula, another way than by quaternion components."""
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
+
+
+def test_matrix_and_trs_multiply_down_the_tree(tmp_path):
+    builder = quad_builder()
+    axis, angle = np.array([2.0, 3.0, 6.0]) / 7.0, 1.1
+    matrix = np.array([[0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 2, 7], [0, 0, 0, 1.0]])
+    builder.node(
+        translation=[1, 2, 3],
+        rotation=[*(axis * math.sin(angle / 2)), math.cos(angle / 2)],
+        scale=[1, -2, 3],
+        children=[0],
+    )
+    builder.node(matrix=matrix.T.reshape(-1).tolist(), children=[1])
+    trs = np.eye(4)
+    trs[:3, :3] = turn(axis, angle) @ np.diag([1, -2, 3])
+    trs[:3, 3] = (1, 2, 3)
+    instance = load(tmp_path, builder).instances[0]
+    np.testing.assert_allclose(instance.world_from_object, matrix @ trs, atol=1e-14)
+    assert (instance.node, instance.name, instance.mesh) == (0, "place", 0)
+
+
+def test_a_mirrored_instance_keeps_the_mesh_as_the_file_has_it(tmp_path):
+    builder = quad_builder()
+    builder.node(mesh=0, scale=[-1, 1, 1])
+    scene = load(tmp_path, builder)
+    assert len(scene.meshes) == 1
+    assert [i.mesh for i in scene.instances] == [0, 0]
+    assert scene.instances[1].name == "square"
+    np.testing.assert_array_equal(scene.meshes[0].triangle, QUAD_TRIANGLE)
+    np.testing.assert_array_equal(scene.meshes[0].normal, QUAD_NORMAL)
+    assert np.linalg.det(scene.instances[1].world_from_object) == -1
+    assert scene.n_triangles == 4
+
+
+@pytest.mark.parametrize("scale", [[0, 1, 1], [0, 0, 0], [1, 1, 1e-12]])
+def test_flat_instances_go_with_a_warning(tmp_path, scale):
+    builder = quad_builder()
+    builder.node(mesh=0, scale=scale, name="flat")
+    scene = load(tmp_path, builder)
+    assert [i.node for i in scene.instances] == [0]
+    assert [(w.code, w.object) for w in scene.warnings] == [("flat-instance", "flat")]
+    builder.json["nodes"] = [{"mesh": 0, "scale": scale}]
+    with pytest.raises(InputError, match="nothing to bake"):
+        load(tmp_path, builder)
+
+
+def test_scenes_are_chosen_by_default_or_by_number(tmp_path):
+    builder = quad_builder()
+    builder.mesh(builder.primitive(QUAD + np.float32(9), QUAD_TRIANGLE))
+    builder.node(mesh=1, name="other")
+    builder.json["scenes"] = [{"nodes": [0]}, {"nodes": [1], "name": "second"}]
+    scene = load(tmp_path, builder)
+    assert [i.name for i in scene.instances] == ["place"]
+    assert codes(scene) == ["several-scenes"]
+    builder.json["scene"] = 1
+    scene = load(tmp_path, builder)
+    assert [(i.name, i.mesh) for i in scene.instances] == [("other", 0)]
+    assert len(scene.meshes) == 1
+    scene = load(tmp_path, builder, scene_index=0)
+    assert [i.name for i in scene.instances] == ["place"]
+    assert codes(scene) == []
+    with pytest.raises(InputError, match="no scene 2"):
+        load(tmp_path, builder, scene_index=2)
+
+
+def test_a_file_without_scenes_shows_all_its_roots(tmp_path):
+    builder = quad_builder()
+    builder.node(children=[0], translation=[1, 0, 0])
+    builder.json["scenes"] = []
+    scene = load(tmp_path, builder)
+    assert [(i.node, i.world_from_object[0, 3]) for i in scene.instances] == [(0, 1)]
+
+
+def test_lights_stand_and_shine_where_their_nodes_do(tmp_path):
+    builder = quad_builder()
+    lights = [
+        {"type": "point", "color": [1, 0.5, 0], "intensity": 8, "name": "bulb"},
+        {"type": "spot", "intensity": 2, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}},
+        {"type": "directional"},
+        {"type": "spot"},
+    ]
+    builder.json["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    half = math.sqrt(0.5)
+    for k in range(4):
+        place = {"extensions": {"KHR_lights_punctual": {"light": k}}, "translation": [k, 1, 2]}
+        # A quarter turn about x points -z down at -y; the scale must not change the direction's length.
+        builder.node(**place, rotation=[-half, 0, 0, half], scale=[2, 2, 5])
+    bulb, spot, sun, plain = load(tmp_path, builder).lights
+    assert [light.kind for light in (bulb, spot, sun, plain)] == ["point", "spot", "directional", "spot"]
+    assert bulb.intensity == (8, 4, 0)
+    assert bulb.position == (0, 1, 2)
+    assert (bulb.name, bulb.node) == ("bulb", 1)
+    assert (spot.inner_cone, spot.outer_cone) == (0.2, 0.4)
+    assert (plain.inner_cone, plain.outer_cone) == (0, math.pi / 4)
+    assert sun.intensity == (1, 1, 1)
+    for light in (spot, sun, plain):
+        np.testing.assert_allclose(light.direction, (0, -1, 0), atol=1e-15)
+
+
+def test_skinned_meshes_are_taken_as_they_are_bound(tmp_path):
+    builder = quad_builder()
+    builder.json["nodes"][0]["skin"] = 0
+    builder.json["skins"] = [{"joints": [0]}]
+    scene = load(tmp_path, builder)
+    assert [(w.code, w.object) for w in scene.warnings] == [("skinned", "place")]
+    np.testing.assert_array_equal(scene.meshes[0].position, QUAD)
+
+
+def test_extensions_that_nobody_needs_are_ignored_and_named(tmp_path):
+    builder = quad_builder()
+    builder.json["extensionsUsed"] = ["KHR_materials_clearcoat", "EXT_mesh_gpu_instancing", "ACME_x"]
+    builder.json["extensionsRequired"] = ["KHR_materials_clearcoat"]
+    scene = load(tmp_path, builder)
+    assert [(w.code, w.object) for w in scene.warnings] == [
+        ("extension-ignored", "EXT_mesh_gpu_instancing"),
+        ("extension-ignored", "ACME_x"),
+    ]
+
+
+def test_the_hash_covers_every_outside_file(tmp_path):
+    builder = quad_builder()
+    path = write(tmp_path / "a.glb", builder)
+    assert load_scene(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    png = bytes.fromhex("00")
+    (tmp_path / "b.bin").write_bytes(builder.blob)
+    (tmp_path / "unused.png").write_bytes(png)
+    builder.json["buffers"] = [{"byteLength": len(builder.blob), "uri": "b.bin"}]
+    builder.json["images"] = [{"uri": "unused.png"}]
+    path = write(tmp_path / "a.gltf", builder)
+    expected = hashlib.sha256(path.read_bytes() + builder.blob + png).hexdigest()
+    assert load_scene(path).sha256 == expected
+
+
+def test_the_source_document_is_kept_for_the_writer(tmp_path):
+    builder = quad_builder()
+    builder.json["extras"] = {"kept": [1, 2]}
+    scene = load(tmp_path, builder)
+    assert scene.source.json["extras"] == {"kept": [1, 2]}
+    assert scene.source.buffers == (builder.blob,)
+    assert scene.source.folder == tmp_path
+    assert scene.name == "room"
+
+
+def test_up_and_scale_are_checked_and_not_applied_to_gltf(tmp_path):
+    scene = load(tmp_path, quad_builder(), up="z", scale=3.0)
+    np.testing.assert_array_equal(scene.instances[0].world_from_object, np.eye(4))
+    assert codes(scene) == ["up-and-scale-ignored"]
+    for options in ({"up": "x"}, {"scale": 0.0}, {"scale": math.nan}):
+        with pytest.raises(SettingsError):
+            load(tmp_path, quad_builder(), **options)
+
+
+def test_every_known_suffix_has_an_importer():
+    assert importers.names() == [".glb", ".gltf", ".obj", ".off", ".ply", ".stl"]
