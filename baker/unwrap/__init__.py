@@ -1,1 +1,17 @@
-"""Lightmap uv: unwrap, pack, keep, check."""
+"""Lightmap uv: cut with xatlas, or kept from the input, then packed into pages and checked."""
+
+from baker.core.atlas import Atlas
+from baker.core.progress import Progress, silent
+from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
+
+
+def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = silent) -> Atlas:
+    """Lay out all instances in lightmap pages; see `baker.unwrap.unwrap.unwrap_scene`."""
+    # Imported here so that a worker process, and `baker --help`, start without it.
+    from baker.unwrap.unwrap import unwrap_scene as run
+
+    return run(scene, settings, progress)
+
+
+__all__ = ["unwrap_scene"]

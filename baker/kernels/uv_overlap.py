@@ -1,0 +1,127 @@
+"""Counts the samples of a uv layout that lie strictly inside more than one triangle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):  # type: ignore[no-untyped-def]
+    """Mark the samples each triangle covers and count those that were covered before.
+
+    Sample (r, c) lies at (c + 0.5, r + 0.5). A sample closer than `slack` to an edge does not count,
+    so that triangles sharing an edge, even one that was rounded, do not overlap.
+
+    Parameters
+    ----------
+    corner : (T, 3, 2) float64, in samples
+    group : (T,) int64
+        Grid and counter of each triangle.
+    base, stride, rows : (G,) int64
+        Where each group's grid starts in `mark`, its columns and its rows. Groups may share a grid.
+    slack : float, in samples
+    mark : (M,) uint8
+        In and out: 0 free, 1 covered once, 2 more than once.
+    covered, doubled : (G,) int64
+        Out: samples covered by the group's triangles, and those of them found covered already.
+    """
+    for t in range(len(corner)):
+        g = group[t]
+        ax, ay = corner[t, 0, 0], corner[t, 0, 1]
+        bx, by = corner[t, 1, 0], corner[t, 1, 1]
+        cx, cy = corner[t, 2, 0], corner[t, 2, 1]
+        turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if turn == 0.0:
+            continue
+        if turn < 0.0:
+            bx, by, cx, cy = cx, cy, bx, by
+        # Signed distance to an edge: n . (p - a), n pointing inwards.
+        l0 = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        l1 = np.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
+        l2 = np.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
+        if l0 == 0.0 or l1 == 0.0 or l2 == 0.0:
+            continue
+        r_low = max(0, int(np.floor(min(ay, by, cy) - 0.5)))
+        r_high = min(rows[g] - 1, int(np.ceil(max(ay, by, cy) - 0.5)))
+        c_low = max(0, int(np.floor(min(ax, bx, cx) - 0.5)))
+        c_high = min(stride[g] - 1, int(np.ceil(max(ax, bx, cx) - 0.5)))
+        for r in range(r_low, r_high + 1):
+            y = r + 0.5
+            row = base[g] + r * stride[g]
+            for c in range(c_low, c_high + 1):
+                x = c + 0.5
+                if (
+                    (bx - ax) * (y - ay) - (by - ay) * (x - ax) > slack * l0
+                    and (cx - bx) * (y - by) - (cy - by) * (x - bx) > slack * l1
+                    and (ax - cx) * (y - cy) - (ay - cy) * (x - cx) > slack * l2
+                ):
+                    covered[g] += 1
+                    if mark[row + c] == 0:
+                        mark[row + c] = 1
+                    else:
+                        mark[row + c] = 2
+                        doubled[g] += 1
+
+
+@njit(cache=True, nogil=True)
+def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
+    """Write chart + 1 into each free texel whose square a triangle enters.
+
+    Parameters
+    ----------
+    corner : (T, 3, 2) float64, in texels; texel (r, c) spans c to c + 1 and r to r + 1
+    chart : (T,) int32
+    owner : (H, W) int32
+        In and out: 0 where free.
+    """
+    height, width = owner.shape
+    # What only touches a texel's border does not enter it.
+    slack = 1e-4
+    for t in range(len(corner)):
+        y_low = min(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1])
+        y_high = max(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1])
+        for r in range(
+            max(0, int(np.floor(y_low + slack))), min(height - 1, int(np.ceil(y_high - slack)) - 1) + 1
+        ):
+            x_low, x_high = 1e30, -1e30
+            for k in range(3):
+                ax, ay = corner[t, k, 0], corner[t, k, 1]
+                m = k + 1 if k < 2 else 0
+                bx, by = corner[t, m, 0], corner[t, m, 1]
+                if r <= ay <= r + 1:
+                    x_low, x_high = min(x_low, ax), max(x_high, ax)
+                for line in (r, r + 1):
+                    if (ay < line) != (by < line):
+                        x = ax + (bx - ax) * (line - ay) / (by - ay)
+                        x_low, x_high = min(x_low, x), max(x_high, x)
+            c_low, c_high = (
+                max(0, int(np.floor(x_low + slack))),
+                min(width - 1, int(np.ceil(x_high - slack)) - 1),
+            )
+            for c in range(c_low, c_high + 1):
+                if owner[r, c] == 0:
+                    owner[r, c] = chart[t] + 1
+
+
+@njit(cache=True, nogil=True)
+def count_close(owner, gap):  # type: ignore[no-untyped-def]
+    """Count owned texels that have another owner's texel within `gap` rows and columns."""
+    height, width = owner.shape
+    count = 0
+    for r in range(height):
+        for c in range(width):
+            own = owner[r, c]
+            if own == 0:
+                continue
+            found = False
+            for y in range(max(0, r - gap), min(height, r + gap + 1)):
+                for x in range(max(0, c - gap), min(width, c + gap + 1)):
+                    if owner[y, x] != 0 and owner[y, x] != own:
+                        found = True
+                        break
+                if found:
+                    break
+            if found:
+                count += 1
+    return count

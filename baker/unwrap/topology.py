@@ -1,0 +1,85 @@
+"""Which vertices are one, which triangles hang together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
+    """Return the (V,) int32 number of each row's value, numbered by first occurrence.
+
+    Parameters
+    ----------
+    key : (V, K) float arrays
+        Rows are equal if all of them are equal, bit by bit but for -0 = 0.
+    """
+    columns = [column for array in key for column in (array + 0.0).T]
+    order = np.lexsort(columns[::-1])
+    new = np.zeros(len(order), bool)
+    for column in columns:
+        ordered = column[order]
+        new[1:] |= ordered[1:] != ordered[:-1]
+    label = np.zeros(len(order), np.int64)
+    label[order] = np.cumsum(new)
+    return number_by_first(label)
+
+
+def connected_vertices(triangle: NDArray[np.integer], n_vertices: int) -> NDArray[np.int32]:
+    """Return the (T,) int32 piece of each triangle: pieces share vertices; numbered by first triangle."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a = np.concatenate([triangle[:, 0], triangle[:, 1]])
+    b = np.concatenate([triangle[:, 1], triangle[:, 2]])
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n_vertices, n_vertices))
+    _, label = connected_components(graph, directed=False)
+    return number_by_first(label[triangle[:, 0]])
+
+
+def connected_faces(
+    triangle: NDArray[np.integer],
+    kind: NDArray[np.integer],
+    normal: NDArray[np.float64] | None = None,
+    min_dot: float = -1.0,
+) -> NDArray[np.int32]:
+    """Return the (T,) int32 piece of each triangle: triangles of one kind that share an edge.
+
+    Parameters
+    ----------
+    triangle : (T, 3) int
+    kind : (T,) int, at least 0
+    normal : (T, 3) float64, unit, or None
+        If given, neighbours hang together only if their normals' product is over `min_dot`.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(triangle)
+    if n == 0:
+        return np.zeros(0, np.int32)
+    wide = triangle.astype(np.int64)
+    ends = np.sort(np.stack([wide, np.roll(wide, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    key = (ends[:, 0] * (int(wide.max()) + 1) + ends[:, 1]) * (int(kind.max()) + 1) + np.repeat(
+        kind.astype(np.int64), 3
+    )
+    order = np.argsort(key, kind="stable")
+    same = key[order][1:] == key[order][:-1]
+    face = order // 3
+    a, b = face[:-1][same], face[1:][same]
+    if normal is not None:
+        smooth = np.einsum("ex,ex->e", normal[a], normal[b]) > min_dot
+        a, b = a[smooth], b[smooth]
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    return number_by_first(label)
+
+
+def number_by_first(label: NDArray[np.integer]) -> NDArray[np.int32]:
+    """Renumber labels from 0 in the order in which they first occur; negative ones become -1."""
+    known, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    order = order[known[order] >= 0]
+    rank = np.full(len(known), -1, np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    return np.asarray(rank[inverse], dtype=np.int32)
