@@ -27,6 +27,7 @@ def main() -> None:
     try:
         out = _reserve_stdout() if _asks_json(argv) else sys.stdout
         code = run(argv, out=out, stop=stop, notes=notes)
+        out.flush()
     except KeyboardInterrupt:
         code = INTERRUPTED
     _leave(code)
@@ -54,8 +55,8 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         if stop is not None:
             session.stop = stop
         return _dispatch(argv, session)
-    except BrokenPipeError:
-        # The reader (`| head`) has seen enough.
+    except SystemExit:
+        # typer's answer to a broken pipe: the reader (`| head`) has seen enough.
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -68,6 +69,9 @@ def _dispatch(argv: list[str], session: Any) -> int:
     from baker.cli.group import make_app
 
     code = make_app().main(args=argv, prog_name="baker", standalone_mode=False, obj=session)
+    if code == INTERRUPTED:
+        # typer made an exit code of it; the message and the JSON are still owed.
+        raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
 
 

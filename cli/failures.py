@@ -32,7 +32,7 @@ def explain(error: BaseException) -> BakerError | None:
     if isinstance(error, BakerError):
         return error
     if isinstance(error, KeyboardInterrupt):
-        return Cancelled("interrupted; nothing was written")
+        return Cancelled("interrupted")
     if isinstance(error, MemoryError):
         return ResourceError(
             "out of memory; try a smaller --resolution, a lower --density or fewer --threads"

@@ -93,7 +93,9 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
 def announce(notes: int | None, out: str) -> None:
     """Tell the parent which output folder is about to be written."""
     if notes is not None:
-        os.write(notes, os.path.abspath(out).encode("utf-8", "surrogateescape") + b"\0")  # noqa: PTH100
+        from baker.cli.leftovers import survey
+
+        os.write(notes, survey(out))
 
 
 def _settle_child(parent: int) -> None:
@@ -157,13 +159,14 @@ class _Watch:
         """Wait for the child and return the exit code of the command."""
         _, status = os.waitpid(self.child, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
+        if self.stopping or not os.WIFEXITED(status):
+            self._send(signal.SIGKILL)  # helpers that outlived it
+            self._tidy()
         if os.WIFEXITED(status):
             return os.WEXITSTATUS(status)
-        self._send(signal.SIGKILL)  # helpers that outlived it
-        self._tidy()
         number = os.WTERMSIG(status)
         if self.stopping:
-            return self._tell("cancelled", "interrupted; nothing was written", INTERRUPTED)
+            return self._tell("cancelled", "interrupted", INTERRUPTED)
         if number == signal.SIGKILL:
             why = "the work was killed from outside, most likely for want of memory"
         else:
@@ -174,13 +177,13 @@ class _Watch:
     def _tidy(self) -> None:
         os.set_blocking(self.notes, False)
         try:
-            named = os.read(self.notes, 1 << 16).split(b"\0")
+            lines = os.read(self.notes, 1 << 16).splitlines()
         except BlockingIOError:
             return
         from baker.cli.leftovers import remove_leftovers
 
-        for out in filter(None, named):
-            remove_leftovers(os.fsdecode(out), self.child)
+        for line in lines:
+            remove_leftovers(line)
 
     def _tell(self, kind: str, message: str, code: int) -> int:
         sys.stderr.write(f"baker: {message}\n")

@@ -1,0 +1,328 @@
+"""The command line: flags from the settings, config files, exit codes, JSON, progress, start-up."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+from baker.cli.app import run
+from baker.cli.progress import Reporter
+
+from baker.core.errors import Cancelled, InputError
+from baker.core.settings import BakeSettings
+
+MANIFEST = {
+    "version": 1,
+    "pages": [{"channel": "ao", "page": 0, "file": "ao_0.exr"}],
+    "statistics": {"ao": {"min": 0.0, "max": 1.0, "mean": 0.5}},
+    "timings": {"load": 0.25, "gather": 1.5},
+    "rays": {"gather": 1000},
+    "warnings": [{"code": "bad-triangles", "message": "2 triangles have no area", "object": "crate"}],
+    "settings": {},
+}
+
+
+class FakePipeline:
+    """Stands in for `baker.pipeline`: remembers how it was called, then answers or fails."""
+
+    def __init__(self):
+        self.calls = []
+        self.error = None
+
+    def bake(self, scene, *, out, settings, progress, force):
+        self.calls.append(SimpleNamespace(scene=scene, out=out, settings=settings, force=force))
+        progress("gather", 0.5, "23.1 Mrays/s")
+        if self.error is not None:
+            raise self.error
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "ao_0.exr").write_bytes(b"x" * 2048)
+        return SimpleNamespace(manifest=MANIFEST, out=out)
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    fake = FakePipeline()
+    monkeypatch.setitem(sys.modules, "baker.pipeline", fake)
+    return fake
+
+
+@pytest.fixture
+def command(tmp_path):
+    def call(*argv):
+        out = io.StringIO()
+        return run([str(word) for word in argv], out=out), out.getvalue()
+
+    return call
+
+
+def bake_words(tmp_path, *more):
+    return ("bake", "scene.glb", "-o", tmp_path / "out", *more)
+
+
+# A value other than the default for every setting; a setting missing here fails the test below.
+OTHER = {
+    "channels": ("ao", ("ao",)),
+    "resolution": ("256", 256),
+    "density": ("32.5", 32.5),
+    "max_pages": ("3", 3),
+    "padding": ("2", 2),
+    "uv": ("keep", "keep"),
+    "unwrapper": ("xatlas", "xatlas"),
+    "quality": ("high", "high"),
+    "samples": ("10", 10),
+    "light_samples": ("11", 11),
+    "ao_samples": ("12", 12),
+    "ao_distance": ("0.5", "0.5"),
+    "sky": ("1,2,3", "1,2,3"),
+    "sky_strength": ("2", 2.0),
+    "bounces": ("0", 0),
+    "denoise": (None, False),
+    "dtype": ("float", "float"),
+    "up": ("z", "z"),
+    "scale": ("0.01", 0.01),
+    "seed": ("7", 7),
+    "threads": ("1", 1),
+}
+
+
+def test_every_setting_has_a_flag_that_arrives(pipeline, command, tmp_path):
+    assert set(OTHER) == set(BakeSettings.model_fields)
+    words = []
+    for name, (text, _) in OTHER.items():
+        dashed = name.replace("_", "-")
+        words += [f"--no-{dashed}"] if text is None else [f"--{dashed}", text]
+    code, _ = command(*bake_words(tmp_path, *words, "-q"))
+    assert code == 0
+    settings = pipeline.calls[0].settings
+    assert {name: getattr(settings, name) for name in OTHER} == {
+        name: value for name, (_, value) in OTHER.items()
+    }
+
+
+def test_no_flags_means_the_defaults(pipeline, command, tmp_path):
+    assert command(*bake_words(tmp_path))[0] == 0
+    assert pipeline.calls[0].settings == BakeSettings()
+    assert pipeline.calls[0].force is False
+
+
+def test_ao_is_bake_with_one_channel(pipeline, command, tmp_path):
+    assert command("ao", "s.obj", "-o", tmp_path / "out", "--ao-distance", "2", "--force")[0] == 0
+    call = pipeline.calls[0]
+    assert call.settings == BakeSettings(channels=("ao",), ao_distance="2")
+    assert (call.force, str(call.scene)) == (True, "s.obj")
+
+
+@pytest.mark.parametrize("head", ["", "[bake]\n"])
+def test_command_line_wins_over_config(head, pipeline, command, tmp_path):
+    config = tmp_path / "bake.toml"
+    config.write_text(
+        head + 'resolution = 128\nao-distance = 0.25\nchannels = ["ao"]\ndenoise = false\nsky = [1, 0.5, 0]\n'
+    )
+    code, _ = command(*bake_words(tmp_path, "--config", config, "--resolution", "64", "--denoise"))
+    assert code == 0
+    expected = BakeSettings(resolution=64, ao_distance="0.25", channels=("ao",), denoise=True, sky="1,0.5,0")
+    assert pipeline.calls[0].settings == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("resolutoin = 128", ["resolutoin", "did you mean 'resolution'"]),
+        ("resolution = 128\nseed = = 2", ["not valid TOML", "line 2"]),
+        ("resolution = ", ["not valid TOML"]),
+        ("resolution = 3", ["resolution", "16"]),
+        ("[bake]\nseed = 1\n[other]\nx = 1", ["other", "[bake]"]),
+        ("bake = 3", ["table"]),
+        ("ao-distance = 1\nao_distance = 2", ["twice"]),
+    ],
+)
+def test_bad_config_is_one_sentence_naming_the_file(text, words, pipeline, command, tmp_path, capsys):
+    config = tmp_path / "bake.toml"
+    config.write_text(text)
+    code, out = command(*bake_words(tmp_path, "--config", config, "--json"))
+    assert code == 2
+    assert pipeline.calls == []
+    error = json.loads(out)["error"]
+    assert error["file"] == str(config)
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert all(word in line for word in words), line
+
+
+def test_missing_config_is_wrong_use(command, tmp_path, capsys):
+    assert command(*bake_words(tmp_path, "--config", tmp_path / "none.toml"))[0] == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
+WRONG = [
+    ((), "Missing argument"),
+    (("a.glb",), "Missing option"),
+    (("a.glb", "-o", "x", "--resolutio", "3"), "--resolution"),
+    (("a.glb", "-o", "x", "--resolution", "big"), "resolution"),
+    (("a.glb", "-o", "x", "--resolution", "3"), "16"),
+    (("a.glb", "-o", "x", "--sky", "1,2"), "sky"),
+    (("a.glb", "-o", "x", "--ao-distance", "-1"), "ao_distance"),
+    (("a.glb", "-o", "x", "--channels", ","), "channels"),
+    (("a.glb", "b.glb", "-o", "x"), "b.glb"),
+]
+
+
+@pytest.mark.parametrize(("words", "needle"), WRONG)
+def test_wrong_use_is_exit_2_with_one_sentence(words, needle, pipeline, command, capsys):
+    assert command("bake", *words) == (2, "")
+    plain = capsys.readouterr().err
+    assert plain.startswith("baker: ")
+    assert plain.count("\n") == 1
+    assert needle in plain
+    code, out = command("bake", *words, "--json")
+    assert code == 2
+    assert set(json.loads(out)["error"]) == {"kind", "message", "file", "object"}
+    assert json.loads(out)["error"]["kind"] == "settings"
+    assert pipeline.calls == []
+
+
+def test_unknown_command_names_the_nearest(command, capsys):
+    assert command("bkae")[0] == 2
+    assert "'bake'" in capsys.readouterr().err
+
+
+FAILURES = [
+    (InputError("the file ends early", file="a.glb", object="mesh 3"), 3, "input"),
+    (MemoryError(), 4, "resource"),
+    (OSError(errno.ENOSPC, "No space left on device", "out/x.exr"), 4, "resource"),
+    (PermissionError(errno.EACCES, "Permission denied", "out"), 4, "resource"),
+    (Cancelled("the work was cancelled"), 130, "cancelled"),
+    (KeyboardInterrupt(), 130, "cancelled"),
+    (ZeroDivisionError("float division\nby zero"), 4, "internal"),
+]
+
+
+@pytest.mark.parametrize(("error", "code", "kind"), FAILURES, ids=lambda v: type(v).__name__)
+def test_failures_have_their_exit_code_and_no_traceback(
+    error, code, kind, pipeline, command, tmp_path, capsys
+):
+    pipeline.error = error
+    assert command(*bake_words(tmp_path)) == (code, "")
+    err = capsys.readouterr().err
+    assert err.startswith("baker: ")
+    assert err.count("\n") == 1
+    got, out = command(*bake_words(tmp_path, "--json", "-vv"))
+    assert got == code
+    body = json.loads(out)["error"]
+    assert body["kind"] == kind
+    assert body["file"] == getattr(error, "file", getattr(error, "filename", None))
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_json_is_one_object_with_the_promised_keys(pipeline, command, tmp_path, capsys):
+    code, out = command(*bake_words(tmp_path, "--json"))
+    assert code == 0
+    value = json.loads(out)
+    keys = ("pages", "statistics", "timings", "rays", "warnings")
+    assert value == {"out": str(tmp_path / "out"), **{key: MANIFEST[key] for key in keys}}
+    assert "ao_0.exr" in capsys.readouterr().err
+
+
+def test_summary_tells_files_seconds_and_warnings(pipeline, command, tmp_path):
+    _, out = command(*bake_words(tmp_path))
+    for part in ("ao_0.exr", "2.0 kB", "1.75 s", "gather 1.50", "crate: 2 triangles have no area"):
+        assert part in out
+
+
+def test_quiet_says_nothing(pipeline, command, tmp_path, capsys):
+    assert command(*bake_words(tmp_path, "-q")) == (0, "")
+    assert capsys.readouterr().err == ""
+
+
+def test_inspect_prints_text_and_json(monkeypatch, command):
+    found = {
+        "kind": "scene",
+        "triangles": 32,
+        "nodes": [{"name": f"n{k}", "mesh": k} for k in range(25)],
+        "lights": [],
+    }
+    monkeypatch.setitem(sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path: found))
+    code, out = command("inspect", "a.glb", "--threads", "1", "--seed", "2")
+    assert code == 0
+    assert "triangles: 32\n" in out
+    assert "- name n19, mesh 19\n" in out
+    assert "... and 5 more" in out
+    assert "lights: none" in out
+    assert "name n24" in command("inspect", "a.glb", "-v")[1]
+    assert json.loads(command("inspect", "a.glb", "--json")[1]) == found
+    assert command("inspect", "a.glb", "-q") == (0, "")
+
+
+def test_version(command):
+    assert command("--version")[1].startswith("baker ")
+    assert set(json.loads(command("--version", "--json")[1])) == {"version"}
+
+
+def test_plain_progress_is_a_line_now_and_then():
+    clock = iter(range(100))
+    stream = io.StringIO()
+    reporter = Reporter(quiet=False, stopped=lambda: False, stream=stream, clock=lambda: float(next(clock)))
+    with reporter:
+        answers = [reporter("gather", k / 10, "23.1 Mrays/s") for k in range(11)]
+    assert not any(answers)
+    lines = stream.getvalue().splitlines()
+    # One second passes between two reports and three between two lines.
+    assert lines[0] == "gather:  20 %  23.1 Mrays/s  8 s left"
+    assert len(lines) == 3
+
+
+def test_terminal_gets_a_bar_with_stage_rate_and_time_left():
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    stream = Terminal()
+    with Reporter(quiet=False, stopped=lambda: False, stream=stream) as reporter:
+        reporter("gather", 0.25, "23.1 Mrays/s")
+        reporter("solve", 0.5, "")
+        time.sleep(0.15)
+    assert "gather" in stream.getvalue() or "solve" in stream.getvalue()
+    assert "50%" in stream.getvalue()
+
+
+def test_progress_answers_the_stop_flag():
+    with Reporter(quiet=True, stopped=lambda: True) as reporter:
+        assert reporter("gather", 0.1)
+
+
+def test_help_is_quick_and_imports_nothing_heavy():
+    # The fastest of three: other work on the machine may slow any one of them.
+    seconds = []
+    for _ in range(3):
+        began = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-m", "baker.cli", "--help"], capture_output=True, text=True, check=True
+        )
+        seconds.append(time.perf_counter() - began)
+    assert min(seconds) < 0.5
+    assert all(name in done.stdout for name in ("bake", "ao", "inspect"))
+    code = "import sys; from baker.cli.app import run; run(['--help']); print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"numpy", "numba", "pydantic", "scipy", "baker.core.settings"} & set(loaded)
+
+
+def test_json_stdout_is_kept_clean_of_what_libraries_print():
+    code = (
+        "import os, sys, types\n"
+        "def look(path):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
+        "sys.modules['baker.io.inspect'] = types.SimpleNamespace(inspect_path=look)\n"
+        "from baker.cli.app import main\nmain()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "inspect", "a", "--json"], capture_output=True, check=True
+    )
+    assert json.loads(done.stdout) == {"kind": "x"}
+    assert b"library noise" in done.stderr
