@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import typer
 
-if TYPE_CHECKING:
-    from pydantic.fields import FieldInfo
-
 KEYWORD = inspect.Parameter.KEYWORD_ONLY
+
+# `field` below is a field of the settings model: its class is named in `core.settings` alone.
 
 
 def flag(name: str, kind: Any, option: Any, default: Any = None) -> inspect.Parameter:
@@ -66,7 +65,7 @@ def setting_flags(
     ]
 
 
-def range_of(field: FieldInfo) -> str:
+def range_of(field: Any) -> str:
     """Return a setting's range in words, empty if it has none."""
     bound = {}
     for item in field.metadata:
@@ -77,7 +76,7 @@ def range_of(field: FieldInfo) -> str:
     return ", ".join(f"{words[key]} {value}" for key, value in bound.items())
 
 
-def default_of(field: FieldInfo) -> str:
+def default_of(field: Any) -> str:
     """Return a setting's default as one would type it, empty if it has none of its own."""
     value = field.default
     if value is None:
@@ -89,7 +88,7 @@ def default_of(field: FieldInfo) -> str:
     return str(value)
 
 
-def metavar_of(field: FieldInfo) -> str:
+def metavar_of(field: Any) -> str:
     """Return what stands for a setting's value in the help: `N`, `X`, `a|b` or `TEXT`."""
     kinds = [kind for kind in get_args(field.annotation) or (field.annotation,) if kind is not type(None)]
     if get_origin(field.annotation) is Literal:
@@ -99,7 +98,7 @@ def metavar_of(field: FieldInfo) -> str:
     return {int: "N", float: "X"}.get(kinds[0], "TEXT")
 
 
-def is_switch(field: FieldInfo) -> bool:
+def is_switch(field: Any) -> bool:
     """Tell whether a setting is on or off."""
     return field.annotation is bool
 
@@ -124,7 +123,7 @@ def build(name: str, summary: str, work: Callable[..., None], flags: list[inspec
     return typer.main.get_command(app)
 
 
-def _setting_flag(name: str, field: FieldInfo) -> inspect.Parameter:
+def _setting_flag(name: str, field: Any) -> inspect.Parameter:
     dashed = name.replace("_", "-")
     remarks = [range_of(field), f"default {default_of(field)}" if default_of(field) else ""]
     remark = "; ".join(filter(None, remarks))

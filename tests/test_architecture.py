@@ -1,0 +1,180 @@
+"""What the source has to look like: layers, sizes, one home for each library, no leaks, types, format."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("baker", "cli")
+# Libraries that are slow to import or that a file should hide behind an interface.
+HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic")
+NOT_SOURCE = {".git", ".venv", "build", "dist", ".mypy_cache", ".ruff_cache", ".pytest_cache", "__pycache__"}
+
+
+def sources(*folders):
+    for folder in folders:
+        yield from sorted((ROOT / folder).rglob("*.py"))
+
+
+def tree_of(path):
+    return ast.parse(path.read_text("utf-8"), str(path))
+
+
+def name_of(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def imported(path):
+    """Return the top-level names of everything that a file imports, wherever in it."""
+    names = set()
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module.split(".")[0])
+    return names
+
+
+def run(*command, cwd=ROOT, **env):
+    done = subprocess.run(command, cwd=cwd, env={**os.environ, **env}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed_layout(tmp_path_factory):
+    """A copy of the packages as they are installed: cli/ lies in baker/ there."""
+    folder = tmp_path_factory.mktemp("layout")
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "baker", folder / "baker", ignore=ignore)
+    shutil.copytree(ROOT / "cli", folder / "baker" / "cli", ignore=ignore)
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    return folder
+
+
+def test_imports_point_down(installed_layout):
+    tool = Path(sys.executable).with_name("lint-imports")
+    run(str(tool), "--no-cache", cwd=installed_layout, PYTHONPATH=str(installed_layout))
+
+
+def test_types(installed_layout):
+    # The cache stays in the checkout, so that only the first run takes long.
+    cache = str(ROOT / ".mypy_cache" / "layout")
+    run(sys.executable, "-m", "mypy", "-p", "baker", "--cache-dir", cache, cwd=installed_layout)
+
+
+def test_lint():
+    run(sys.executable, "-m", "ruff", "check", ".")
+
+
+def test_format():
+    run(sys.executable, "-m", "ruff", "format", "--check", ".")
+
+
+def test_no_file_is_long():
+    found = {
+        name_of(path): len(path.read_text("utf-8").splitlines())
+        for path in sources(*PACKAGES, "tests", "assets")
+    }
+    found |= {
+        name_of(path): len(path.read_text("utf-8").splitlines()) for path in sources("benchmarks", "docs")
+    }
+    assert {name: lines for name, lines in found.items() if lines > 500} == {}
+    assert len(found) > 60
+
+
+@pytest.mark.parametrize("library", HEAVY)
+def test_a_heavy_library_has_one_home(library):
+    homes = [name_of(path) for path in sources(*PACKAGES) if library in imported(path)]
+    assert len(homes) <= 1, homes
+
+
+def test_pillow_has_one_reader_and_one_writer():
+    homes = [name_of(path) for path in sources(*PACKAGES) if "PIL" in imported(path)]
+    assert set(homes) <= {"baker/io/images.py", "baker/io/png.py"}
+
+
+def test_numba_lives_low():
+    homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
+    assert homes <= {"kernels", "lights", "trace"}
+
+
+def test_printing_is_for_the_command_line():
+    found = []
+    for path in sources("baker"):
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
+                found.append(f"{name_of(path)}:{node.lineno}")
+    assert found == []
+
+
+def test_uninitialised_arrays_are_for_kernels():
+    found = []
+    for path in sources(*PACKAGES):
+        if path.parent.name == "kernels":
+            continue
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.Attribute) and node.attr in {"empty", "empty_like"}:
+                found.append(f"{name_of(path)}:{node.lineno}")
+    assert found == []
+
+
+def test_no_variable_of_the_environment_is_read():
+    # Handing the whole environment on to a helper process is fine; looking into it is not.
+    found = []
+    for path in sources(*PACKAGES):
+        for node in ast.walk(tree_of(path)):
+            looked = node.value if isinstance(node, ast.Subscript | ast.Attribute) else None
+            name = getattr(looked, "attr", None)
+            if name == "environ" or getattr(node, "attr", None) in {"getenv", "putenv"}:
+                found.append(f"{name_of(path)}:{node.lineno}")
+    assert found == []
+
+
+def is_registration(decorator):
+    called = decorator.func if isinstance(decorator, ast.Call) else None
+    return isinstance(called, ast.Attribute) and called.attr == "register"
+
+
+def test_a_plugin_file_registers_one_thing():
+    count = {}
+    for path in sources("baker"):
+        plugins = [
+            node.name
+            for node in ast.walk(tree_of(path))
+            if isinstance(node, ast.ClassDef | ast.FunctionDef)
+            and any(map(is_registration, node.decorator_list))
+        ]
+        # One importer may answer to several file suffixes: names are not counted, plugins are.
+        if plugins:
+            count[name_of(path)] = plugins
+    assert count
+    assert {name: plugins for name, plugins in count.items() if len(plugins) > 1} == {}
+
+
+def test_no_path_of_one_machine():
+    # Written in two parts, so that this line does not find itself.
+    leak = re.compile(r"(?:^|[^\w.\-/])/(?:wo" + r"rk|ro" + r"ot|ho" + r"me|Us" + r"ers|tm" + r"p)/\w")
+    found = []
+    for path in sorted(ROOT.rglob("*")):
+        relative = path.relative_to(ROOT)
+        if not path.is_file() or NOT_SOURCE & set(relative.parts) or relative.parts[0].startswith("out"):
+            continue
+        if path.suffix in {".py", ".md", ".toml", ".yml", ".yaml", ".txt", ".json"} or path.name == "run":
+            for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+                if leak.search(line):
+                    found.append(f"{relative}:{number}")
+    assert found == []
+
+
+def test_settings_page_is_current():
+    page = run(sys.executable, str(ROOT / "docs" / "make_settings_page.py"), "--print")
+    assert (ROOT / "docs" / "SETTINGS.md").read_text("utf-8") == page
