@@ -81,6 +81,9 @@ def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
         found = load_stl(stream)
     else:
         found = load_off(stream)
+    if found.get("geometry") == {} and b"facet" not in data:
+        # A binary file that is cut off is taken for text without a single solid.
+        raise ValueError("it is neither text nor as long as its header says; it may be cut off")
     # A text STL with several solids comes as a dictionary of them.
     return list(found["geometry"].values()) if "geometry" in found else [found]
 

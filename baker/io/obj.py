@@ -7,6 +7,7 @@ last image row; it is turned over here, so that v = 0 is the first row as everyw
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -56,12 +57,11 @@ def import_obj(source: SceneFile) -> Scene:
         normal=to_world(np.array(attributes.normals, np.float64).reshape(-1, 3), source.up, 1.0),
         texcoord=np.array(attributes.texcoords, np.float64).reshape(-1, 2),
         colour=_colours(attributes, len(position)),
-        file=file,
     )
     groups: list[tuple[str, list[PrimitiveArrays]]] = []
     for number, shape in enumerate(reader.GetShapes()):
         name = shape.name or f"shape_{number}"
-        groups.append((name, _primitives(shape.mesh, name, corners, len(materials))))
+        groups.append((name, _primitives(shape.mesh, corners, len(materials))))
     if any(p.material == len(materials) for _, primitives in groups for p in primitives):
         if materials:
             message = f"faces without a known material are grey; MTL names {len(materials)}"
@@ -103,10 +103,26 @@ def _read_libraries(
 
 
 def _parse(text: str, materials: list[Material], file: str) -> Any:
+    """Return the parser with all faces cut to triangles and every index known to be in range."""
+    # Ear clipping reads vertices without a check and crashes on a wrong index: look at the faces first.
+    reader = _run_parser(text, materials, file, triangulate=False)
+    attributes = reader.GetAttrib()
+    counts = tuple(
+        len(v) // k for v, k in ((attributes.vertices, 3), (attributes.normals, 3), (attributes.texcoords, 2))
+    )
+    polygons = False
+    for number, shape in enumerate(reader.GetShapes()):
+        _check_indices(shape.mesh, counts, file, shape.name or f"shape_{number}")
+        corners = np.array(shape.mesh.num_face_vertices, np.int64)
+        polygons |= bool((corners != 3).any())
+    return _run_parser(text, materials, file, triangulate=True) if polygons else reader
+
+
+def _run_parser(text: str, materials: list[Material], file: str, *, triangulate: bool) -> Any:
     import tinyobjloader
 
     config = tinyobjloader.ObjReaderConfig()
-    config.triangulate = True
+    config.triangulate = triangulate
     reader = tinyobjloader.ObjReader()
     # The binding does not show `Ke`: our own reader takes the values, and this one only needs the names.
     names = "".join(f"newmtl {material.name}\n" for material in materials)
@@ -114,6 +130,21 @@ def _parse(text: str, materials: list[Material], file: str) -> Any:
         why = " ".join(reader.Error().split()).rstrip(".") or "it is not an OBJ file"
         raise InputError(f"the file cannot be parsed: {why[:200]}", file=file)
     return reader
+
+
+def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) -> None:
+    # The numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13), so lists it is.
+    kinds = (
+        (mesh.vertex_indices(), "vertex"),
+        (mesh.normal_indices(), "normal"),
+        (mesh.texcoord_indices(), "texture vertex"),
+    )
+    for (index, what), count in zip(kinds, counts, strict=True):
+        if index and max(index) >= count:
+            message = f"a face names {what} {max(index) + 1}, but the file has {count}"
+            raise InputError(message, file=file, object=shape)
+    if kinds[0][0] and min(kinds[0][0]) < 0:
+        raise InputError("a face has an index of zero or less", file=file, object=shape)
 
 
 def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -129,10 +160,9 @@ def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float
 
 def _is_number(word: bytes) -> bool:
     try:
-        float(word)
+        return math.isfinite(float(word))
     except ValueError:
         return False
-    return True
 
 
 def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
@@ -153,32 +183,19 @@ class _Corners:
         normal: NDArray[np.float32],
         texcoord: NDArray[np.float64],
         colour: NDArray[np.float32] | None,
-        file: str,
     ) -> None:
         self.position = position
         self.normal = normal
         self.texcoord = (texcoord * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
         self.colour = colour
-        self.file = file
-
-    def check(self, index: NDArray[np.int64], count: int, what: str, shape: str) -> None:
-        if len(index) and index.max() >= count:
-            message = f"a face names {what} {index.max() + 1}, but the file has {count}"
-            raise InputError(message, file=self.file, object=shape)
 
 
-def _primitives(mesh: Any, name: str, corners: _Corners, grey: int) -> list[PrimitiveArrays]:
+def _primitives(mesh: Any, corners: _Corners, grey: int) -> list[PrimitiveArrays]:
     """Split a shape by material and give each part its own vertices."""
-    # The numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13), so lists it is.
     vertex, normal, texcoord = (
         np.array(values, np.int64)
         for values in (mesh.vertex_indices(), mesh.normal_indices(), mesh.texcoord_indices())
     )
-    corners.check(vertex, len(corners.position), "vertex", name)
-    corners.check(normal, len(corners.normal), "normal", name)
-    corners.check(texcoord, len(corners.texcoord), "texture vertex", name)
-    if len(vertex) and vertex.min() < 0:
-        raise InputError("a face has an index of zero or less", file=corners.file, object=name)
     n = len(vertex) // 3
     material = np.array(mesh.material_ids, np.int64)[:n]
     material = np.where((material < 0) | (material >= grey), grey, material)
