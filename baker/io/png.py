@@ -36,7 +36,8 @@ def encode_palette_png(
     """
     from PIL import Image, PngImagePlugin
 
-    palette = np.zeros((max(colours) + 1, 3), np.uint8)
+    # All 256 places, so that a texel takes eight bits and a reader of raw bytes finds the number itself.
+    palette = np.zeros((256, 3), np.uint8)
     for number, colour in colours.items():
         palette[number] = colour
     image = Image.fromarray(index)
@@ -45,8 +46,7 @@ def encode_palette_png(
     for key, value in text.items():
         info.add_text(key, value)
     stream = io.BytesIO()
-    # Eight bits a texel, so that a reader of raw bytes finds the number itself.
-    image.save(stream, "PNG", pnginfo=info, bits=8)
+    image.save(stream, "PNG", pnginfo=info)
     return stream.getvalue()
 
 

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gltf_builder import write
+from io_scenes import quad_result, rich_builder
+
+from baker.core.errors import InputError
+from baker.io.inspect import inspect_path
+from baker.io.output import write_bake
+
+
+def test_a_scene_is_counted(tmp_path: Path) -> None:
+    found = inspect_path(write(tmp_path / "rich.glb", rich_builder()))
+    json.dumps(found, allow_nan=False)
+    assert found["kind"] == "scene"
+    assert found["triangles"] == 4 + 4 + 2
+    assert [m["instances"] for m in found["meshes"]] == [2, 1]
+    assert [i["node"] for i in found["instances"]] == [0, 1, 5]
+    # Squares at x 0 to 1 and 3 to 4, z 0 and 1; one more at y 3 to 4.
+    assert (found["box"]["min"], found["box"]["max"]) == ([0, 0, 0], [4, 4, 1])
+    assert found["box"]["diagonal"] == pytest.approx(np.sqrt(33))
+
+
+def test_a_bake_is_summed_up_and_its_files_compared(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    write_bake(quad_result(tmp_path / "in"), out)
+    for path in (out, out / "bake.json"):
+        found = inspect_path(path)
+        json.dumps(found, allow_nan=False)
+        assert found["kind"] == "bake"
+        assert found["whole"]
+        assert found["texels"] == 123
+        assert found["seconds"] == pytest.approx(0.6)
+        assert {entry["state"] for entry in found["files"]} == {"as baked"}
+    (out / "ao_0.exr").unlink()
+    (out / "scene.glb").write_bytes(b"other")
+    found = inspect_path(out)
+    assert not found["whole"]
+    states = {entry["file"]: entry["state"] for entry in found["files"]}
+    assert states["ao_0.exr"] == "missing"
+    assert states["scene.glb"] == "changed"
+    assert states["irradiance_0.exr"] == "as baked"
+
+
+def test_an_image_is_measured(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in")
+    write_bake(result, tmp_path / "out")
+    found = inspect_path(tmp_path / "out" / "irradiance_0.exr")
+    json.dumps(found, allow_nan=False)
+    assert (found["kind"], found["width"], found["height"], found["type"]) == ("image", 16, 16, "half")
+    assert [c["channel"] for c in found["channels"]] == ["R", "G", "B"]
+    stored = result.lightmaps["irradiance"].value[0].astype(np.float16).astype(np.float64)
+    for index, channel in enumerate(found["channels"]):
+        assert channel["min"] == stored[:, :, index].min()
+        assert channel["max"] == stored[:, :, index].max()
+        assert channel["mean"] == pytest.approx(stored[:, :, index].mean(), rel=1e-12)
+        assert channel["not_finite"] == 0
+    assert found["header"]["unit"] == "lx"
+
+
+def test_what_is_nothing_of_that_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        inspect_path(tmp_path / "absent")
+    with pytest.raises(InputError, match="holds no bake"):
+        inspect_path(tmp_path)
