@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
@@ -101,6 +102,7 @@ def _instances(
     default = len(materials)
     built: dict[int, int | None] = {}
     meshes: list[Mesh] = []
+    extents: list[NDArray[np.float64]] = []
     instances: list[Instance] = []
     for node in placed:
         if "mesh" not in node.json:
@@ -118,10 +120,12 @@ def _instances(
                     SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
                 )
             built[number] = None if mesh is None else len(meshes)
-            meshes += [] if mesh is None else [mesh]
+            if mesh is not None:
+                meshes.append(mesh)
+                extents.append(np.abs(mesh.position).max(axis=0).astype(np.float64))
         at = built[number]
         label = node.json.string("name", name)
-        if at is None or not _stands(node, meshes[at], label, warnings):
+        if at is None or not _stands(node, extents[at], label, warnings):
             continue
         if "skin" in node.json:
             message = "the mesh is skinned; its bind pose is baked, placed by its node"
@@ -130,15 +134,15 @@ def _instances(
     return _drop_unused(meshes, instances)
 
 
-def _stands(node: Placed, mesh: Mesh, label: str, warnings: list[SceneWarning]) -> bool:
-    """Tell whether the instance has an extent that can be baked."""
+def _stands(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
+    """Tell whether an instance can be baked; `extent` is its mesh's largest coordinate along each axis."""
     stretch = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
     if not stretch[2] > _FLATTEST * stretch[0]:
         message = "the node's scale is zero along an axis; the instance is left out"
         warnings.append(SceneWarning("flat-instance", message, label))
         return False
-    low, high = mesh.position.min(axis=0).astype(np.float64), mesh.position.max(axis=0).astype(np.float64)
-    reach = np.abs(node.matrix[:3, :3]) @ np.maximum(np.abs(low), np.abs(high)) + np.abs(node.matrix[:3, 3])
+    with np.errstate(over="ignore"):
+        reach = np.abs(node.matrix[:3, :3]) @ extent + np.abs(node.matrix[:3, 3])
     if not (reach <= LARGEST_COORDINATE).all():
         node.json.fail(f"the node places its mesh further than {LARGEST_COORDINATE:g} m away")
     return True
