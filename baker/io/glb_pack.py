@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.errors import ResourceError
+
 Json = dict[str, Any]
 
 ARRAY_BUFFER = 34962
@@ -112,7 +114,13 @@ class Packer:
         return self._add(data, accessor, {"target": ELEMENT_ARRAY_BUFFER})
 
     def glb(self) -> bytes:
-        """Return the whole file; the packer is not to be used afterwards."""
+        """Return the whole file; the packer is not to be used afterwards.
+
+        Raises
+        ------
+        ResourceError
+            If it is too large for the format.
+        """
         _tidy(self._accessors, self._free_accessors, {"componentType": 5126, "count": 1, "type": "SCALAR"})
         _tidy(self._views, self._free_views, {"buffer": 0, "byteOffset": 0, "byteLength": 4})
         for key, items in (("accessors", self._accessors), ("bufferViews", self._views)):
@@ -132,7 +140,12 @@ class Packer:
         parts = [struct.pack("<II", len(text), _JSON_CHUNK), text]
         if binary:
             parts += [struct.pack("<II", len(binary), _BIN_CHUNK), binary]
-        return struct.pack("<III", 0x46546C67, 2, 12 + sum(map(len, parts))) + b"".join(parts)
+        total = 12 + sum(map(len, parts))
+        if total >= 2**32:
+            raise ResourceError(
+                f"the scene takes {total / 2**30:.1f} GiB, but GLB files end at 4; split the scene"
+            )
+        return struct.pack("<III", 0x46546C67, 2, total) + b"".join(parts)
 
     def _add(self, data: bytes, accessor: Json, keys: Json) -> int:
         """Add an accessor with a view of its own, or return an equal one added before."""

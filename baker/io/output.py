@@ -144,18 +144,21 @@ def _write_page(
         raise ResourceError("the EXR encoding is missing from this installation; install baker again")
     name = f"{lightmap.channel}_{page}{encoding.suffix}"
     value = lightmap.value[page]
+    quantity = _QUANTITY.get(lightmap.channel, lightmap.channel)
+    colour_space = "linear Rec.709, D65" if value.shape[2] == 3 else "none"
     header = {
-        "quantity": _QUANTITY.get(lightmap.channel, lightmap.channel),
+        "quantity": quantity,
         "unit": lightmap.unit,
-        "colourSpace": "linear Rec.709, D65" if value.shape[2] == 3 else "none",
+        "colourSpace": colour_space,
         "software": _signature(),
     }
     count = encoding.encode(folder / name, value, half=result.settings.dtype == "half", header=header)
     with (folder / name).open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     height, width = value.shape[:2]
-    entry = {"channel": lightmap.channel, "page": page, "file": name, "sha256": digest}
-    return {**entry, "width": width, "height": height, "unit": lightmap.unit}, count
+    entry: dict[str, Any] = {"channel": lightmap.channel, "page": page, "file": name, "sha256": digest}
+    entry |= {"width": width, "height": height, "unit": lightmap.unit}
+    return {**entry, "quantity": quantity, "colour_space": colour_space}, count
 
 
 def _write_data(folder: Path, name: str, data: bytes) -> dict[str, Any]:

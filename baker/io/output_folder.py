@@ -45,9 +45,8 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     parent = next(path for path in folder.parents if path.exists())
     if not parent.is_dir():
         raise SettingsError(f"'{parent}' is a file; the output cannot lie in it", file=str(out))
-    if not folder.exists() or not _cannot_move(folder):
-        _check_writable(parent, out)
     if not folder.exists():
+        _check_writable(parent, out)
         return
     try:
         _check_writable(folder, out)
@@ -212,8 +211,14 @@ def remove_leftovers(out: Path, process: int) -> None:
 
 
 def _cannot_move(folder: Path) -> bool:
-    """Say whether a folder must stay where it is: mounted, or the one we stand in."""
-    return os.path.ismount(folder) or Path.cwd().is_relative_to(folder)
+    """Say whether a folder must stay where it is: mounted, in a locked parent, or the one we stand in."""
+    if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
+        return True
+    try:
+        return Path.cwd().is_relative_to(folder)
+    except OSError:
+        # The current folder was removed under our feet.
+        return False
 
 
 def _check_writable(folder: Path, out: Path) -> None:

@@ -311,3 +311,16 @@ def test_the_output_is_a_scene_again_with_the_same_uv(tmp_path: Path) -> None:
         uv = again.meshes[instance.mesh].texcoord[1]
         assert uv is not None
         assert {row.tobytes() for row in uv} == {row.tobytes() for row in layout.uv}
+
+
+def test_compressed_copies_beside_plain_data_go(tmp_path: Path) -> None:
+    builder, path = plain(tmp_path)
+    builder.json["extensionsUsed"] = ["KHR_draco_mesh_compression"]
+    draco = {"bufferView": builder.view(b"draco..."), "attributes": {"POSITION": 0}}
+    primitive = builder.json["meshes"][0]["primitives"][0]
+    primitive["extensions"] = {"KHR_draco_mesh_compression": draco}
+    scene = load_scene(write(path, builder))
+    after = Glb(make_glb(scene, make_atlas(split_layout(scene, 0))).data)
+    assert "extensionsUsed" not in after.json
+    assert "extensions" not in after.json["meshes"][0]["primitives"][0]
+    assert after.corners(after.json["meshes"][0]["primitives"][0], "POSITION").shape == (2, 3, 3)

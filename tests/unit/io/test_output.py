@@ -296,3 +296,19 @@ def test_what_a_killed_process_left_is_cleaned_up(
     assert tree(out) == before
     assert names(tmp_path) == ["in", "out"]
     assert names(out) == NAMES
+
+
+def test_a_place_that_cannot_be_written_is_found_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked = tmp_path / "locked"
+    out = locked / "out"
+    out.mkdir(parents=True)
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != locked and access(path, mode))
+    with pytest.raises(ResourceError, match="nothing can be written to") as caught:
+        check_out(locked / "new" / "out")
+    assert caught.value.exit_code == 4
+    # The folder itself may be written to, though it cannot be renamed.
+    write_bake(quad_result(tmp_path / "in"), out)
+    assert names(out) == NAMES
