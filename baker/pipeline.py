@@ -159,7 +159,7 @@ def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) 
         )
     with record.stage("ray tree"):
         rays = RayScene(geometry.position, geometry.triangle, threads=threads)
-        emitters = build_emitters(geometry, shading, shading.emission)
+        emitters = build_emitters(geometry, shading)
         table = build_hit_table(geometry, texels, emitters)
     with record.stage("buried texels"):
         mask, cast = find_buried(

@@ -14,6 +14,10 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.emitters import (
+    NORMAL,
+    RADIANCE,
+    TEXTURED,
+    TWO_SIDED,
     bounding_sphere,
     cluster_chances,
     emitted_radiance,
@@ -21,15 +25,14 @@ from baker.kernels.emitters import (
     sample_emitter,
 )
 from baker.kernels.hits import front_facing
-from baker.kernels.rays import FAR, aim_cosine
-from baker.kernels.sampling import hash_combine, texel_scramble
+from baker.kernels.rays import FAR, aim_texel, lane_seeds
+from baker.kernels.sampling import texel_scramble
 from baker.kernels.surface import N_POINTS, drop_buried, place_points
 from baker.trace.packets import (
     DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_packet, set_ray, trace,
 )  # fmt: skip
 
 _f = np.float32
-_u = np.uint32
 _INV_PI = 1.0 / math.pi
 # Shadow rays end this share of their length before the light.
 _SHORT = np.float32(0.9999)
@@ -51,8 +54,9 @@ def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, sha
     second : (n_entries,) float32, mean square over 16 batches of the first estimate's sum
     """
     n_samples = len(net)
-    width = tracer.width
-    valid, floats, words = new_packet()
+    width, scene, occluded, intersect = tracer.width, tracer.scene, tracer.occluded, tracer.intersect
+    lamp = emitters.row
+    valid, floats, words = new_packet(width)
     n = end - begin
     origin = np.zeros((n, N_POINTS, 3), np.float32)
     normal = np.zeros((n, N_POINTS, 3), np.float32)
@@ -66,14 +70,17 @@ def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, sha
     if not cluster_chances(emitters, x, y, z, radius, chance, cumulative):
         return
     point = np.zeros(3, np.float32)
+    lamp_first = emitters.first
     radiance = np.zeros(4)
     value = np.zeros((width, 6))
     batch = np.zeros((width, N_POINTS))
     total = np.zeros((width, 6))
+    seeds = np.zeros((width, 2), np.uint32)
     for group in range(0, n, width):
         lanes = min(width, n - group)
         total[:] = 0.0
         batch[:] = 0.0
+        lane_seeds(begin + group, lanes, 15, seeds)
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             any_lane = False
@@ -82,33 +89,35 @@ def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, sha
                 if lane >= lanes:
                     continue
                 i = group + lane
-                seed = _u(begin + i)
-                u = texel_scramble(net[s, 0], hash_combine(seed, _u(31)), shared)
-                v = texel_scramble(net[s, 1], hash_combine(seed, _u(32)), shared)
-                m, density, b1, b2 = sample_emitter(emitters, chance, cumulative, u, v, point)
-                o = origin[i, k]
-                dx, dy, dz = point[0] - o[0], point[1] - o[1], point[2] - o[2]
+                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+                m, density, b1, b2 = sample_emitter(lamp, lamp_first, chance, cumulative, u, v, point)
+                ox, oy, oz = origin[i, k, 0], origin[i, k, 1], origin[i, k, 2]
+                dx, dy, dz = point[0] - ox, point[1] - oy, point[2] - oz
                 square = dx * dx + dy * dy + dz * dz
                 if square <= _f(0.0):
                     continue
                 length = math.sqrt(square)
                 cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / length
-                light = -(dx * emitters.normal[m, 0] + dy * emitters.normal[m, 1] + dz * emitters.normal[m, 2]) / length
-                if emitters.two_sided[m]:
+                light = -(dx * lamp[m, NORMAL] + dy * lamp[m, NORMAL + 1] + dz * lamp[m, NORMAL + 2]) / length
+                if lamp[m, TWO_SIDED] > _f(0.0):
                     light = abs(light)
                 if cosine <= _f(0.0) or light <= _f(1.0e-6):
                     continue
-                emitted_radiance(shading, surface.triangle, emitters.triangle[m], b1, b2, radiance)
+                for c in range(3):
+                    radiance[c] = lamp[m, RADIANCE + c]
+                if lamp[m, TEXTURED] > _f(0.0):
+                    emitted_radiance(shading, surface.triangle, emitters.triangle[m], b1, b2, radiance)
                 steradian = density * square / light
                 for c in range(3):
                     value[lane, c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[0])
                     value[lane, 3 + c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[1])
-                set_ray(floats, words, width, lane, o[0], o[1], o[2], dx, dy, dz, _f(0.0), _SHORT)
+                set_ray(floats, words, width, lane, ox, oy, oz, dx, dy, dz, _SHORT)
                 valid[lane] = -1
                 any_lane = True
             if not any_lane:
                 continue
-            trace(tracer.occluded, tracer.scene, valid, floats)
+            trace(occluded, scene, valid, floats)
             for lane in range(lanes):
                 if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
                     for c in range(6):
@@ -130,8 +139,9 @@ def hemisphere_hits(surface, mask, table, emitters, shading, tracer, begin, end,
     The other half of `light_samples`'s second estimate; n_light is its number of shadow rays.
     """
     n_samples = len(net)
-    width = tracer.width
-    valid, floats, words = new_packet()
+    width, scene, occluded, intersect = tracer.width, tracer.scene, tracer.occluded, tracer.intersect
+    lamp = emitters.row
+    valid, floats, words = new_packet(width)
     n = end - begin
     origin = np.zeros((n, N_POINTS, 3), np.float32)
     normal = np.zeros((n, N_POINTS, 3), np.float32)
@@ -144,50 +154,54 @@ def hemisphere_hits(surface, mask, table, emitters, shading, tracer, begin, end,
     x, y, z, radius = bounding_sphere(origin.reshape(n * N_POINTS, 3), 0, n * N_POINTS)
     cluster_chances(emitters, x, y, z, radius, chance, cumulative)
     radiance = np.zeros(4)
+    seeds = np.zeros((width, 2), np.uint32)
+    row = table.row
     for group in range(0, n, width):
         lanes = min(width, n - group)
+        lane_seeds(begin + group, lanes, 20, seeds)
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             for lane in range(lanes):
-                seed = _u(begin + group + lane)
-                u = texel_scramble(net[s, 0], hash_combine(seed, _u(41)), shared)
-                v = texel_scramble(net[s, 1], hash_combine(seed, _u(42)), shared)
-                i = group + lane
-                aim_cosine(floats, words, width, lane, origin[i, k], normal[i, k], u, v, FAR)
-            trace(tracer.intersect, tracer.scene, valid, floats)
+                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, FAR)
+            trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 if words[GEOM_ID * width + lane] == NO_HIT:
                     continue
                 prim = np.int64(words[PRIM_ID * width + lane])
-                m = np.int64(table.row[prim, 12])
+                m = np.int64(row[prim, 12])
                 if m < 0:
                     continue
-                w = normal[group + lane, k]
+                i = group + lane
                 weight = emitter_hit(
-                    table, emitters, chance, cumulative, prim, m, floats[DIR_X * width + lane],
-                    floats[DIR_Y * width + lane], floats[DIR_Z * width + lane], w, floats[TFAR * width + lane],
-                    n_light, n_samples,
+                    row, lamp, chance, cumulative, prim, m, floats[DIR_X * width + lane],
+                    floats[DIR_Y * width + lane], floats[DIR_Z * width + lane], normal[i, k, 0], normal[i, k, 1],
+                    normal[i, k, 2], floats[TFAR * width + lane], n_light, n_samples,
                 )  # fmt: skip
                 if weight > 0.0:
-                    emitted_radiance(
-                        shading, surface.triangle, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane],
-                        radiance,
-                    )  # fmt: skip
+                    for c in range(3):
+                        radiance[c] = lamp[m, RADIANCE + c]
+                    if lamp[m, TEXTURED] > _f(0.0):
+                        emitted_radiance(
+                            shading, surface.triangle, prim, floats[HIT_U * width + lane],
+                            floats[HIT_V * width + lane], radiance,
+                        )  # fmt: skip
                     for c in range(3):
                         out[begin + group + lane, 3 + c] += radiance[c] * weight
 
 
 @njit(cache=True, nogil=True)
-def emitter_hit(table, emitters, chance, cumulative, prim, m, dx, dy, dz, w, distance, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+def emitter_hit(row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
     """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0 for its back)."""
-    front = front_facing(table, prim, dx, dy, dz)
-    if not front and not emitters.two_sided[m]:
+    front = front_facing(row, prim, dx, dy, dz)
+    if not front and lamp[m, TWO_SIDED] == _f(0.0):
         return 0.0
-    cosine = dx * w[0] + dy * w[1] + dz * w[2]
-    light = abs(dx * emitters.normal[m, 0] + dy * emitters.normal[m, 1] + dz * emitters.normal[m, 2])
+    cosine = dx * nx + dy * ny + dz * nz
+    light = abs(dx * lamp[m, NORMAL] + dy * lamp[m, NORMAL + 1] + dz * lamp[m, NORMAL + 2])
     if cosine <= 0.0 or light <= 1.0e-6:
         return 0.0
-    density = emitter_density(emitters, chance, cumulative, m) * distance * distance / light
+    density = emitter_density(lamp, chance, cumulative, m) * distance * distance / light
     return mis_weighted(1.0, cosine, density, n_light, n_hemisphere)

@@ -21,24 +21,22 @@ from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 
 
+# Columns of an emitter's row: three corners, face normal, area, 1 if two-sided, chance inside its cluster,
+# running sum of these chances, cluster, radiance without texture, 1 if textured.
+CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 16, 17, 20
+ROW_LENGTH = 24
+
+
 class Emitters(NamedTuple):
     """M emissive triangles in C clusters.
 
-    triangle (M,) int32, numbers in the scene, cluster after cluster; corner (M, 9) float32; normal
-    (M, 3) float32; area (M,) float32; two_sided (M,) bool; share (M,) float32, chance inside its
-    cluster; cumulative (M,) float32, running sum of `share` inside the cluster; cluster (M,) int32;
-    first (C + 1,) int32; centre (C, 3), radius (C,), power (C,), axis (C, 3) float32; spread (C,)
-    float32, radians, pi for clusters with two-sided triangles.
+    row (M, 24) float32, see the column names; triangle (M,) int32, numbers in the scene, cluster
+    after cluster; first (C + 1,) int32; centre (C, 3), radius (C,), power (C,), axis (C, 3) float32;
+    spread (C,) float32, radians, pi for clusters with two-sided triangles.
     """
 
+    row: NDArray[np.float32]
     triangle: NDArray[np.int32]
-    corner: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    area: NDArray[np.float32]
-    two_sided: NDArray[np.bool_]
-    share: NDArray[np.float32]
-    cumulative: NDArray[np.float32]
-    cluster: NDArray[np.int32]
     first: NDArray[np.int32]
     centre: NDArray[np.float32]
     radius: NDArray[np.float32]
@@ -98,43 +96,48 @@ def cluster_chances(emitters, x, y, z, radius, chance, cumulative):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def _find(cumulative, begin, end, u):  # type: ignore[no-untyped-def]
-    """Return the first index in [begin, end) whose running sum exceeds u (the last one otherwise)."""
-    low = begin
-    high = end - 1
+def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
+    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2.
+
+    `row` and `first` are those of `Emitters`; `chance` and `cumulative` those of `cluster_chances`.
+    """
+    n = len(cumulative)
+    total = cumulative[n - 1]
+    u *= total
+    low = 0
+    high = n - 1
     while low < high:
         middle = (low + high) // 2
         if cumulative[middle] > u:
             high = middle
         else:
             low = middle + 1
-    return low
-
-
-@njit(cache=True, nogil=True)
-def sample_emitter(emitters, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
-    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2."""
-    total = cumulative[len(cumulative) - 1]
-    u *= total
-    c = _find(cumulative, 0, len(cumulative), u)
-    u = min(max((u - (cumulative[c] - chance[c])) / chance[c], 0.0), 0.9999999)
-    m = _find(emitters.cumulative, emitters.first[c], emitters.first[c + 1], u)
-    share = emitters.share[m]
-    u = min(max((u - (emitters.cumulative[m] - share)) / share, 0.0), 0.9999999)
-    b1, b2 = triangle_barycentric(np.float32(u), np.float32(v))
+    picked = chance[low]
+    u = min(max((u - (cumulative[low] - picked)) / picked, np.float32(0.0)), np.float32(0.9999999))
+    m = first[low]
+    high = first[low + 1] - 1
+    while m < high:
+        middle = (m + high) // 2
+        if row[middle, CUMULATIVE] > u:
+            high = middle
+        else:
+            m = middle + 1
+    share = row[m, SHARE]
+    u = min(max((u - (row[m, CUMULATIVE] - share)) / share, np.float32(0.0)), np.float32(0.9999999))
+    b1, b2 = triangle_barycentric(u, v)
     b0 = np.float32(1.0) - b1 - b2
     for a in range(3):
-        point[a] = b0 * emitters.corner[m, a] + b1 * emitters.corner[m, 3 + a] + b2 * emitters.corner[m, 6 + a]
-    return m, chance[c] / total * share / emitters.area[m], b1, b2
+        point[a] = b0 * row[m, a] + b1 * row[m, 3 + a] + b2 * row[m, 6 + a]
+    return m, picked / total * share / row[m, AREA], b1, b2
 
 
 @njit(cache=True, nogil=True)
-def emitter_density(emitters, chance, cumulative, m):  # type: ignore[no-untyped-def]
+def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
     """Return the density per m2 with which `sample_emitter` picks a point of emitter m."""
     total = cumulative[len(cumulative) - 1]
-    if total <= 0.0:
-        return 0.0
-    return chance[emitters.cluster[m]] / total * emitters.share[m] / emitters.area[m]
+    if total <= np.float32(0.0):
+        return np.float32(0.0)
+    return chance[np.int64(row[m, CLUSTER])] / total * row[m, SHARE] / row[m, AREA]
 
 
 @njit(cache=True, nogil=True)

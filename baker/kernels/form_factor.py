@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.hits import front_facing, hit_entry
-from baker.kernels.rays import FAR, aim_cosine
+from baker.kernels.rays import FAR, aim_texel, lane_seeds
 from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.kernels.surface import N_POINTS, drop_buried, place_points
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, new_packet, trace
@@ -36,16 +36,19 @@ def cast_form_factors(surface, mask, table, patch, member_first, member, weight,
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
     """
     n_rays = len(net)
-    width = tracer.width
-    valid, floats, words = new_packet()
-    origin = np.zeros((width, 1, N_POINTS, 3), np.float32)
-    normal = np.zeros((width, 1, N_POINTS, 3), np.float32)
+    width, scene, intersect = tracer.width, tracer.scene, tracer.intersect
+    row, lookup, back_entry, size = table.row, table.lookup, table.back_entry, table.size
+    valid, floats, words = new_packet(width)
+    origin = np.zeros((width, N_POINTS, 3), np.float32)
+    normal = np.zeros((width, N_POINTS, 3), np.float32)
+    seeds = np.zeros((width, 2), np.uint32)
     hit = np.zeros((1, N_POINTS), np.int32)
     bary = np.zeros((1, N_POINTS, 2), np.float32)
     placed = np.zeros(width, np.int64)
     for group in range(begin, end, width):
         lanes = min(width, end - group)
         placed[:] = -1
+        lane_seeds(group, lanes, 30, seeds)
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for r in range(n_rays):
@@ -55,19 +58,19 @@ def cast_form_factors(surface, mask, table, patch, member_first, member, weight,
                 share = (r + 0.5) / n_rays
                 if placed[lane] < 0:
                     placed[lane] = member_first[p]
-                    _place_one(surface, mask, member[placed[lane]], origin[lane], normal[lane], hit, bary)
+                    _place_one(surface, mask, member[placed[lane]], origin[lane : lane + 1], normal[lane : lane + 1], hit, bary)
                 moved = False
                 while placed[lane] < member_first[p + 1] - 1 and weight[placed[lane]] < share:
                     placed[lane] += 1
                     moved = True
                 if moved:
-                    _place_one(surface, mask, member[placed[lane]], origin[lane], normal[lane], hit, bary)
+                    _place_one(surface, mask, member[placed[lane]], origin[lane : lane + 1], normal[lane : lane + 1], hit, bary)
                 seed = _u(p)
-                u = texel_scramble(net[r, 0], hash_combine(seed, _u(61)), shared)
-                v = texel_scramble(net[r, 1], hash_combine(seed, _u(62)), shared)
+                u = texel_scramble(net[r, 0], seeds[lane, 0], shared)
+                v = texel_scramble(net[r, 1], seeds[lane, 1], shared)
                 k = np.int64(hash_combine(seed, _u(r)) & _u(N_POINTS - 1))
-                aim_cosine(floats, words, width, lane, origin[lane, 0, k], normal[lane, 0, k], u, v, FAR)
-            trace(tracer.intersect, tracer.scene, valid, floats)
+                aim_texel(floats, words, width, lane, origin, normal, lane, k, u, v, FAR)
+            trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 p = group + lane
                 target[p - begin, r] = -1
@@ -76,10 +79,12 @@ def cast_form_factors(surface, mask, table, patch, member_first, member, weight,
                     continue
                 prim = np.int64(words[PRIM_ID * width + lane])
                 front = front_facing(
-                    table, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
+                    row, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
                     floats[DIR_Z * width + lane],
                 )  # fmt: skip
-                entry = hit_entry(table, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane], front)
+                entry = hit_entry(
+                    row, lookup, back_entry, size, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane], front
+                )  # fmt: skip
                 if entry < 0:
                     tally[p, 1] += 1
                 else:

@@ -15,17 +15,16 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.area_light import emitter_hit
-from baker.kernels.emitters import bounding_sphere, cluster_chances, emitted_radiance
+from baker.kernels.emitters import RADIANCE, TEXTURED, bounding_sphere, cluster_chances, emitted_radiance
 from baker.kernels.hits import front_facing, hit_entry
-from baker.kernels.rays import FAR, aim_cosine
-from baker.kernels.sampling import hash_combine, texel_scramble
+from baker.kernels.rays import FAR, aim_texel, lane_seeds
+from baker.kernels.sampling import texel_scramble
 from baker.kernels.surface import N_POINTS, drop_buried, place_points
 from baker.trace.packets import (
     DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_packet, trace,
 )  # fmt: skip
 
 _f = np.float32
-_u = np.uint32
 # Columns of `out`: indirect RGB, sky and emitted RGB, AO, mean squares of the two sums over batches.
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
@@ -41,8 +40,8 @@ def gather(surface, mask, table, exitance, emitters, shading, tracer, begin, end
     out : (n_front, 8) float32, see the column names
     """
     n_samples = len(net)
-    width = tracer.width
-    valid, floats, words = new_packet()
+    width, scene, intersect, occluded = tracer.width, tracer.scene, tracer.intersect, tracer.occluded
+    valid, floats, words = new_packet(width)
     n = end - begin
     origin = np.zeros((n, N_POINTS, 3), np.float32)
     normal = np.zeros((n, N_POINTS, 3), np.float32)
@@ -58,9 +57,12 @@ def gather(surface, mask, table, exitance, emitters, shading, tracer, begin, end
     radiance = np.zeros(4)
     total = np.zeros((width, 7))
     batch = np.zeros((width, N_POINTS))
+    seeds = np.zeros((width, 2), np.uint32)
     distance = _f(limits[0])
+    row, lookup, back_entry, size, lamp = table.row, table.lookup, table.back_entry, table.size, emitters.row
     for group in range(0, n, width):
         lanes = min(width, n - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         total[:] = 0.0
@@ -68,12 +70,10 @@ def gather(surface, mask, table, exitance, emitters, shading, tracer, begin, end
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             for lane in range(lanes):
-                seed = _u(begin + group + lane)
-                u = texel_scramble(net[s, 0], hash_combine(seed, _u(51)), shared)
-                v = texel_scramble(net[s, 1], hash_combine(seed, _u(52)), shared)
-                i = group + lane
-                aim_cosine(floats, words, width, lane, origin[i, k], normal[i, k], u, v, FAR)
-            trace(tracer.intersect, tracer.scene, valid, floats)
+                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, FAR)
+            trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 if words[GEOM_ID * width + lane] == NO_HIT:
                     total[lane, OPEN] += 1.0
@@ -87,18 +87,22 @@ def gather(surface, mask, table, exitance, emitters, shading, tracer, begin, end
                 prim = np.int64(words[PRIM_ID * width + lane])
                 dx, dy, dz = floats[DIR_X * width + lane], floats[DIR_Y * width + lane], floats[DIR_Z * width + lane]
                 hit_u, hit_v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
-                m = np.int64(table.row[prim, 12])
+                m = np.int64(row[prim, 12])
                 if m >= 0:
+                    i = group + lane
                     weight = emitter_hit(
-                        table, emitters, chance, cumulative, prim, m, dx, dy, dz, normal[group + lane, k], far,
-                        limits[1], n_samples,
+                        row, lamp, chance, cumulative, prim, m, dx, dy, dz,
+                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], far, limits[1], n_samples,
                     ) * n_samples / np.pi  # fmt: skip
                     if weight > 0.0:
-                        emitted_radiance(shading, surface.triangle, prim, hit_u, hit_v, radiance)
+                        for c in range(3):
+                            radiance[c] = lamp[m, RADIANCE + c]
+                        if lamp[m, TEXTURED] > _f(0.0):
+                            emitted_radiance(shading, surface.triangle, prim, hit_u, hit_v, radiance)
                         for c in range(3):
                             total[lane, DIRECT + c] += radiance[c] * weight
                             batch[lane, k] += radiance[c] * weight
-                entry = hit_entry(table, prim, hit_u, hit_v, front_facing(table, prim, dx, dy, dz))
+                entry = hit_entry(row, lookup, back_entry, size, prim, hit_u, hit_v, front_facing(row, prim, dx, dy, dz))
                 if entry >= 0:
                     for c in range(3):
                         value = exitance[entry, c] * _f(0.31830987)
@@ -123,8 +127,8 @@ def open_share(surface, mask, tracer, begin, end, net, shared, distance, out):  
     out : (n_front,) float32
     """
     n_samples = len(net)
-    width = tracer.width
-    valid, floats, words = new_packet()
+    width, scene, intersect, occluded = tracer.width, tracer.scene, tracer.intersect, tracer.occluded
+    valid, floats, words = new_packet(width)
     n = end - begin
     origin = np.zeros((n, N_POINTS, 3), np.float32)
     normal = np.zeros((n, N_POINTS, 3), np.float32)
@@ -133,20 +137,20 @@ def open_share(surface, mask, tracer, begin, end, net, shared, distance, out):  
     place_points(surface, begin, end, origin, normal, hit, bary)
     drop_buried(mask, begin, end, origin, normal)
     count = np.zeros(width, np.int64)
+    seeds = np.zeros((width, 2), np.uint32)
     for group in range(0, n, width):
         lanes = min(width, n - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
         count[:] = 0
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             for lane in range(lanes):
-                seed = _u(begin + group + lane)
-                u = texel_scramble(net[s, 0], hash_combine(seed, _u(51)), shared)
-                v = texel_scramble(net[s, 1], hash_combine(seed, _u(52)), shared)
-                i = group + lane
-                aim_cosine(floats, words, width, lane, origin[i, k], normal[i, k], u, v, distance)
-            trace(tracer.occluded, tracer.scene, valid, floats)
+                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, distance)
+            trace(occluded, scene, valid, floats)
             for lane in range(lanes):
                 if floats[TFAR * width + lane] >= _f(0.0):
                     count[lane] += 1

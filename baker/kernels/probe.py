@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.hits import front_facing
-from baker.kernels.rays import FAR, aim_cosine
+from baker.kernels.rays import FAR, aim_texel
 from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.kernels.surface import N_POINTS, place_points
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PRIM_ID, new_packet, trace
@@ -22,8 +22,9 @@ def back_face_hits(surface, table, tracer, chosen, begin, end, net, rays_per_poi
     Each stride-th of a texel's 16 points casts `rays_per_point` cosine-weighted rays; `hits` (n, 16)
     uint8 gets the counts, by position in `chosen`. net : (16 / stride * rays_per_point, 2) uint32.
     """
-    valid, floats, words = new_packet()
-    width = tracer.width
+    width, scene, intersect = tracer.width, tracer.scene, tracer.intersect
+    row, pixel = table.row, surface.pixel
+    valid, floats, words = new_packet(width)
     origin = np.zeros((width, N_POINTS, 3), np.float32)
     normal = np.zeros((width, N_POINTS, 3), np.float32)
     hit = np.zeros((width, N_POINTS), np.int32)
@@ -42,20 +43,18 @@ def back_face_hits(surface, table, tracer, chosen, begin, end, net, rays_per_poi
         for point in range(0, N_POINTS, stride):
             for _ in range(rays_per_point):
                 for lane in range(lanes):
-                    seed = _u(surface.pixel[chosen[group + lane]])
+                    seed = _u(pixel[chosen[group + lane]])
                     u = texel_scramble(net[sample, 0], hash_combine(seed, _u(21)), _u(0))
                     v = texel_scramble(net[sample, 1], hash_combine(seed, _u(22)), _u(0))
-                    aim_cosine(
-                        floats, words, width, lane, origin[lane, point], normal[lane, point], u, v, FAR
-                    )  # fmt: skip
+                    aim_texel(floats, words, width, lane, origin, normal, lane, point, u, v, FAR)
                 sample += 1
-                trace(tracer.intersect, tracer.scene, valid, floats)
+                trace(intersect, scene, valid, floats)
                 for lane in range(lanes):
                     if words[GEOM_ID * width + lane] == NO_HIT:
                         continue
                     prim = np.int64(words[PRIM_ID * width + lane])
-                    if table.row[prim, 7] == _f(0.0) and not front_facing(
-                        table, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
+                    if row[prim, 7] == _f(0.0) and not front_facing(
+                        row, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
                         floats[DIR_Z * width + lane],
                     ):  # fmt: skip
                         hits[group + lane, point] += 1

@@ -19,8 +19,8 @@ def add_visible(tracer, origin, ray, weight, colour, begin, out):  # type: ignor
     weight : (n, 16) float32, irradiance for colour 1 if nothing is in the way; 0 casts no ray
     colour : (3,) float32; out : (n_entries, 6) float32
     """
-    valid, floats, words = new_packet()
-    width = tracer.width
+    width, scene, occluded = tracer.width, tracer.scene, tracer.occluded
+    valid, floats, words = new_packet(width)
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         for k in range(N_POINTS):
@@ -28,14 +28,16 @@ def add_visible(tracer, origin, ray, weight, colour, begin, out):  # type: ignor
             for lane in range(width):
                 valid[lane] = 0
                 if lane < lanes and weight[group + lane, k] > _f(0.0):
-                    o = origin[group + lane, k]
-                    d = ray[group + lane, k]
-                    set_ray(floats, words, width, lane, o[0], o[1], o[2], d[0], d[1], d[2], _f(0.0), d[3])
+                    i = group + lane
+                    set_ray(
+                        floats, words, width, lane, origin[i, k, 0], origin[i, k, 1], origin[i, k, 2],
+                        ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3],
+                    )  # fmt: skip
                     valid[lane] = -1
                     any_lane = True
             if not any_lane:
                 continue
-            trace(tracer.occluded, tracer.scene, valid, floats)
+            trace(occluded, scene, valid, floats)
             for lane in range(lanes):
                 if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
                     i = group + lane

@@ -22,9 +22,10 @@ from baker.kernels.sampling import hash_combine, texel_scramble
 
 N_POINTS = 16
 # Ray origins leave the surface by this share of the largest coordinate: a few dozen float32 steps.
-OFFSET = np.float32(1.0e-5)
+OFFSET = 1.0e-5
+# Vertices whose normal leans further from the face (cosine) lift nothing: that is no smooth surface.
+STEEPEST = 0.7
 _u = np.uint32
-_f = np.float32
 
 
 class Surface(NamedTuple):
@@ -53,51 +54,62 @@ class Surface(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _place(surface, t, x, y, flip, origin, normal):  # type: ignore[no-untyped-def]
-    """Write the world point and shading normal of texel-space point (x, y) on triangle t; return b1, b2."""
-    size = surface.size
-    i0, i1, i2 = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
-    ax, ay = surface.uv[i0, 0] * size, surface.uv[i0, 1] * size
-    bx, by = surface.uv[i1, 0] * size - ax, surface.uv[i1, 1] * size - ay
-    cx, cy = surface.uv[i2, 0] * size - ax, surface.uv[i2, 1] * size - ay
+def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
+    """Return b1 = a x + b y + c and b2 = d x + e y + f of triangle t for texel-space (x, y), as six floats."""
+    i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+    ax, ay = float(uv[i0, 0]) * size, float(uv[i0, 1]) * size
+    bx, by = float(uv[i1, 0]) * size - ax, float(uv[i1, 1]) * size - ay
+    cx, cy = float(uv[i2, 0]) * size - ax, float(uv[i2, 1]) * size - ay
     det = bx * cy - by * cx
-    b1 = b2 = 1.0 / 3.0
-    if abs(det) > 1.0e-12:
-        b1 = min(max(((x - ax) * cy - (y - ay) * cx) / det, 0.0), 1.0)
-        b2 = min(max((bx * (y - ay) - by * (x - ax)) / det, 0.0), 1.0 - b1)
+    if abs(det) <= 1.0e-12:
+        return 0.0, 0.0, 1.0 / 3.0, 0.0, 0.0, 1.0 / 3.0
+    return (
+        cy / det, -cx / det, (ay * cx - ax * cy) / det,
+        -by / det, bx / det, (ax * by - ay * bx) / det,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  # type: ignore[no-untyped-def]
+    """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
+
+    p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; least : see `Surface`
+    """
+    b1 = min(max(b1, 0.0), 1.0)
+    b2 = min(max(b2, 0.0), 1.0 - b1)
     b0 = 1.0 - b1 - b2
-    px = np.zeros(3)
-    nx = np.zeros(3)
-    lifted = np.zeros(3)
-    for a in range(3):
-        px[a] = b0 * surface.position[i0, a] + b1 * surface.position[i1, a] + b2 * surface.position[i2, a]
-        nx[a] = b0 * surface.normal[i0, a] + b1 * surface.normal[i1, a] + b2 * surface.normal[i2, a]
+    i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+    px = b0 * p[i0, 0] + b1 * p[i1, 0] + b2 * p[i2, 0]
+    py = b0 * p[i0, 1] + b1 * p[i1, 1] + b2 * p[i2, 1]
+    pz = b0 * p[i0, 2] + b1 * p[i1, 2] + b2 * p[i2, 2]
+    nx = b0 * m[i0, 0] + b1 * m[i1, 0] + b2 * m[i2, 0]
+    ny = b0 * m[i0, 1] + b1 * m[i1, 1] + b2 * m[i2, 1]
+    nz = b0 * m[i0, 2] + b1 * m[i1, 2] + b2 * m[i2, 2]
+    fx, fy, fz = float(face[t, 0]), float(face[t, 1]), float(face[t, 2])
     sign = -1.0 if flip else 1.0
-    face = surface.face_normal[t]
-    length = math.sqrt(nx[0] * nx[0] + nx[1] * nx[1] + nx[2] * nx[2])
-    facing = nx[0] * face[0] + nx[1] * face[1] + nx[2] * face[2]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    facing = nx * fx + ny * fy + nz * fz
+    lx = ly = lz = 0.0
     if length < 1.0e-6 or facing <= 0.0:
-        for a in range(3):
-            nx[a] = face[a]
-        length = 1.0
+        nx, ny, nz, length = fx, fy, fz, 1.0
     elif not flip and facing < 0.99999 * length:
         # Project onto the tangent planes of the three vertices that the point lies below.
         for i in range(3):
             vertex = i0 if i == 0 else (i1 if i == 1 else i2)
             weight = b0 if i == 0 else (b1 if i == 1 else b2)
-            below = 0.0
-            turned = 0.0
-            for a in range(3):
-                below += (px[a] - surface.position[vertex, a]) * surface.normal[vertex, a]
-                turned += surface.normal[vertex, a] * face[a]
-            if below < 0.0 and turned > 0.7:
-                for a in range(3):
-                    lifted[a] -= weight * below * surface.normal[vertex, a]
-    largest = max(abs(px[0]), abs(px[1]), abs(px[2]), surface.least)
-    for a in range(3):
-        normal[a] = _f(sign * nx[a] / length)
-        origin[a] = _f(px[a] + lifted[a] + sign * face[a] * OFFSET * largest)
-    return b1, b2
+            vx, vy, vz = float(m[vertex, 0]), float(m[vertex, 1]), float(m[vertex, 2])
+            below = (px - p[vertex, 0]) * vx + (py - p[vertex, 1]) * vy + (pz - p[vertex, 2]) * vz
+            if below < 0.0 and vx * fx + vy * fy + vz * fz > STEEPEST:
+                lx -= weight * below * vx
+                ly -= weight * below * vy
+                lz -= weight * below * vz
+    away = sign * OFFSET * max(abs(px), abs(py), abs(pz), least)
+    origin[n, k, 0] = px + lx + away * fx
+    origin[n, k, 1] = py + ly + away * fy
+    origin[n, k, 2] = pz + lz + away * fz
+    normal[n, k, 0] = sign * nx / length
+    normal[n, k, 1] = sign * ny / length
+    normal[n, k, 2] = sign * nz / length
 
 
 @njit(cache=True, nogil=True)
@@ -109,44 +121,48 @@ def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # ty
     corner = np.zeros((3, 2))
     cut = np.zeros((MAX_CORNERS, 2))
     spare = np.zeros((MAX_CORNERS, 2))
-    size = surface.size
+    # Out of the tuple once: every access to a tuple's array costs an atomic reference count.
+    position, shading, face = surface.position, surface.normal, surface.face_normal
+    uv, triangle, net = surface.uv, surface.triangle, surface.net
+    pixels, fronts, back = surface.pixel, surface.front, surface.back
+    starts, entry, entry_area = surface.first, surface.entry, surface.entry_area
+    size, least = surface.size, surface.least
     full = _u(0)
     for i in range(begin, end):
-        pixel = surface.pixel[i]
+        pixel = pixels[i]
         rest = pixel % (size * size)
         x0 = rest % size
         y0 = rest // size
         seed_x = hash_combine(_u(pixel), _u(11))
         seed_y = hash_combine(_u(pixel), _u(12))
-        front = surface.front[i]
-        first, last = surface.first[front], surface.first[front + 1]
+        front = fronts[i]
+        first, last = starts[front], starts[front + 1]
         total = 0.0
         for e in range(first, last):
-            total += surface.entry_area[e]
+            total += entry_area[e]
         whole = last - first == 1 and total > 0.999999
-        # The net's first number rises with k here, so that one walk along the triangles serves all points.
         e = first
-        t = surface.entry[e]
-        done = 0.0
-        m = -1
+        t = entry[e]
+        a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
         for k in range(N_POINTS):
-            u = texel_scramble(surface.net[k, 0], seed_x, full)
-            v = texel_scramble(surface.net[k, 1], seed_y, full)
+            u = texel_scramble(net[k, 0], seed_x, full)
+            v = texel_scramble(net[k, 1], seed_y, full)
             if whole:
                 x = float(u)
                 y = float(v)
             else:
                 e = first
                 done = 0.0
-                while e < last - 1 and u * total >= done + surface.entry_area[e]:
-                    done += surface.entry_area[e]
+                while e < last - 1 and u * total >= done + entry_area[e]:
+                    done += entry_area[e]
                     e += 1
-                t = surface.entry[e]
-                for c in range(3):
-                    corner[c, 0] = surface.uv[surface.triangle[t, c], 0] * size
-                    corner[c, 1] = surface.uv[surface.triangle[t, c], 1] * size
+                t = entry[e]
+                a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
+                for j in range(3):
+                    corner[j, 0] = uv[triangle[t, j], 0] * size
+                    corner[j, 1] = uv[triangle[t, j], 1] * size
                 m = clip_to_square(corner, x0, y0, cut, spare)
-                inside = max(float(surface.entry_area[e]), 1.0e-30)
+                inside = max(float(entry_area[e]), 1.0e-30)
                 if m == 0:
                     x, y = 0.5, 0.5
                 elif m < 3 or polygon_area(cut, m) <= 0.0:
@@ -154,7 +170,11 @@ def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # ty
                 else:
                     x, y = polygon_point(cut, m, min(max((u * total - done) / inside, 0.0), 1.0), v)
             n = i - begin
-            b1, b2 = _place(surface, t, x0 + x, y0 + y, surface.back[i], origin[n, k], normal[n, k])
+            x += x0
+            y += y0
+            b1 = a * x + b * y + c
+            b2 = d * x + g * y + h
+            place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, k)
             hit_triangle[n, k] = t
             bary[n, k, 0] = b1
             bary[n, k, 1] = b2

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area
-from baker.kernels.surface import N_POINTS, _place, place_points
+from baker.kernels.surface import N_POINTS, inverse_uv, place, place_points
 from baker.kernels.textures import sample_texture
 
 
@@ -21,6 +21,8 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
     corner = np.zeros((3, 2))
     cut = np.zeros((MAX_CORNERS, 2))
     spare = np.zeros((MAX_CORNERS, 2))
+    spot = np.zeros((1, 1, 3), np.float32)
+    facing = np.zeros((1, 1, 3), np.float32)
     for i in range(begin, end):
         rest = surface.pixel[i] % (surface.size * surface.size)
         x0 = rest % surface.size
@@ -36,9 +38,9 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
             metres += inside * triangle_scale[t]
             mx = my = 0.5
             if inside < 0.999999:
-                for c in range(3):
-                    corner[c, 0] = surface.uv[surface.triangle[t, c], 0] * surface.size
-                    corner[c, 1] = surface.uv[surface.triangle[t, c], 1] * surface.size
+                for j in range(3):
+                    corner[j, 0] = surface.uv[surface.triangle[t, j], 0] * surface.size
+                    corner[j, 1] = surface.uv[surface.triangle[t, j], 1] * surface.size
                 mx, my = _centroid(cut, clip_to_square(corner, x0, y0, cut, spare))
             weight = max(inside, 1.0e-12)
             total += weight
@@ -47,7 +49,15 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
         centroid[i, 0] = cx / total - 0.5
         centroid[i, 1] = cy / total - 0.5
         area[i] = metres
-        _place(surface, main, x0 + cx / total, y0 + cy / total, False, position[i], normal[i])
+        a, b, c, d, g, h = inverse_uv(surface.uv, surface.triangle, surface.size, main)
+        x, y = x0 + cx / total, y0 + cy / total
+        place(
+            surface.position, surface.normal, surface.face_normal, surface.triangle, surface.least, main,
+            a * x + b * y + c, d * x + g * y + h, False, spot, facing, 0, 0,
+        )  # fmt: skip
+        for axis in range(3):
+            position[i, axis] = spot[0, 0, axis]
+            normal[i, axis] = facing[0, 0, axis]
 
 
 @njit(cache=True, nogil=True)

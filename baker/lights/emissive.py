@@ -7,12 +7,16 @@ Based on: see `kernels.emitters`.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
-from baker.kernels.emitters import Emitters, emitted_radiance
+from baker.kernels.emitters import (
+    AREA, CLUSTER, CORNER, CUMULATIVE, NORMAL, RADIANCE, ROW_LENGTH, SHARE, TEXTURED, TWO_SIDED, Emitters, emitted_radiance,
+)  # fmt: skip
 from baker.kernels.texel_raster import morton_code
 
 # At most so many clusters are weighed for every tile of texels.
@@ -22,7 +26,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _GRID = 16
 
 
-def build_emitters(geometry: Geometry, shading: tuple[NDArray[np.generic], ...], emission: NDArray[np.float32]) -> Emitters:
+def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
     """Find the triangles that emit and group them.
 
     Parameters
@@ -30,10 +34,8 @@ def build_emitters(geometry: Geometry, shading: tuple[NDArray[np.generic], ...],
     geometry : Geometry
     shading : Shading
         Materials as kernels see them.
-    emission : (M, 3) float32
-        Emission of each material before texture, cd/m2.
     """
-    candidate = np.flatnonzero((emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
+    candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
     luminance = np.zeros(len(candidate))
     _mean_luminance(shading, geometry.triangle, candidate, _LUMINANCE, luminance)
     power = np.pi * geometry.area[candidate] * luminance
@@ -51,21 +53,18 @@ def build_emitters(geometry: Geometry, shading: tuple[NDArray[np.generic], ...],
     cumulative = np.cumsum(share) - np.arange(n_clusters)[cluster]
     corner = geometry.position[geometry.triangle[triangle]]
     centre, radius, axis, spread = _bounds(corner, geometry.face_normal[triangle], two_sided, first)
+    row = np.zeros((len(triangle), ROW_LENGTH), np.float32)
+    row[:, CORNER : CORNER + 9] = corner.reshape(-1, 9)
+    row[:, NORMAL : NORMAL + 3] = geometry.face_normal[triangle]
+    row[:, AREA] = geometry.area[triangle]
+    row[:, TWO_SIDED] = two_sided
+    row[:, SHARE] = share
+    row[:, CUMULATIVE] = np.maximum(cumulative, 0)
+    row[:, CLUSTER] = cluster
+    row[:, RADIANCE : RADIANCE + 3] = shading.emission[geometry.material[triangle]]
+    row[:, TEXTURED] = shading.emission_texture[geometry.material[triangle]] >= 0
     return Emitters(
-        triangle=triangle.astype(np.int32),
-        corner=np.ascontiguousarray(corner.reshape(-1, 9), np.float32),
-        normal=geometry.face_normal[triangle],
-        area=geometry.area[triangle],
-        two_sided=two_sided,
-        share=share.astype(np.float32),
-        cumulative=np.maximum(cumulative, 0).astype(np.float32),
-        cluster=cluster,
-        first=first,
-        centre=centre,
-        radius=radius,
-        power=cluster_power.astype(np.float32),
-        axis=axis,
-        spread=spread,
+        row, triangle.astype(np.int32), first, centre, radius, cluster_power.astype(np.float32), axis, spread
     )
 
 

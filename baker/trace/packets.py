@@ -40,38 +40,33 @@ def call_embree(typing_context, address, valid, scene, ray, arguments):  # type:
 
 
 @njit(cache=True, nogil=True)
-def new_packet():  # type: ignore[no-untyped-def]
+def new_packet(width):  # type: ignore[no-untyped-def]
     """Return memory for a packet: valid (16,) int32, floats (21 * 16,) float32 and its integer view.
 
-    All three start at multiples of 64 bytes, as Embree wants. Time, mask and flags are set once.
+    All start at multiples of 64 bytes, as Embree wants. What no kernel changes is set here: time 0,
+    all bits of the mask, tnear 0.
     """
     raw = np.zeros((ROWS * MAX_WIDTH + MAX_WIDTH) * 4 + 64, np.uint8)
     start = (64 - raw.ctypes.data % 64) % 64
     valid = raw[start : start + MAX_WIDTH * 4].view(np.int32)
     body = raw[start + MAX_WIDTH * 4 : start + (ROWS + 1) * MAX_WIDTH * 4]
-    return valid, body.view(np.float32), body.view(np.uint32)
+    words = body.view(np.uint32)
+    for lane in range(width):
+        words[MASK * width + lane] = np.uint32(0xFFFFFFFF)
+    return valid, body.view(np.float32), words
 
 
 @njit(cache=True, nogil=True, inline="always")
-def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tnear, tfar):  # type: ignore[no-untyped-def]
+def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ignore[no-untyped-def]
     """Write one ray into a lane of the packet."""
     floats[ORG_X * width + lane] = x
     floats[ORG_Y * width + lane] = y
     floats[ORG_Z * width + lane] = z
-    floats[TNEAR * width + lane] = tnear
     floats[DIR_X * width + lane] = dx
     floats[DIR_Y * width + lane] = dy
     floats[DIR_Z * width + lane] = dz
-    floats[TIME * width + lane] = 0.0
     floats[TFAR * width + lane] = tfar
-    words[MASK * width + lane] = np.uint32(0xFFFFFFFF)
-    words[ID * width + lane] = np.uint32(0)
-    words[FLAGS * width + lane] = np.uint32(0)
-    words[PRIM_ID * width + lane] = np.uint32(0xFFFFFFFF)
     words[GEOM_ID * width + lane] = np.uint32(0xFFFFFFFF)
-    # instID and instPrimID, one level each
-    words[19 * width + lane] = np.uint32(0xFFFFFFFF)
-    words[20 * width + lane] = np.uint32(0xFFFFFFFF)
 
 
 @njit(cache=True, nogil=True, inline="always")
