@@ -8,6 +8,7 @@ Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Sta
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -55,12 +56,17 @@ def encode_exr(
     """
     if pixels.ndim != 3 or pixels.shape[2] not in _NAMES or 0 in pixels.shape:
         raise ValueError(f"pixels of shape {pixels.shape} are neither (H, W, 1) nor (H, W, 3)")
-    if np.isnan(pixels).any():
+    # One look at the extremes (NaN shows in them) is all that most pages need.
+    low, high = float(pixels.min()), float(pixels.max())
+    if math.isnan(low) or math.isnan(high):
         count = int(np.isnan(pixels).any(axis=2).sum())
         raise ValueError(f"{count} texels are not a number; {path.name} is not written")
     top = HALF_MAX if half else float(np.finfo(np.float32).max)
-    clipped = int((np.abs(pixels) > top).any(axis=2).sum())
-    stored = np.clip(pixels, -top, top).astype(np.float16 if half else np.float32)
+    clipped = 0
+    if low < -top or high > top:
+        clipped = int((np.abs(pixels) > top).any(axis=2).sum())
+        pixels = np.clip(pixels, -top, top)
+    stored = pixels.astype(np.float16 if half else np.float32)
     _write(path, stored, dict(header or {}))
     return clipped
 
