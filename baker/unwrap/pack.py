@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from baker.core.progress import Progress, report
 
 STAGE = "unwrap"
-# Items placed between two looks at the cancel flag.
-_CHUNK = 512
+# Items times texels of the page to place between two looks at the cancel flag: well under a second.
+_CHUNK_WORK = 1 << 29
 
 
 @dataclass(frozen=True)
@@ -124,9 +124,10 @@ def pack(
     order = np.lexsort((np.arange(len(item_shape)), item_shape, -n_columns[item_shape], -n_rows[item_shape]))
     lowest = np.full(len(n_rows), margin, np.int64)
     placed = 0
-    for start in range(0, len(order), _CHUNK):
+    step = max(16, _CHUNK_WORK // resolution**2)
+    for start in range(0, len(order), step):
         report(progress, STAGE, fraction)
-        chunk = order[start : start + _CHUNK]
+        chunk = order[start : start + step]
         count = place(
             next_used, next_free, chunk, item_shape, first_row, low, high, gap, margin, lowest, position
         )

@@ -244,7 +244,7 @@ def _too_many_charts(packer: _Packer, names: list[str], instance: NDArray[np.int
     count = first[instance + 1] - first[instance]
     if len(instance) > 1:
         return InputError(
-            f"the scene's {int(count.sum())} charts do not fit pages of {packer.page[0]} texels; raise --resolution"
+            f"{int(count.sum())} charts do not fit pages of {packer.page[0]} texels; raise --resolution"
         )
     name = names[int(instance[0])]
     return InputError(

@@ -141,7 +141,7 @@ def _true_to_size(
     length2 = np.einsum("tkx,tkx->tk", edge, edge)
 
     def sums(value: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.bincount(chart, weights=value.sum(axis=1), minlength=n_charts)
+        return np.bincount(chart, weights=value.sum(axis=1), minlength=n_charts).astype(np.float64)
 
     pp, pq, qq = sums(p * p), sums(p * q), sums(q * q)
     pl, ql = sums(p * length2), sums(q * length2)
@@ -161,7 +161,7 @@ def _true_to_size(
     )
     real = np.bincount(chart, weights=area, minlength=n_charts)
     factor = np.sqrt(np.divide(real, flat, out=np.zeros(n_charts), where=flat > 0))
-    return np.asarray(uv * factor[chart][:, None, None])
+    return np.asarray(uv * factor[chart][:, None, None], dtype=np.float64)
 
 
 def _drop_flat(
