@@ -77,16 +77,17 @@ def chart_meshes(
     answers = run_jobs(jobs, threads, progress, until)
     uv = [np.zeros((len(w.triangle), 3, 2)) for w in welded]
     chart = [np.full(len(w.triangle), -1, np.int64) for w in welded]
+    base = 0
     for answer, pieces in zip(answers, origin, strict=True):
+        # A job's charts are numbered over all its pieces; a base keeps jobs apart.
+        number = np.where(answer.chart >= 0, answer.chart.astype(np.int64) + base, -1)
+        base = int(number.max(initial=base - 1)) + 1
         row = 0
         for mesh, face in pieces:
             rows = slice(row, row + len(face))
             row += len(face)
             uv[mesh][face] = answer.uv[rows]
-            # Charts never span parts, so an offset by the first face keeps numbers of jobs apart.
-            offset = int(chart[mesh].max(initial=-1)) + 1
-            found = answer.chart[rows]
-            chart[mesh][face] = np.where(found >= 0, number_by_first(found) + offset, -1)
+            chart[mesh][face] = number[rows]
     return [
         _finish(triangle, w, FlatCharts(u, number_by_first(c)))
         for (_, triangle), w, u, c in zip(meshes, welded, uv, chart, strict=True)
