@@ -112,7 +112,7 @@ def bake(
     if folder is not None:
         from baker.io.output import check_out
 
-        check_out(folder, force=force)
+        check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record = Record(progress)
     try:
         with record.stage("load"):
@@ -130,8 +130,8 @@ def bake(
             from baker.io.output import write_bake
 
             with record.stage("write"):
-                write_bake(result, folder, force=force)
-            result = replace(result, out=folder)
+                manifest = write_bake(result, folder, force=force, progress=progress)
+            result = replace(result, out=folder, manifest=manifest)
     except MemoryError:
         raise ResourceError("memory ran out; lower --resolution or --samples, or bake fewer objects") from None
     return result
@@ -283,7 +283,7 @@ def _reflected(
         # Direct light meets the albedo of its own texel; the sky's share is known per patch.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
         solution = solve_radiosity(
-            matrix, source, albedo, bounces=settings.bounces, progress=record.progress
+            matrix, source, albedo, patches.area, bounces=settings.bounces, progress=record.progress
         )
         record.solve.update(
             patches=patches.n,

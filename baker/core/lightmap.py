@@ -61,6 +61,8 @@ class BakeResult:
     denoise : dict, what the denoiser was and did (empty if none ran)
     out : Path or None
         The folder written, if any.
+    manifest : dict
+        What `bake.json` in that folder says.
     """
 
     scene: Scene
@@ -76,3 +78,4 @@ class BakeResult:
     denoise: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[SceneWarning, ...] = ()
     out: Path | None = None
+    manifest: dict[str, Any] = field(default_factory=dict)

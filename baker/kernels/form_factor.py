@@ -1,4 +1,4 @@
-"""Form factors of patches by cosine-weighted rays, and the sweeps that solve with them.
+"""Form factors of patches by cosine-weighted rays, and products with their matrix.
 
     F_ij = share of what leaves patch i that arrives at j = share of i's cosine rays that hit j
 
@@ -116,48 +116,19 @@ def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, nogil=True)
-def jacobi_step(first, column, value, source, exitance, albedo, irradiance):  # type: ignore[no-untyped-def]
-    """Write irradiance = F (source + albedo * irradiance_before), `exitance` being that bracket."""
+def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-untyped-def]
+    """Write irradiance = F exitance, both (P, 3) float64."""
     for i in range(len(first) - 1):
-        for c in range(3):
-            exitance[i, c] = source[i, c] + albedo[i, c] * irradiance[i, c]
-    for i in range(len(first) - 1):
-        a = b = c3 = 0.0
+        red = green = blue = 0.0
         for k in range(first[i], first[i + 1]):
             j = column[k]
             f = value[k]
-            a += f * exitance[j, 0]
-            b += f * exitance[j, 1]
-            c3 += f * exitance[j, 2]
-        irradiance[i, 0] = a
-        irradiance[i, 1] = b
-        irradiance[i, 2] = c3
-
-
-@njit(cache=True, nogil=True)
-def gauss_seidel_step(first, column, value, albedo, exitance, irradiance):  # type: ignore[no-untyped-def]
-    """Sweep E_i = sum_j F_ij M_j once, in place; return the sum of squared changes and of squares of E.
-
-    exitance : (P, 3) float64 = source + albedo * irradiance, kept up to date
-    """
-    change = 0.0
-    size = 0.0
-    for i in range(len(first) - 1):
-        a = b = c3 = 0.0
-        for k in range(first[i], first[i + 1]):
-            j = column[k]
-            f = value[k]
-            a += f * exitance[j, 0]
-            b += f * exitance[j, 1]
-            c3 += f * exitance[j, 2]
-        for c in range(3):
-            new = a if c == 0 else (b if c == 1 else c3)
-            step = new - irradiance[i, c]
-            change += step * step
-            size += new * new
-            irradiance[i, c] = new
-            exitance[i, c] += albedo[i, c] * step
-    return change, size
+            red += f * exitance[j, 0]
+            green += f * exitance[j, 1]
+            blue += f * exitance[j, 2]
+        irradiance[i, 0] = red
+        irradiance[i, 1] = green
+        irradiance[i, 2] = blue
 
 
 @njit(cache=True, nogil=True)
