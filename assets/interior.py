@@ -22,7 +22,7 @@ def make_interior() -> GlbBuilder:
     _living_room(glb)
     _study(glb)
     glb.light("sun", "directional", 20000.0, colour=(1.0, 0.93, 0.82), towards=(0.72, -0.62, 0.31))
-    glb.camera((4.7, 1.55, 3.7), (0.6, 0.9, 0.9), 60.0)
+    glb.camera((4.4, 1.6, 3.75), (0.9, 0.85, 0.9), 60.0)
     return glb
 
 
