@@ -27,7 +27,6 @@ def main() -> None:
     try:
         out = _reserve_stdout() if _asks_json(argv) else sys.stdout
         code = run(argv, out=out, stop=stop, notes=notes)
-        out.flush()
     except KeyboardInterrupt:
         code = INTERRUPTED
     _leave(code)
@@ -54,9 +53,11 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         session = Session(out=out, notes=notes)
         if stop is not None:
             session.stop = stop
-        return _dispatch(argv, session)
-    except SystemExit:
-        # typer's answer to a broken pipe: the reader (`| head`) has seen enough.
+        code = _dispatch(argv, session)
+        out.flush()
+        return code
+    except (SystemExit, BrokenPipeError):
+        # The reader (`| head`) has seen enough; typer makes an exit of the broken pipe.
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -100,8 +101,11 @@ def _silence(stream: TextIO) -> None:
 
 
 def _leave(code: int) -> None:
-    if code == INTERRUPTED:
-        # A normal exit would wait for kernels still running in worker threads.
-        sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
+    # Not sys.exit: it takes half a second to free compiled code and arrays one by one, and after an
+    # interruption it would wait for kernels that still run in worker threads.
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            continue  # nobody is left to tell
+    os._exit(code)

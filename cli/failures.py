@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import sys
@@ -84,7 +85,9 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
             "file": known.file,
             "object": known.object,
         }
-        out.write(json.dumps({"error": body}) + "\n")
+        with contextlib.suppress(OSError):  # standard output may be what failed
+            out.write(json.dumps({"error": body}) + "\n")
+            out.flush()
     return known.exit_code
 
 

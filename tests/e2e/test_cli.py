@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -326,3 +327,15 @@ def test_json_stdout_is_kept_clean_of_what_libraries_print():
     )
     assert json.loads(done.stdout) == {"kind": "x"}
     assert b"library noise" in done.stderr
+
+
+def test_full_or_closed_standard_output_is_no_traceback():
+    version = [sys.executable, "-m", "baker.cli", "--version"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(version, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 4
+    assert done.stderr == "baker: the disk is full; free some space, or write elsewhere with -o\n"
+    with subprocess.Popen(version, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as closed:
+        closed.stdout.close()
+        assert closed.stderr.read() == ""
+    assert closed.returncode == 0
