@@ -1,0 +1,127 @@
+"""Scenes of a few rectangles whose lightmap uv is known, ready to be traced stage by stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.geometry import world_geometry
+from baker.core.progress import silent
+from baker.core.scene import Instance, Material, Mesh, Scene
+from baker.lights.emissive import build_emitters
+from baker.radiosity.hit_table import build_hit_table
+from baker.radiosity.materials import resolve_materials
+from baker.radiosity.texels import build_texels
+from baker.trace.embree import RayScene
+
+
+@dataclass(frozen=True)
+class Quad:
+    """A rectangle from `corner` along two edges; its front is towards edge_u x edge_v."""
+
+    corner: tuple[float, float, float]
+    edge_u: tuple[float, float, float]
+    edge_v: tuple[float, float, float]
+    material: Material = field(default_factory=lambda: Material(base_colour=(0.5, 0.5, 0.5, 1.0)))
+    colour: Any = None
+
+
+@dataclass(frozen=True)
+class World:
+    """What `baker.pipeline.prepare` makes, without masks."""
+
+    scene: Any
+    atlas: Any
+    geometry: Any
+    shading: Any
+    texels: Any
+    surface: Any
+    rays: Any
+    emitters: Any
+    table: Any
+
+    @property
+    def free(self):
+        """Masks that say that no point is buried."""
+        return np.full(self.texels.n, 0xFFFF, np.uint16)
+
+
+def grey(albedo=0.5, emission=0.0, double_sided=False):
+    return Material(
+        base_colour=(albedo, albedo, albedo, 1.0), emission=(emission,) * 3, double_sided=double_sided
+    )
+
+
+def quad_scene(quads):
+    meshes, instances = [], []
+    square = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
+    for k, quad in enumerate(quads):
+        u, v = np.array(quad.edge_u), np.array(quad.edge_v)
+        normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
+        zero, row = np.zeros(2, np.int32), np.arange(4, dtype=np.int32)
+        meshes.append(
+            Mesh(
+                f"quad {k}",
+                np.float32(np.array(quad.corner) + square[:, :1] * u + square[:, 1:] * v),
+                np.float32(np.tile(normal, (4, 1))),
+                np.int32([[0, 1, 2], [0, 2, 3]]),
+                zero + np.int32(k),
+                zero,
+                np.zeros(4, np.int32),
+                row,
+                (square, None),
+                None if quad.colour is None else np.float32(quad.colour),
+            )
+        )
+        instances.append(Instance(k, f"quad {k}", k, np.eye(4)))
+    return Scene("tiny", None, tuple(meshes), tuple(q.material for q in quads), tuple(instances))
+
+
+def quad_atlas(scene, size, inset=0.0):
+    """Put each quad into its own cell of a square grid, `inset` texels away from the cell's border."""
+    side = int(np.ceil(np.sqrt(len(scene.instances))))
+    cell = size // side
+    layouts = []
+    for k, instance in enumerate(scene.instances):
+        base = np.array([k % side, k // side]) * cell
+        uv = (base + inset + scene.meshes[instance.mesh].texcoord[0] * (cell - 1 - 2 * inset)) / size
+        mesh = scene.meshes[instance.mesh]
+        row = np.arange(4, dtype=np.int32)
+        chart = np.full(2, k, np.int32)
+        layouts.append(InstanceLayout(k, 0, row, np.float32(uv), mesh.triangle, chart, True, float(cell)))
+    return Atlas(size, 1, tuple(layouts), len(layouts), 1)
+
+
+def quad_world(quads, size=16, inset=0.0):
+    scene = quad_scene(quads)
+    return world_of(scene, quad_atlas(scene, size, inset))
+
+
+def world_of(scene, atlas):
+    geometry = world_geometry(scene, atlas)
+    shading = resolve_materials(scene, geometry)
+    texels, surface = build_texels(geometry, shading, atlas, seed=0, threads=1, progress=silent)
+    rays = RayScene(geometry.position, geometry.triangle, threads=1)
+    emitters = build_emitters(geometry, shading)
+    table = build_hit_table(geometry, texels, emitters)
+    return World(scene, atlas, geometry, shading, texels, surface, rays, emitters, table)
+
+
+def box_quads(low, high, *, inward, material=None):
+    """Six rectangles of an axis-aligned box, fronts inwards (a room) or outwards (a crate)."""
+    low, high = np.array(low, float), np.array(high, float)
+    quads = []
+    for axis in range(3):
+        u, v = np.zeros(3), np.zeros(3)
+        u[(axis + 1) % 3] = (high - low)[(axis + 1) % 3]
+        v[(axis + 2) % 3] = (high - low)[(axis + 2) % 3]
+        for side in (0, 1):
+            corner = low.copy()
+            corner[axis] = (low, high)[side][axis]
+            # u x v is +axis: outwards at the high side.
+            a, b = (u, v) if (side == 1) != inward else (v, u)
+            quads.append(Quad(tuple(corner), tuple(a), tuple(b), material or grey()))
+    return quads
