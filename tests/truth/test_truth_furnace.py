@@ -1,0 +1,107 @@
+"""Furnaces: where everything glows, E = pi L / (1 - rho) everywhere; under an even sky, E = pi L."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import SceneBuilder, icosphere
+from ztest import assert_unbiased
+
+SEEDS = 6
+
+
+def furnace_box(albedo, size=64, texels=12):
+    builder = SceneBuilder(size)
+    quads = builder.box((0, 0, 0), (1, 2, 3), builder.material(albedo, 1.0), texels, inward=True)
+    return builder, list(quads.values())
+
+
+def covered(result, channel="irradiance"):
+    """Return (n, C) of all texels that lie on a surface."""
+    return result.lightmaps[channel].value[result.status == 1].astype(np.float64)
+
+
+@pytest.mark.parametrize("denoise", [False, True])
+@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.8, 0.95])
+def test_closed_box_glows_everywhere_alike(albedo, denoise):
+    builder, quads = furnace_box(albedo)
+    truth = np.pi / (1 - albedo)
+    means = []
+    for seed in range(SEEDS):
+        result = builder.bake(seed=seed, denoise=denoise)
+        value = np.concatenate([q.values(result).reshape(-1, 3) for q in quads])
+        assert len(value) == 6 * 144
+        means.append(value.mean())
+        # Noise of 64 rays a texel: the emitters' half of the estimate has under 2 % (the rest is even).
+        assert value.std() < 0.02 * truth
+        assert np.abs(value - truth).max() < 0.12 * truth
+        # The three colours see the same rays; the denoiser, a network, tints single texels at chart corners.
+        tint = np.ptp(value, axis=1) / value.mean(axis=1)
+        assert np.median(tint) < (0.003 if denoise else 1e-6)
+        assert tint.max() < (0.08 if denoise else 1e-5)
+    # 0.5 % of the truth: the direct light of all patches shares no sample, so six bakes average well.
+    assert_unbiased(means, truth, least=0.005)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_inward_sphere_glows_everywhere_alike(smooth):
+    corner = icosphere(1, inward=True)
+    means = []
+    for seed in range(SEEDS):
+        builder = SceneBuilder(128)
+        builder.triangles(corner, builder.material(0.5, 1.0), 4, normal=-corner if smooth else None)
+        result = builder.bake(seed=seed)
+        value = covered(result) / (2 * np.pi)
+        means.append(value.mean())
+        assert value.std() < 0.03
+    # Smooth normals lean from the faces by up to 20 degrees; a hemisphere about them still sees only walls.
+    assert_unbiased(means, 1.0, least=0.005)
+
+
+def test_coloured_furnace_keeps_colours_apart():
+    albedo, glow = np.array([0.2, 0.5, 0.8]), np.array([3.0, 0.0, 1.0])
+    means = []
+    for seed in range(SEEDS):
+        builder = SceneBuilder(64)
+        quads = builder.box((0, 0, 0), (1, 1, 1), builder.material(albedo, glow), 12, inward=True)
+        result = builder.bake(seed=seed)
+        means.append(np.mean([q.values(result).mean(axis=(0, 1)) for q in quads.values()], axis=0))
+    assert_unbiased(means, np.pi * glow / (1 - albedo), least=0.005)
+
+
+@pytest.mark.parametrize("shape", ["box", "sphere"])
+def test_convex_body_under_an_even_sky(shape):
+    sky = (0.5, 1.0, 2.0)
+    builder = SceneBuilder(128)
+    material = builder.material(0.7)
+    if shape == "box":
+        builder.box((-1, -1, -1), (1, 2, 3), material, 12)
+    else:
+        builder.triangles(icosphere(2), material, 4)
+    result = builder.bake(sky="0.5,1,2", channels=["irradiance", "ao"], ao_distance="inf")
+    # Every ray of every texel leaves the scene: there is no noise, only float32 sums of 64 terms.
+    assert np.allclose(covered(result), np.pi * np.array(sky), rtol=2e-6)
+    assert (covered(result, "ao") == 1.0).all()
+
+
+def test_sky_over_a_floor_beside_a_wall_is_half_hidden():
+    builder = SceneBuilder(64)
+    black = builder.material(0.0)
+    # The wall is 2000 times as high and wide as the floor's farthest texel is away from it.
+    builder.quad((0, -2000, -2000), (0, 4000, 0), (0, 0, 4000), black, (8, 8))
+    floor = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), black, (16, 16))
+    assert floor.normal @ [0, 1, 0] == 1
+    values = [floor.values(builder.bake(seed=seed, sky="1", samples=64))[..., 0] for seed in range(4)]
+    assert_unbiased([v.mean() for v in values], np.pi / 2, least=0.002)
+    # Which rays go left is decided by one stratified coordinate: no texel is off by more than a stratum or two.
+    assert np.abs(np.array(values) - np.pi / 2).max() < np.pi / 8
+
+
+def test_sky_light_bounces_once_from_a_wall():
+    """A floor beside an endless white wall: half sky, half wall; the wall itself sees half a sky above
+    the floor's level only if the floor is endless: here it is a speck, so the wall has E = pi."""
+    builder = SceneBuilder(64)
+    builder.quad((0, -2000, -2000), (0, 4000, 0), (0, 0, 4000), builder.material(0.6), (8, 8))
+    speck = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))
+    means = [speck.values(builder.bake(seed=seed, sky="1"))[..., 0].mean() for seed in range(SEEDS)]
+    assert_unbiased(means, np.pi * (0.5 + 0.5 * 0.6), least=0.002)
