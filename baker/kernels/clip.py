@@ -90,9 +90,7 @@ def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]
     )
-    if twice == 0.0:
-        return 1
-    inside = True
+    inside = twice != 0.0
     for i in range(3):
         j = i + 1 if i < 2 else 0
         # Inward normal of the edge and its value at the nearest and the farthest corner of the square.
@@ -103,6 +101,9 @@ def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
             ny = -ny
         base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
         if base + max(nx, 0.0) + max(ny, 0.0) < 0.0:
+            return 0
+        # A triangle without area has no inner side: it touches what its line passes through.
+        if twice == 0.0 and base + min(nx, 0.0) + min(ny, 0.0) > 0.0:
             return 0
         if base + min(nx, 0.0) + min(ny, 0.0) < 0.0:
             inside = False
