@@ -1,7 +1,7 @@
 """The stages of a bake, in order; the only place that wires them together.
 
-    scene -> atlas -> texels -> buried points -> direct light -> patches -> form factors -> solve
-          -> final gather -> finished pages -> output folder
+scene -> atlas -> texels -> buried points -> direct light -> patches -> form factors -> solve
+-> final gather -> finished pages -> output folder
 """
 
 from __future__ import annotations
@@ -133,7 +133,9 @@ def bake(
                 manifest = write_bake(result, folder, force=force, progress=progress)
             result = replace(result, out=folder, manifest=manifest)
     except MemoryError:
-        raise ResourceError("memory ran out; lower --resolution or --samples, or bake fewer objects") from None
+        raise ResourceError(
+            "memory ran out; lower --resolution or --samples, or bake fewer objects"
+        ) from None
     return result
 
 
@@ -201,7 +203,9 @@ def trace_transport(
     return transport
 
 
-def _light(scene: Scene, world: World, settings: BakeSettings, ao_distance: float, record: Record) -> Transport:
+def _light(
+    scene: Scene, world: World, settings: BakeSettings, ao_distance: float, record: Record
+) -> Transport:
     """Direct light, radiosity and final gather."""
     threads, seed, progress = thread_count(settings.threads), settings.seed, record.progress
     n_samples = settings.hemisphere_samples
@@ -321,7 +325,9 @@ def _finish(
     with record.stage("finish"):
         for name, channel in channels.items():
             layers = channel.layers(transport)
-            value = np.zeros((atlas.n_pages, atlas.resolution, atlas.resolution, channel.components), np.float32)
+            value = np.zeros(
+                (atlas.n_pages, atlas.resolution, atlas.resolution, channel.components), np.float32
+            )
             images = [(texels.page_image(part.value), texels.page_image(part.error)) for part in layers]
             for page in range(atlas.n_pages):
                 plan = PagePlan(chart[page], valid[page], centroid[page])

@@ -1,6 +1,6 @@
 """Ambient occlusion: the cosine-weighted share of the hemisphere that is open within a distance.
 
-    AO = 1/pi integral over the hemisphere of V(w, r) cos(theta) dw        1 = open, 0 = closed
+AO = 1/pi integral over the hemisphere of V(w, r) cos(theta) dw        1 = open, 0 = closed
 """
 
 from __future__ import annotations

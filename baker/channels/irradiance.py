@@ -1,6 +1,6 @@
 """Irradiance: all light that arrives at the surface, direct and indirect, in lux.
 
-    E = E_direct + E_sky + E_indirect        (without the receiver's own albedo)
+E = E_direct + E_sky + E_indirect        (without the receiver's own albedo)
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from itertools import islice
 
 from baker.core.progress import Progress, report
 
@@ -60,7 +61,7 @@ def run_tiles(
     pool = ThreadPoolExecutor(max_workers=threads)
     running: dict[Future[object], int] = {}
     try:
-        for begin, end in (s for s, _ in zip(waiting, range(2 * threads), strict=False)):
+        for begin, end in islice(waiting, 2 * threads):
             running[pool.submit(work, begin, end)] = end - begin
         while running:
             finished, _ = wait(running, timeout=_LOOK, return_when=FIRST_COMPLETED)

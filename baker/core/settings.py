@@ -31,13 +31,21 @@ class BakeSettings(BaseModel):
     quality: Literal["preview", "medium", "high", "ultra"] = Field(
         "medium", description="Preset of samples: preview 16, medium 64, high 256, ultra 1024."
     )
-    samples: int | None = Field(None, ge=1, le=65536, description="Hemisphere rays per texel; default by quality.")
-    light_samples: int | None = Field(None, ge=1, le=65536, description="Shadow rays per texel; default: samples.")
+    samples: int | None = Field(
+        None, ge=1, le=65536, description="Hemisphere rays per texel; default by quality."
+    )
+    light_samples: int | None = Field(
+        None, ge=1, le=65536, description="Shadow rays per texel; default: samples."
+    )
     ao_samples: int | None = Field(None, ge=1, le=65536, description="AO rays per texel; default: samples.")
-    ao_distance: str = Field("10%", description="Reach of AO: metres, `10%` of the scene's diagonal, or `inf`.")
+    ao_distance: str = Field(
+        "10%", description="Reach of AO: metres, `10%` of the scene's diagonal, or `inf`."
+    )
     sky: str | None = Field(None, description="Sky radiance R,G,B in cd/m2.")
     sky_strength: float = Field(1.0, ge=0, description="Factor on the sky.")
-    bounces: int | None = Field(None, ge=0, le=1000, description="Reflections of light; default: until converged.")
+    bounces: int | None = Field(
+        None, ge=0, le=1000, description="Reflections of light; default: until converged."
+    )
     denoise: bool = Field(True, description="Denoise with Open Image Denoise.")
     dtype: Literal["half", "float"] = Field("half", description="Number format of the EXR files.")
     up: Literal["y", "z"] = Field("y", description="Up axis of OBJ, PLY, STL and OFF files.")
@@ -66,7 +74,9 @@ class BakeSettings(BaseModel):
         except ValueError:
             reach = -1.0
         if not reach > 0:
-            raise SettingsError(f"ao_distance '{self.ao_distance}' is not a positive number of metres, a percentage or inf")
+            raise SettingsError(
+                f"ao_distance '{self.ao_distance}' is not a positive number of metres, a percentage or inf"
+            )
         return reach
 
 

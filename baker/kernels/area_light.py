@@ -18,19 +18,15 @@ from baker.kernels.emitters import (
     RADIANCE,
     TEXTURED,
     TWO_SIDED,
-    bounding_sphere,
-    cluster_chances,
     emitted_radiance,
     emitter_density,
     sample_emitter,
-)
-from baker.kernels.hits import front_facing
-from baker.kernels.rays import FAR, aim_texel, lane_seeds
-from baker.kernels.sampling import texel_scramble
-from baker.kernels.surface import N_POINTS, drop_buried, place_points
-from baker.trace.packets import (
-    DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_packet, set_ray, trace,
 )  # fmt: skip
+from baker.kernels.hits import front_facing
+from baker.kernels.rays import lane_seeds
+from baker.kernels.sampling import texel_scramble
+from baker.kernels.surface import N_POINTS
+from baker.trace.packets import TFAR, set_ray, trace
 
 _f = np.float32
 _INV_PI = 1.0 / math.pi
@@ -45,53 +41,41 @@ def mis_weighted(radiance, cosine, density, n_light, n_hemisphere):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, shared, hemisphere, out, second):  # type: ignore[no-untyped-def]
-    """Add the light-sampled share of irradiance of entries begin to end.
+def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, out, second):  # type: ignore[no-untyped-def]
+    """Add the light-sampled share of irradiance of texels.
 
+    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
     net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
     hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
     out : (n_entries, 6) float32, lx: two differently weighted estimates of RGB
-    second : (n_entries,) float32, mean square over 16 batches of the first estimate's sum
+    second : (n_entries,) float32, sum over 16 batches of the square of the first estimate's share
     """
     n_samples = len(net)
-    width, scene, occluded, intersect = tracer.width, tracer.scene, tracer.occluded, tracer.intersect
-    lamp = emitters.row
-    valid, floats, words = new_packet(width)
-    n = end - begin
-    origin = np.zeros((n, N_POINTS, 3), np.float32)
-    normal = np.zeros((n, N_POINTS, 3), np.float32)
-    hit = np.zeros((n, N_POINTS), np.int32)
-    bary = np.zeros((n, N_POINTS, 2), np.float32)
-    place_points(surface, begin, end, origin, normal, hit, bary)
-    drop_buried(mask, begin, end, origin, normal)
-    chance = np.zeros(len(emitters.power), np.float32)
-    cumulative = np.zeros(len(emitters.power), np.float32)
-    x, y, z, radius = bounding_sphere(origin.reshape(n * N_POINTS, 3), 0, n * N_POINTS)
-    if not cluster_chances(emitters, x, y, z, radius, chance, cumulative):
-        return
+    width, scene, occluded = caster.width, caster.scene, caster.occluded
+    valid, floats, words = caster.valid, caster.floats, caster.words
+    row, first, triangle = lamps.row, lamps.first, lamps.triangle
+    chance, cumulative = lamps.chance, lamps.cumulative
     point = np.zeros(3, np.float32)
-    lamp_first = emitters.first
     radiance = np.zeros(4)
     value = np.zeros((width, 6))
     batch = np.zeros((width, N_POINTS))
     total = np.zeros((width, 6))
     seeds = np.zeros((width, 2), np.uint32)
-    for group in range(0, n, width):
-        lanes = min(width, n - group)
+    for group in range(0, len(origin), width):
+        lanes = min(width, len(origin) - group)
         total[:] = 0.0
         batch[:] = 0.0
+        valid[:] = 0
         lane_seeds(begin + group, lanes, 15, seeds)
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             any_lane = False
-            for lane in range(width):
+            for lane in range(lanes):
                 valid[lane] = 0
-                if lane >= lanes:
-                    continue
                 i = group + lane
                 u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
                 v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
-                m, density, b1, b2 = sample_emitter(lamp, lamp_first, chance, cumulative, u, v, point)
+                m, density, b1, b2 = sample_emitter(row, first, chance, cumulative, u, v, point)
                 ox, oy, oz = origin[i, k, 0], origin[i, k, 1], origin[i, k, 2]
                 dx, dy, dz = point[0] - ox, point[1] - oy, point[2] - oz
                 square = dx * dx + dy * dy + dz * dz
@@ -99,19 +83,21 @@ def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, sha
                     continue
                 length = math.sqrt(square)
                 cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / length
-                light = -(dx * lamp[m, NORMAL] + dy * lamp[m, NORMAL + 1] + dz * lamp[m, NORMAL + 2]) / length
-                if lamp[m, TWO_SIDED] > _f(0.0):
+                light = -(dx * row[m, NORMAL] + dy * row[m, NORMAL + 1] + dz * row[m, NORMAL + 2]) / length
+                if row[m, TWO_SIDED] > _f(0.0):
                     light = abs(light)
                 if cosine <= _f(0.0) or light <= _f(1.0e-6):
                     continue
                 for c in range(3):
-                    radiance[c] = lamp[m, RADIANCE + c]
-                if lamp[m, TEXTURED] > _f(0.0):
-                    emitted_radiance(shading, surface.triangle, emitters.triangle[m], b1, b2, radiance)
+                    radiance[c] = row[m, RADIANCE + c]
+                if row[m, TEXTURED] > _f(0.0):
+                    emitted_radiance(shading, triangle[m], b1, b2, radiance)
                 steradian = density * square / light
                 for c in range(3):
                     value[lane, c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[0])
-                    value[lane, 3 + c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[1])
+                    value[lane, 3 + c] = mis_weighted(
+                        radiance[c], cosine, steradian, n_samples, hemisphere[1]
+                    )
                 set_ray(floats, words, width, lane, ox, oy, oz, dx, dy, dz, _SHORT)
                 valid[lane] = -1
                 any_lane = True
@@ -133,68 +119,9 @@ def light_samples(surface, mask, emitters, shading, tracer, begin, end, net, sha
 
 
 @njit(cache=True, nogil=True)
-def hemisphere_hits(surface, mask, table, emitters, shading, tracer, begin, end, net, shared, n_light, out):  # type: ignore[no-untyped-def]
-    """Add to out[:, 3:6] the share of irradiance that cosine-weighted rays find at emitters.
-
-    The other half of `light_samples`'s second estimate; n_light is its number of shadow rays.
-    """
-    n_samples = len(net)
-    width, scene, occluded, intersect = tracer.width, tracer.scene, tracer.occluded, tracer.intersect
-    lamp = emitters.row
-    valid, floats, words = new_packet(width)
-    n = end - begin
-    origin = np.zeros((n, N_POINTS, 3), np.float32)
-    normal = np.zeros((n, N_POINTS, 3), np.float32)
-    hit = np.zeros((n, N_POINTS), np.int32)
-    bary = np.zeros((n, N_POINTS, 2), np.float32)
-    place_points(surface, begin, end, origin, normal, hit, bary)
-    drop_buried(mask, begin, end, origin, normal)
-    chance = np.zeros(len(emitters.power), np.float32)
-    cumulative = np.zeros(len(emitters.power), np.float32)
-    x, y, z, radius = bounding_sphere(origin.reshape(n * N_POINTS, 3), 0, n * N_POINTS)
-    cluster_chances(emitters, x, y, z, radius, chance, cumulative)
-    radiance = np.zeros(4)
-    seeds = np.zeros((width, 2), np.uint32)
-    row = table.row
-    for group in range(0, n, width):
-        lanes = min(width, n - group)
-        lane_seeds(begin + group, lanes, 20, seeds)
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
-        for s in range(n_samples):
-            k = s * N_POINTS // n_samples
-            for lane in range(lanes):
-                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
-                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, FAR)
-            trace(intersect, scene, valid, floats)
-            for lane in range(lanes):
-                if words[GEOM_ID * width + lane] == NO_HIT:
-                    continue
-                prim = np.int64(words[PRIM_ID * width + lane])
-                m = np.int64(row[prim, 12])
-                if m < 0:
-                    continue
-                i = group + lane
-                weight = emitter_hit(
-                    row, lamp, chance, cumulative, prim, m, floats[DIR_X * width + lane],
-                    floats[DIR_Y * width + lane], floats[DIR_Z * width + lane], normal[i, k, 0], normal[i, k, 1],
-                    normal[i, k, 2], floats[TFAR * width + lane], n_light, n_samples,
-                )  # fmt: skip
-                if weight > 0.0:
-                    for c in range(3):
-                        radiance[c] = lamp[m, RADIANCE + c]
-                    if lamp[m, TEXTURED] > _f(0.0):
-                        emitted_radiance(
-                            shading, surface.triangle, prim, floats[HIT_U * width + lane],
-                            floats[HIT_V * width + lane], radiance,
-                        )  # fmt: skip
-                    for c in range(3):
-                        out[begin + group + lane, 3 + c] += radiance[c] * weight
-
-
-@njit(cache=True, nogil=True)
-def emitter_hit(row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+def emitter_hit(
+    row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
+):  # type: ignore[no-untyped-def]
     """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0 for its back)."""
     front = front_facing(row, prim, dx, dy, dz)
     if not front and lamp[m, TWO_SIDED] == _f(0.0):

@@ -20,10 +20,19 @@ from baker.kernels.sampling import triangle_barycentric
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 
-
 # Columns of an emitter's row: three corners, face normal, area, 1 if two-sided, chance inside its cluster,
 # running sum of these chances, cluster, radiance without texture, 1 if textured.
-CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 16, 17, 20
+CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED = (
+    0,
+    9,
+    12,
+    13,
+    14,
+    15,
+    16,
+    17,
+    20,
+)
 ROW_LENGTH = 24
 
 
@@ -45,17 +54,33 @@ class Emitters(NamedTuple):
     spread: NDArray[np.float32]
 
 
-@njit(cache=True, nogil=True)
-def bounding_sphere(position, begin, end):  # type: ignore[no-untyped-def]
-    """Return x, y, z, radius of a sphere around position[begin:end]: its box's centre and half diagonal."""
-    low = np.full(3, 1.0e30)
-    high = np.full(3, -1.0e30)
-    for i in range(begin, end):
-        for a in range(3):
-            low[a] = min(low[a], position[i, a])
-            high[a] = max(high[a], position[i, a])
-    half = 0.5 * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2 + (high[2] - low[2]) ** 2)
-    return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]), half
+class Lamps(NamedTuple):
+    """Emitters as a tile of texels samples them: `Emitters` with the chances of its clusters.
+
+    row, triangle, first: see `Emitters`; chance, cumulative (C,) float32.
+    """
+
+    row: NDArray[np.float32]
+    triangle: NDArray[np.int32]
+    first: NDArray[np.int32]
+    chance: NDArray[np.float32]
+    cumulative: NDArray[np.float32]
+
+
+def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
+    """Return the emitters with the chances that points (m, w, 3) float32, metres, give their clusters."""
+    chance = np.zeros(len(emitters.power), np.float32)
+    cumulative = np.zeros_like(chance)
+    if len(chance):
+        cluster_chances(emitters, *bounding_sphere(origin.reshape(-1, 3)), chance, cumulative)
+    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
+
+
+def bounding_sphere(position: NDArray[np.float32]) -> tuple[float, float, float, float]:
+    """Return x, y, z, radius of a sphere around (n, 3) points: their box's centre and half diagonal."""
+    low, high = position.min(axis=0).astype(np.float64), position.max(axis=0).astype(np.float64)
+    x, y, z = 0.5 * (low + high)
+    return float(x), float(y), float(z), float(0.5 * np.linalg.norm(high - low))
 
 
 @njit(cache=True, nogil=True)
@@ -74,7 +99,9 @@ def cluster_chances(emitters, x, y, z, radius, chance, cumulative):  # type: ign
         reach = radius + emitters.radius[c]
         weight = emitters.power[c] / max(distance * distance, reach * reach + 1.0e-12)
         if distance > reach and emitters.spread[c] < 3.0:
-            facing = (dx * emitters.axis[c, 0] + dy * emitters.axis[c, 1] + dz * emitters.axis[c, 2]) / distance
+            facing = (
+                dx * emitters.axis[c, 0] + dy * emitters.axis[c, 1] + dz * emitters.axis[c, 2]
+            ) / distance
             angle = math.acos(min(max(facing, -1.0), 1.0)) - emitters.spread[c] - math.asin(reach / distance)
             if angle >= 0.5 * math.pi:
                 weight = 0.0
@@ -92,7 +119,6 @@ def cluster_chances(emitters, x, y, z, radius, chance, cumulative):  # type: ign
             chance[c] = 0.95 * chance[c] / total + 0.05 / lit
         running += chance[c]
         cumulative[c] = running
-    return total > 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -141,12 +167,12 @@ def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def emitted_radiance(shading, triangle, t, b1, b2, out):  # type: ignore[no-untyped-def]
+def emitted_radiance(shading, t, b1, b2, out):  # type: ignore[no-untyped-def]
     """Write the radiance (cd/m2) that triangle t emits at barycentrics to `out` (4,)."""
     m = shading.material[t]
     out[0] = out[1] = out[2] = 1.0
     if shading.emission_texture[m] >= 0:
-        u, v = uv_at(shading.emission_uv, triangle, t, b1, b2)
+        u, v = uv_at(shading.emission_uv, shading.triangle, t, b1, b2)
         sample_texture(shading.pack, shading.emission_texture[m], u, v, 0.0, out)
     for c in range(3):
         out[c] *= shading.emission[m, c]

@@ -16,100 +16,65 @@ from numba import njit
 
 from baker.kernels.hits import front_facing, hit_entry
 from baker.kernels.rays import FAR, aim_texel, lane_seeds
-from baker.kernels.sampling import hash_combine, texel_scramble
-from baker.kernels.surface import N_POINTS, drop_buried, place_points
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, new_packet, trace
-
-_f = np.float32
-_u = np.uint32
+from baker.kernels.sampling import texel_scramble
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, trace
 
 
 @njit(cache=True, nogil=True)
-def cast_form_factors(surface, mask, table, patch, member_first, member, weight, tracer, begin, end, net, shared, target, tally):  # type: ignore[no-untyped-def]
-    """Cast the rays of patches begin to end.
+def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, target, tally):  # type: ignore[no-untyped-def]
+    """Cast the rays of patches.
 
-    patch : (n_entries,) int32, patch of each texel entry
-    member_first : (P + 1,) int64; member : (n_entries,) int32, texel entries patch by patch
-    weight : (n_entries,) float32, running share of the patch's area, 1 at its last member
-    net : (R, 2) uint32
-    target : (P_tile, R) int32 output, rows relative to `begin`: patch hit, or -1
+    origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
+    patch : (n_entries,) int32, patch of each texel entry; net : (R, 2) uint32
+    target : (m, R) int32 output, patch hit or -1
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
     """
-    n_rays = len(net)
-    width, scene, intersect = tracer.width, tracer.scene, tracer.intersect
+    width, scene, intersect = caster.width, caster.scene, caster.intersect
+    valid, floats, words = caster.valid, caster.floats, caster.words
     row, lookup, back_entry, size = table.row, table.lookup, table.back_entry, table.size
-    valid, floats, words = new_packet(width)
-    origin = np.zeros((width, N_POINTS, 3), np.float32)
-    normal = np.zeros((width, N_POINTS, 3), np.float32)
     seeds = np.zeros((width, 2), np.uint32)
-    hit = np.zeros((1, N_POINTS), np.int32)
-    bary = np.zeros((1, N_POINTS, 2), np.float32)
-    placed = np.zeros(width, np.int64)
-    for group in range(begin, end, width):
-        lanes = min(width, end - group)
-        placed[:] = -1
-        lane_seeds(group, lanes, 30, seeds)
+    for group in range(0, len(origin), width):
+        lanes = min(width, len(origin) - group)
+        lane_seeds(begin + group, lanes, 30, seeds)
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
-        for r in range(n_rays):
+        for r in range(len(net)):
             for lane in range(lanes):
-                p = group + lane
-                # The ray's number walks over the patch's area: every texel starts its share of rays.
-                share = (r + 0.5) / n_rays
-                if placed[lane] < 0:
-                    placed[lane] = member_first[p]
-                    _place_one(surface, mask, member[placed[lane]], origin[lane : lane + 1], normal[lane : lane + 1], hit, bary)
-                moved = False
-                while placed[lane] < member_first[p + 1] - 1 and weight[placed[lane]] < share:
-                    placed[lane] += 1
-                    moved = True
-                if moved:
-                    _place_one(surface, mask, member[placed[lane]], origin[lane : lane + 1], normal[lane : lane + 1], hit, bary)
-                seed = _u(p)
                 u = texel_scramble(net[r, 0], seeds[lane, 0], shared)
                 v = texel_scramble(net[r, 1], seeds[lane, 1], shared)
-                k = np.int64(hash_combine(seed, _u(r)) & _u(N_POINTS - 1))
-                aim_texel(floats, words, width, lane, origin, normal, lane, k, u, v, FAR)
+                aim_texel(floats, words, width, lane, origin, normal, group + lane, r, u, v, FAR)
             trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 p = group + lane
-                target[p - begin, r] = -1
+                target[p, r] = -1
                 if words[GEOM_ID * width + lane] == NO_HIT:
-                    tally[p, 0] += 1
+                    tally[begin + p, 0] += 1
                     continue
                 prim = np.int64(words[PRIM_ID * width + lane])
                 front = front_facing(
                     row, prim, floats[DIR_X * width + lane], floats[DIR_Y * width + lane],
                     floats[DIR_Z * width + lane],
                 )  # fmt: skip
-                entry = hit_entry(
-                    row, lookup, back_entry, size, prim, floats[HIT_U * width + lane], floats[HIT_V * width + lane], front
-                )  # fmt: skip
+                u, v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
+                entry = hit_entry(row, lookup, back_entry, size, prim, u, v, front)
                 if entry < 0:
-                    tally[p, 1] += 1
+                    tally[begin + p, 1] += 1
                 else:
-                    target[p - begin, r] = patch[entry]
-
-
-@njit(cache=True, nogil=True)
-def _place_one(surface, mask, entry, origin, normal, hit, bary):  # type: ignore[no-untyped-def]
-    place_points(surface, entry, entry + 1, origin, normal, hit, bary)
-    drop_buried(mask, entry, entry + 1, origin, normal)
+                    target[p, r] = patch[entry]
 
 
 @njit(cache=True, nogil=True)
 def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-def]
-    """Merge equal targets of each row: sorted columns, how often each, and how many differ."""
+    """Merge equal targets of rows that are sorted: which, how often each, and how many differ."""
     for i in range(len(target)):
-        row = np.sort(target[i])
         m = 0
-        for r in range(len(row)):
-            if row[r] < 0:
+        for r in range(target.shape[1]):
+            if target[i, r] < 0:
                 continue
-            if m and columns[i, m - 1] == row[r]:
+            if m and columns[i, m - 1] == target[i, r]:
                 counts[i, m - 1] += 1
             else:
-                columns[i, m] = row[r]
+                columns[i, m] = target[i, r]
                 counts[i, m] = 1
                 m += 1
         lengths[i] = m
@@ -132,7 +97,9 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def weigh_reciprocal(first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value):  # type: ignore[no-untyped-def]
+def weigh_reciprocal(
+    first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
+):  # type: ignore[no-untyped-def]
     """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
 
     `other` is the transpose of F in CSR: row i has the entries F_ji. The variance of A_i F_ij is

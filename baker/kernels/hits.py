@@ -32,13 +32,13 @@ class HitTable(NamedTuple):
 
 # The functions below take the table's arrays one by one: handing a tuple of arrays to a function costs
 # Numba an atomic reference count per array and call, which tripled the time of a hit.
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def front_facing(row, prim, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Tell whether a ray of direction d meets the front of the triangle."""
     return row[prim, 8] * dx + row[prim, 9] * dy + row[prim, 10] * dz < np.float32(0.0)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def hit_entry(row, lookup, back_entry, size, prim, u, v, front):  # type: ignore[no-untyped-def]
     """Return the texel entry at barycentrics (u, v) of a triangle, or LOST or BACK_FACE."""
     entry = np.int64(BACK_FACE)

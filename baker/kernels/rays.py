@@ -11,7 +11,7 @@ from baker.trace.packets import set_ray
 FAR = np.float32(1.0e30)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def aim_cosine(floats, words, width, lane, x, y, z, nx, ny, nz, u, v, far):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted ray that (u, v) gives about a unit normal; `far` is its reach in metres."""
     a, b, c = cosine_direction(u, v)
@@ -22,7 +22,7 @@ def aim_cosine(floats, words, width, lane, x, y, z, nx, ny, nz, u, v, far):  # t
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def aim_texel(floats, words, width, lane, origin, normal, i, k, u, v, far):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted ray of point k of texel i; origin and normal are (n, 16, 3) float32."""
     aim_cosine(

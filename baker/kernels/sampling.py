@@ -117,7 +117,8 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
         t = np.float32(0.78539816) * other / r
     t2 = t * t
     c = np.float32(1.0) + t2 * (
-        np.float32(-0.5) + t2 * (np.float32(4.1666642e-2) + t2 * (np.float32(-1.3888397e-3) + t2 * np.float32(2.4760495e-5)))
+        np.float32(-0.5)
+        + t2 * (np.float32(4.1666642e-2) + t2 * (np.float32(-1.3888397e-3) + t2 * np.float32(2.4760495e-5)))
     )
     s = t * (
         np.float32(1.0)

@@ -6,21 +6,21 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.surface import N_POINTS
-from baker.trace.packets import TFAR, new_packet, set_ray, trace
+from baker.trace.packets import TFAR, set_ray, trace
 
 _f = np.float32
 
 
 @njit(cache=True, nogil=True)
-def add_visible(tracer, origin, ray, weight, colour, begin, out):  # type: ignore[no-untyped-def]
+def add_visible(caster, origin, ray, weight, colour, begin, out):  # type: ignore[no-untyped-def]
     """Add colour * mean over a texel's 16 points of weight * visibility to out[begin:], both column blocks.
 
     origin : (n, 16, 3) float32; ray : (n, 16, 4) float32, direction and reach in units of its length
     weight : (n, 16) float32, irradiance for colour 1 if nothing is in the way; 0 casts no ray
     colour : (3,) float32; out : (n_entries, 6) float32
     """
-    width, scene, occluded = tracer.width, tracer.scene, tracer.occluded
-    valid, floats, words = new_packet(width)
+    width, scene, occluded = caster.width, caster.scene, caster.occluded
+    valid, floats, words = caster.valid, caster.floats, caster.words
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         for k in range(N_POINTS):

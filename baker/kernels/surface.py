@@ -113,10 +113,13 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
 
 
 @njit(cache=True, nogil=True)
-def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
-    """Write the 16 points of entries begin to end: origin, normal (n, 16, 3) float32, all world space.
+def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
+    """Write points of texel entries: origin and normal (m, w, 3) float32, world.
 
-    hit_triangle (n, 16) int32 and bary (n, 16, 2) float32 say where on which triangle each lies.
+    mask : (n,) uint16, bit k is set where point k of a texel is not buried; a buried point is replaced
+    by one that is not, if the texel has any
+    chosen : (m,) int64, entries; wanted : (m or 1, w) uint8, which of their 16 points
+    hit_triangle (m, w) int32 and bary (m, w, 2) float32 say where on which triangle each lies
     """
     corner = np.zeros((3, 2))
     cut = np.zeros((MAX_CORNERS, 2))
@@ -128,7 +131,9 @@ def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # ty
     starts, entry, entry_area = surface.first, surface.entry, surface.entry_area
     size, least = surface.size, surface.least
     full = _u(0)
-    for i in range(begin, end):
+    same = len(wanted) == 1
+    for n in range(len(chosen)):
+        i = chosen[n]
         pixel = pixels[i]
         rest = pixel % (size * size)
         x0 = rest % size
@@ -141,16 +146,15 @@ def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # ty
         for e in range(first, last):
             total += entry_area[e]
         whole = last - first == 1 and total > 0.999999
-        e = first
-        t = entry[e]
+        t = entry[first]
         a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
-        for k in range(N_POINTS):
+        for w in range(wanted.shape[1]):
+            k = free_point(mask[i], wanted[0 if same else n, w])
             u = texel_scramble(net[k, 0], seed_x, full)
             v = texel_scramble(net[k, 1], seed_y, full)
-            if whole:
-                x = float(u)
-                y = float(v)
-            else:
+            x = float(u)
+            y = float(v)
+            if not whole:
                 e = first
                 done = 0.0
                 while e < last - 1 and u * total >= done + entry_area[e]:
@@ -169,34 +173,30 @@ def place_points(surface, begin, end, origin, normal, hit_triangle, bary):  # ty
                     x, y = cut[0, 0], cut[0, 1]
                 else:
                     x, y = polygon_point(cut, m, min(max((u * total - done) / inside, 0.0), 1.0), v)
-            n = i - begin
             x += x0
             y += y0
             b1 = a * x + b * y + c
             b2 = d * x + g * y + h
-            place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, k)
-            hit_triangle[n, k] = t
-            bary[n, k, 0] = b1
-            bary[n, k, 1] = b2
+            place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, w)
+            hit_triangle[n, w] = t
+            bary[n, w, 0] = b1
+            bary[n, w, 1] = b2
 
 
 @njit(cache=True, nogil=True)
-def drop_buried(mask, begin, end, origin, normal):  # type: ignore[no-untyped-def]
-    """Replace buried points (bit k of `mask` (n,) uint16 is 0) by the texel's other points, in turn.
-
-    Texels without any good point are left alone.
-    """
-    for i in range(begin, end):
-        if mask[i] == np.uint16(0xFFFF) or mask[i] == np.uint16(0):
-            continue
-        n = i - begin
-        source = 0
-        for k in range(N_POINTS):
-            if (mask[i] >> k) & 1:
-                continue
-            while not (mask[i] >> source) & 1:
-                source = (source + 1) % N_POINTS
-            for a in range(3):
-                origin[n, k, a] = origin[n, source, a]
-                normal[n, k, a] = normal[n, source, a]
-            source = (source + 1) % N_POINTS
+def free_point(bits, k):  # type: ignore[no-untyped-def]
+    """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
+    bits = np.int64(bits)
+    k = np.int64(k)
+    if (bits >> k) & 1 or bits == 0:
+        return k
+    count = 0
+    for j in range(N_POINTS):
+        count += (bits >> j) & 1
+    rank = k % count
+    for j in range(N_POINTS):
+        if (bits >> j) & 1:
+            if rank == 0:
+                return np.int64(j)
+            rank -= 1
+    return k

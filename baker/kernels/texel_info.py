@@ -113,6 +113,9 @@ def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyp
     hit = np.zeros((1, N_POINTS), np.int32)
     bary = np.zeros((1, N_POINTS, 2), np.float32)
     rgba = np.zeros(4)
+    free = np.full(len(surface.pixel), 0xFFFF, np.uint16)
+    every = np.arange(N_POINTS).astype(np.uint8).reshape(1, N_POINTS)
+    chosen = np.zeros(1, np.int64)
     coloured = len(shading.colour) > 1
     for i in range(begin, end):
         first = shading.material[surface.entry[surface.first[i]]]
@@ -124,7 +127,8 @@ def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyp
             for c in range(3):
                 albedo[i, c] = shading.base[first, c]
             continue
-        place_points(surface, i, i + 1, origin, normal, hit, bary)
+        chosen[0] = i
+        place_points(surface, free, chosen, every, origin, normal, hit, bary)
         for c in range(3):
             albedo[i, c] = 0.0
         for k in range(N_POINTS):

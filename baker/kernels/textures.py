@@ -49,7 +49,11 @@ def _linear_image(image: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    rows = image if image.shape[0] == 1 else (image[: image.shape[0] // 2 * 2 : 2] + image[1::2]) * np.float32(0.5)
+    rows = (
+        image
+        if image.shape[0] == 1
+        else (image[: image.shape[0] // 2 * 2 : 2] + image[1::2]) * np.float32(0.5)
+    )
     if rows.shape[1] == 1:
         return rows
     halved: NDArray[np.float32] = (rows[:, : rows.shape[1] // 2 * 2 : 2] + rows[:, 1::2]) * np.float32(0.5)

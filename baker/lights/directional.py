@@ -35,6 +35,8 @@ def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
                 ray[i, k, a] = -direction[a]
             ray[i, k, 3] = 1.0e30
             cosine = -(
-                direction[0] * normal[i, k, 0] + direction[1] * normal[i, k, 1] + direction[2] * normal[i, k, 2]
+                direction[0] * normal[i, k, 0]
+                + direction[1] * normal[i, k, 1]
+                + direction[2] * normal[i, k, 2]
             )
             weight[i, k] = max(cosine, 0.0)

@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.kernels.emitters import (
-    AREA, CLUSTER, CORNER, CUMULATIVE, NORMAL, RADIANCE, ROW_LENGTH, SHARE, TEXTURED, TWO_SIDED, Emitters, emitted_radiance,
+    AREA,
+    CLUSTER,
+    CORNER,
+    CUMULATIVE,
+    NORMAL,
+    RADIANCE,
+    ROW_LENGTH,
+    SHARE,
+    TEXTURED,
+    TWO_SIDED,
+    Emitters,
+    emitted_radiance,
 )  # fmt: skip
 from baker.kernels.texel_raster import morton_code
 
@@ -37,7 +48,7 @@ def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
     """
     candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
     luminance = np.zeros(len(candidate))
-    _mean_luminance(shading, geometry.triangle, candidate, _LUMINANCE, luminance)
+    _mean_luminance(shading, candidate, _LUMINANCE, luminance)
     power = np.pi * geometry.area[candidate] * luminance
     two_sided = geometry.double_sided[candidate]
     power = np.where(two_sided, 2.0 * power, power)
@@ -80,7 +91,10 @@ def _spatial_order(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[n
 
 
 def _bounds(
-    corner: NDArray[np.float32], normal: NDArray[np.float32], two_sided: NDArray[np.bool_], first: NDArray[np.int32]
+    corner: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    two_sided: NDArray[np.bool_],
+    first: NDArray[np.int32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Return sphere centre and radius, mean normal and largest angle to it for each cluster."""
     n = len(first) - 1
@@ -100,7 +114,7 @@ def _bounds(
 
 
 @njit(cache=True)
-def _mean_luminance(shading, triangle, chosen, weights, out):  # type: ignore[no-untyped-def]
+def _mean_luminance(shading, chosen, weights, out):  # type: ignore[no-untyped-def]
     """Average the luminance that triangles emit over a grid of points (one point if untextured)."""
     radiance = np.zeros(4)
     for i in range(len(chosen)):
@@ -112,6 +126,6 @@ def _mean_luminance(shading, triangle, chosen, weights, out):  # type: ignore[no
                 u, v = (a + 0.5) / grid, (b + 0.5) / grid
                 if u + v > 1.0:
                     u, v = 1.0 - u, 1.0 - v
-                emitted_radiance(shading, triangle, t, u, v, radiance)
+                emitted_radiance(shading, t, u, v, radiance)
                 total += radiance[0] * weights[0] + radiance[1] * weights[1] + radiance[2] * weights[2]
         out[i] = total / (grid * grid)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
@@ -18,7 +17,9 @@ from baker.kernels.hits import HitTable
 from baker.kernels.probe import back_face_hits
 from baker.kernels.sampling import sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
+from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
+from baker.trace.packets import new_caster
 
 STAGE = "buried texels"
 _TILE = 2048
@@ -46,14 +47,17 @@ def find_buried(
         return mask, 0
 
     def look(chosen: NDArray[np.int64], rays_per_point: int, stride: int, pair: int) -> NDArray[np.uint8]:
-        hits = np.zeros((len(chosen), N_POINTS), np.uint8)
-        rays = N_POINTS // stride * rays_per_point
-        net = sobol_reversed(rays, seed, pair)
+        wanted = np.arange(0, N_POINTS, stride, dtype=np.uint8)[None]
+        hits = np.zeros((len(chosen), wanted.size), np.uint8)
+        net = sobol_reversed(wanted.size * rays_per_point, seed, pair)
 
         def work(begin: int, end: int) -> None:
-            back_face_hits(surface, table, tracer, chosen, begin, end, net, rays_per_point, stride, hits)
+            points = points_of(surface, mask, chosen[begin:end], wanted)
+            back_face_hits(*points, table, new_caster(tracer), begin, net, rays_per_point, hits)
 
-        run_tiles(len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
+        run_tiles(
+            len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=len(net)
+        )
         return hits
 
     suspect = look(np.arange(n), 1, _STRIDE, 3).any(axis=1)
@@ -61,7 +65,9 @@ def find_buried(
     chosen = np.flatnonzero(suspect)
     hits = look(chosen, _RAYS_PER_POINT, 1, 4)
     good = hits <= _SHARE * _RAYS_PER_POINT
-    mask[chosen] = (good.astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)).sum(axis=1).astype(np.uint16)
+    mask[chosen] = (
+        (good.astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)).sum(axis=1).astype(np.uint16)
+    )
     return mask, n * N_POINTS // _STRIDE + len(chosen) * N_POINTS * _RAYS_PER_POINT
 
 
@@ -72,9 +78,13 @@ def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray
         side = np.flatnonzero(texels.back == back)
         if not suspect[side].any():
             continue
-        image = np.zeros(texels.n_pages * texels.resolution**2, bool)
-        image[texels.pixel[side]] = suspect[side]
-        pages = image.reshape(texels.n_pages, texels.resolution, texels.resolution)
-        grown = binary_dilation(pages, np.ones((1, 3, 3), bool))
-        out[side] |= grown.reshape(-1)[texels.pixel[side]]
+        size = texels.resolution
+        pages = np.zeros((texels.n_pages, size + 2, size + 2), bool)
+        page, rest = np.divmod(texels.pixel, size * size)
+        row, column = np.divmod(rest, size)
+        at = side[suspect[side]]
+        for down in range(3):
+            for right in range(3):
+                pages[page[at], row[at] + down, column[at] + right] = True
+        out[side] |= pages[page[side], row[side] + 1, column[side] + 1]
     return out

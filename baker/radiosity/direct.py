@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
-from baker.kernels.area_light import hemisphere_hits, light_samples
-from baker.kernels.emitters import Emitters
+from baker.kernels.area_light import light_samples
+from baker.kernels.emitters import Emitters, lamps_for
+from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shadow import add_visible
-from baker.kernels.surface import N_POINTS, Surface, drop_buried, place_points
+from baker.kernels.surface import N_POINTS, Surface
 from baker.lights.family import LIGHT_FAMILIES
+from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
+from baker.trace.packets import new_caster
 
 # Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
 TILE = 256
@@ -83,39 +86,35 @@ def direct_light(
     weigh = np.array([n_gather, N_HEMISPHERE], np.float64)
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
 
+    dark = np.zeros((n, 3), np.float32)
+    black, limits = np.zeros(3, np.float32), np.array([0.0, n_light], np.float64)
+    found = np.zeros((n, N_COLUMNS), np.float32)
+    few_shared = shared_bits_mask(N_HEMISPHERE)
+
     def work(begin: int, end: int) -> None:
-        if len(emitters.power):
-            light_samples(surface, mask, emitters, shading, tracer, begin, end, net, shared, weigh, out, second)
+        caster = new_caster(tracer)
+        origin, normal = points_of(surface, mask, np.arange(begin, end))
+        lamps = lamps_for(emitters, origin)
+        if lamps.chance.any():
+            light_samples(origin, normal, lamps, shading, caster, begin, net, shared, weigh, out, second)
             area[begin:end] = out[begin:end, :3].sum(axis=1)
-            few_mask = shared_bits_mask(N_HEMISPHERE)
-            hemisphere_hits(
-                surface, mask, table, emitters, shading, tracer, begin, end, few, few_mask, n_light, out
+        if len(emitters.power):
+            gather(
+                origin, normal, table, dark, lamps, shading, caster, begin, few, few_shared, black, limits, found
             )  # fmt: skip
+            out[begin:end, 3:] += found[begin:end, DIRECT : DIRECT + 3]
         if families:
-            origin, normal = points_of(surface, mask, begin, end)
             ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
             weight = np.zeros((end - begin, N_POINTS), np.float32)
             for light, family in families:
                 if family is not None:
                     family(light, origin, normal, ray, weight)
-                    add_visible(tracer, origin, ray, weight, np.array(light.intensity, np.float32), begin, out)
+                    add_visible(
+                        caster, origin, ray, weight, np.array(light.intensity, np.float32), begin, out
+                    )
 
     area_rays = (n_light + N_HEMISPHERE) * bool(len(emitters.power))
     rays = area_rays + N_POINTS * len(families)
     run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
     spread = np.maximum(second - area * area / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
     return DirectLight(out[:, :3].copy(), out[:, 3:].copy(), spread.astype(np.float32), rays * n)
-
-
-def points_of(
-    surface: Surface, mask: NDArray[np.uint16], begin: int, end: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return origins and normals (n, 16, 3) float32 of the points of entries begin to end, buried ones replaced."""
-    n = end - begin
-    origin = np.zeros((n, N_POINTS, 3), np.float32)
-    normal = np.zeros((n, N_POINTS, 3), np.float32)
-    place_points(
-        surface, begin, end, origin, normal, np.zeros((n, N_POINTS), np.int32), np.zeros((n, N_POINTS, 2), np.float32)
-    )
-    drop_buried(mask, begin, end, origin, normal)
-    return origin, normal

@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
-from baker.kernels.emitters import Emitters
+from baker.kernels.emitters import Emitters, lamps_for
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.direct import TILE
+from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
+from baker.trace.packets import new_caster
 
 STAGE = "final gather"
 AO_STAGE = "ambient occlusion"
@@ -75,9 +77,12 @@ def final_gather(
     radiance = np.array(sky, np.float32)
 
     def work(begin: int, end: int) -> None:
+        origin, normal = points_of(surface, mask, np.arange(begin, end))
+        lamps = lamps_for(emitters, origin)
         gather(
-            surface, mask, table, exitance, emitters, shading, tracer, begin, end, net, shared, radiance, limits, out
-        )
+            origin, normal, table, exitance, lamps, shading, new_caster(tracer), begin, net, shared, radiance, limits,
+            out,
+        )  # fmt: skip
 
     run_tiles(n_front, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_samples)
     total = out[:, INDIRECT : DIRECT + 3].sum(axis=1)
@@ -110,7 +115,10 @@ def ambient_occlusion(
     reach = np.float32(min(distance, 1.0e30))
 
     def work(begin: int, end: int) -> None:
-        open_share(surface, mask, tracer, begin, end, net, shared, reach, out)
+        points = points_of(surface, mask, np.arange(begin, end))
+        open_share(*points, new_caster(tracer), begin, net, shared, reach, out)
 
-    run_tiles(n_front, TILE, work, threads=threads, stage=AO_STAGE, progress=progress, rays_per_item=n_samples)
+    run_tiles(
+        n_front, TILE, work, threads=threads, stage=AO_STAGE, progress=progress, rays_per_item=n_samples
+    )
     return out

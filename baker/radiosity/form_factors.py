@@ -19,9 +19,11 @@ from baker.core.progress import Progress
 from baker.kernels.form_factor import cast_form_factors, count_targets, scale_symmetric, weigh_reciprocal
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.surface import Surface
+from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.patches import PatchSet
+from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
+from baker.trace.packets import new_caster
 
 STAGE = "form factors"
 _TILE = 256
@@ -81,12 +83,27 @@ def build_form_factors(
     tally = np.zeros((n, 2), np.int32)
     rows: dict[int, tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]] = {}
 
+    # Each ray starts from the texel where its share of the patch's area lies, at a point of its own.
+    owner = np.repeat(np.arange(n), np.diff(patches.first))
+    where = owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)
+    share = (np.arange(n_rays) + 0.5) / n_rays
+    shuffle = np.random.Generator(np.random.PCG64(seed)).permuted(
+        np.resize(np.arange(N_POINTS, dtype=np.uint8), (64, n_rays)), axis=1
+    )
+
     def work(begin: int, end: int) -> None:
+        row = np.arange(begin, end)
+        at = np.minimum(np.searchsorted(where, row[:, None] + share), patches.first[row + 1, None] - 1)
+        wanted = shuffle[row % len(shuffle)]
+        points = points_of(
+            surface, mask, patches.member[at].reshape(-1).astype(np.int64), wanted.reshape(-1, 1)
+        )
+        origin, normal = (p.reshape(end - begin, n_rays, 3) for p in points)
         target = np.full((end - begin, n_rays), -1, np.int32)
         cast_form_factors(
-            surface, mask, table, patches.patch, patches.first, patches.member, patches.cumulative, tracer,
-            begin, end, net, shared, target, tally,
-        )  # fmt: skip
+            origin, normal, table, patches.patch, new_caster(tracer), begin, net, shared, target, tally
+        )
+        target.sort(axis=1)
         column, count = np.zeros_like(target), np.zeros_like(target)
         length = np.zeros(end - begin, np.int32)
         count_targets(target, column, count, length)

@@ -22,7 +22,7 @@ class Shading(NamedTuple):
     base_texture, emission_texture : (M,) int32, -1 for none
     base_uv, emission_uv : (V, 2) float32, by lightmap vertex (of the material its triangles have)
     colour : (V, 3) float32, linear vertex colour
-    material : (T,) int32
+    triangle : (T, 3) int32, lightmap vertices; material : (T,) int32
     """
 
     pack: TexturePack
@@ -33,6 +33,7 @@ class Shading(NamedTuple):
     base_uv: NDArray[np.float32]
     emission_uv: NDArray[np.float32]
     colour: NDArray[np.float32]
+    triangle: NDArray[np.int32]
     material: NDArray[np.int32]
 
 
@@ -68,6 +69,7 @@ def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
         base_uv=_corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials]),
         emission_uv=_corner_uv(scene, geometry, [m.emission_texture for m in scene.materials]),
         colour=_vertex_colour(scene, geometry),
+        triangle=geometry.triangle,
         material=geometry.material,
     )
 

@@ -46,7 +46,10 @@ class PatchSet:
     def mean(self, value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return the weighted mean over each patch of per-entry values (n, C), as (P, C) float64."""
         total = np.bincount(self.patch, weight, self.n)
-        columns = [np.bincount(self.patch, weight * value[:, c].astype(np.float64), self.n) for c in range(value.shape[1])]
+        columns = [
+            np.bincount(self.patch, weight * value[:, c].astype(np.float64), self.n)
+            for c in range(value.shape[1])
+        ]
         return np.stack(columns, axis=1) / np.maximum(total, 1e-300)[:, None]
 
 

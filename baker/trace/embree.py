@@ -26,8 +26,14 @@ _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 
 _SCENE_ROBUST = 1 << 2
 _QUALITY_MEDIUM = 1
 _ERROR_OUT_OF_MEMORY = 4
-_ERRORS = {1: "unknown error", 2: "invalid argument", 3: "invalid operation", 4: "out of memory",
-           5: "unsupported CPU", 6: "cancelled"}
+_ERRORS = {
+    1: "unknown error",
+    2: "invalid argument",
+    3: "invalid operation",
+    4: "out of memory",
+    5: "unsupported CPU",
+    6: "cancelled",
+}
 
 # name: (result type, argument types); p pointer, i int, u unsigned, z size_t, l ssize_t
 _SIGNATURES = {
@@ -50,11 +56,13 @@ def _library() -> ctypes.CDLL:
         installed = files("embreex") or []
     except PackageNotFoundError:
         raise ResourceError("Embree is absent: install it with `pip install embreex`") from None
-    named = [f for f in installed if "embree4" in f.name and (".so" in f.name or f.suffix in {".dll", ".dylib"})]
+    named = [
+        f for f in installed if "embree4" in f.name and (".so" in f.name or f.suffix in {".dll", ".dylib"})
+    ]
     if not named:
         raise ResourceError("the installed embreex carries no Embree 4 library; install embreex 4.4 or newer")
     if sys.platform == "win32":
-        import embreex  # noqa: F401 - its import registers the folder of the libraries
+        import embreex
     try:
         library = ctypes.CDLL(str(named[0].locate()))
     except OSError:
@@ -133,7 +141,9 @@ class RayScene:
         config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
         self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
         if not self._device:
-            raise ResourceError(f"Embree could not start: {_ERRORS.get(library.rtcGetDeviceError(None), 'unknown')}")
+            raise ResourceError(
+                f"Embree could not start: {_ERRORS.get(library.rtcGetDeviceError(None), 'unknown')}"
+            )
         self._scene = library.rtcNewScene(self._device)
         if int(library.rtcGetDeviceProperty(self._device, _PROPERTY_VERSION)) // 10000 != 4:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
@@ -149,7 +159,14 @@ class RayScene:
         library = self._library
         geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
         library.rtcSetSharedGeometryBuffer(
-            geometry, _BUFFER_VERTEX, 0, _FORMAT_FLOAT3, self._position.ctypes.data, 0, 12, len(self._position) - 1
+            geometry,
+            _BUFFER_VERTEX,
+            0,
+            _FORMAT_FLOAT3,
+            self._position.ctypes.data,
+            0,
+            12,
+            len(self._position) - 1,
         )
         library.rtcSetSharedGeometryBuffer(
             geometry, _BUFFER_INDEX, 0, _FORMAT_UINT3, self._triangle.ctypes.data, 0, 12, len(self._triangle)

@@ -9,12 +9,15 @@ Based on: Embree 4 API reference, RTCRayHitN.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from baker.trace.embree import Tracer
 
 # Rows of a packet, in units of its width.
 ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = range(12)
@@ -39,24 +42,37 @@ def call_embree(typing_context, address, valid, scene, ray, arguments):  # type:
     return signature, codegen
 
 
-@njit(cache=True, nogil=True)
-def new_packet(width):  # type: ignore[no-untyped-def]
-    """Return memory for a packet: valid (16,) int32, floats (21 * 16,) float32 and its integer view.
+class Caster(NamedTuple):
+    """A tracer with the memory of one packet; each thread has its own.
 
-    All start at multiples of 64 bytes, as Embree wants. What no kernel changes is set here: time 0,
-    all bits of the mask, tnear 0.
+    scene, intersect, occluded, width: see `Tracer`; valid (16,) int32, -1 for lanes to trace;
+    floats (21 * 16,) float32 and words, the same memory as uint32.
     """
-    raw = np.zeros((ROWS * MAX_WIDTH + MAX_WIDTH) * 4 + 64, np.uint8)
-    start = (64 - raw.ctypes.data % 64) % 64
+
+    scene: int
+    intersect: int
+    occluded: int
+    width: int
+    valid: NDArray[np.int32]
+    floats: NDArray[np.float32]
+    words: NDArray[np.uint32]
+
+
+def new_caster(tracer: Tracer) -> Caster:
+    """Return packet memory at multiples of 64 bytes, as Embree wants.
+
+    What no kernel changes is set here: time and tnear 0, all bits of the mask.
+    """
+    raw = np.zeros((ROWS + 1) * MAX_WIDTH * 4 + 64, np.uint8)
+    start = -raw.ctypes.data % 64
     valid = raw[start : start + MAX_WIDTH * 4].view(np.int32)
     body = raw[start + MAX_WIDTH * 4 : start + (ROWS + 1) * MAX_WIDTH * 4]
     words = body.view(np.uint32)
-    for lane in range(width):
-        words[MASK * width + lane] = np.uint32(0xFFFFFFFF)
-    return valid, body.view(np.float32), words
+    words[MASK * tracer.width : (MASK + 1) * tracer.width] = NO_HIT
+    return Caster(*tracer, valid, body.view(np.float32), words)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ignore[no-untyped-def]
     """Write one ray into a lane of the packet."""
     floats[ORG_X * width + lane] = x
@@ -69,7 +85,7 @@ def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ign
     words[GEOM_ID * width + lane] = np.uint32(0xFFFFFFFF)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
     """Trace the lanes whose `valid` is -1; results are written into the packet."""
     call_embree(function, valid.ctypes.data, scene, floats.ctypes.data, 0)
