@@ -231,16 +231,16 @@ def _light(
             progress=progress,
         )
         record.rays["direct light"] = direct.rays
-    exitance = np.zeros((texels.n, 3), np.float32)
+    exitance = np.zeros((texels.n, 4), np.float32)
     if settings.bounces != 0:
-        exitance = _reflected(world, direct.complete, sky, settings, record)
+        exitance[:, :3] = _reflected(world, direct.complete, sky, settings, record)
     with record.stage("final gather"):
         gathered: Gathered = final_gather(
             texels.n_front,
             world.surface,
             world.mask,
             world.table,
-            exitance,
+            texels.hit_image(exitance),
             world.emitters,
             world.shading,
             world.rays.tracer,
@@ -269,6 +269,7 @@ def _reflected(
         patches = build_patches(texels)
         matrix = build_form_factors(
             patches,
+            texels.hit_image(patches.patch, fill=-1),
             world.surface,
             world.mask,
             world.table,

@@ -7,6 +7,7 @@ double-sided surfaces: they take part in light transport but are not stored in a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,9 @@ class TexelBuffer:
     position : (n, 3) float32, metres, at that centroid
     normal : (n, 3) float32, unit, shading, flipped on back entries
     albedo : (n, 3) float32, linear Rec.709
-    lookup : (P * H * W,) int32, entry of each pixel or -1
+    lookup : (P * H * W,) int32
+        Entry of each pixel, of a covered neighbour for pixels just beside a chart (a hit on the border
+        may be rounded there), else -1.
     back_entry : (n_front,) int32, the back's entry of a front texel or -1
     """
 
@@ -57,7 +60,21 @@ class TexelBuffer:
         """Count all entries, back sides included."""
         return len(self.pixel)
 
-    def page_image(self, value: NDArray[np.generic], fill: float | int = 0) -> NDArray[np.generic]:
+    def hit_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
+        """Spread per-entry values (n, ...) to (P * H * W, ...), backs behind the fronts if there are any.
+
+        Rows are in the order of `kernels.hits.hit_pixel`; pixels without texel get `fill`.
+        """
+        sides = [self.lookup]
+        if self.n > self.n_front:
+            sides.append(np.where(self.lookup >= 0, self.back_entry[self.lookup], -1).astype(np.int32))
+        entry = np.concatenate(sides)
+        image = np.full((len(entry), *value.shape[1:]), fill, value.dtype)
+        on = entry >= 0
+        image[on] = value[entry[on]]
+        return image
+
+    def page_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
         """Scatter per-front-texel values (n_front, ...) to (P, H, W, ...) images."""
         shape = (self.n_pages * self.resolution * self.resolution, *value.shape[1:])
         image = np.full(shape, fill, value.dtype)

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
-from baker.kernels.hits import front_facing, hit_entry
+from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_texel, lane_seeds
 from baker.kernels.sampling import texel_scramble
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, trace
@@ -25,13 +25,13 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
-    patch : (n_entries,) int32, patch of each texel entry; net : (R, 2) uint32
+    patch : (sides * P * H * W,) int32, patch at each pixel (`hits.hit_pixel`), -1 for none; net : (R, 2) uint32
     target : (m, R) int32 output, patch hit or -1
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
     """
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
-    row, lookup, back_entry, size = table.row, table.lookup, table.back_entry, table.size
+    row, size, n_pixels = table.row, table.size, table.n_pixels
     seeds = np.zeros((width, 2), np.uint32)
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -56,11 +56,11 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
                     floats[DIR_Z * width + lane],
                 )  # fmt: skip
                 u, v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
-                entry = hit_entry(row, lookup, back_entry, size, prim, u, v, front)
-                if entry < 0:
+                pixel = hit_pixel(row, size, n_pixels, prim, u, v, front)
+                if pixel >= 0:
+                    target[p, r] = patch[pixel]
+                if target[p, r] < 0:
                     tally[begin + p, 1] += 1
-                else:
-                    target[p, r] = patch[entry]
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from numba import njit
 
 from baker.kernels.area_light import emitter_hit
 from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
-from baker.kernels.hits import front_facing, hit_entry
+from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_texel, lane_seeds
 from baker.kernels.sampling import texel_scramble
 from baker.kernels.surface import N_POINTS
@@ -33,7 +33,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    exitance : (n_entries, 3) float32, lx, light that each texel reflects
+    exitance : (sides * P * H * W, 4) float32, lx, light that the texel at each pixel reflects (RGB, spare)
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
     out : (n_entries, 8) float32, see the column names
@@ -41,14 +41,17 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     n_samples = len(net)
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
-    row, lookup, back_entry, size = table.row, table.lookup, table.back_entry, table.size
+    row, size, n_pixels = table.row, table.size, table.n_pixels
     lamp, chance, cumulative = lamps.row, lamps.chance, lamps.cumulative
     radiance = np.zeros(4)
     total = np.zeros((width, 7))
-    batch = np.zeros((width, N_POINTS))
+    before = np.zeros(width)
+    squares = np.zeros(width)
+    pixel = np.zeros(width, np.int64)
     seeds = np.zeros((width, 2), np.uint32)
     distance = _f(limits[0])
-    # `emitter_hit` weighs against all rays together, the sums below are scaled by pi / n.
+    # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
+    inverse_pi = _f(1.0 / np.pi)
     whole = n_samples / np.pi
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -56,7 +59,8 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         total[:] = 0.0
-        batch[:] = 0.0
+        before[:] = 0.0
+        squares[:] = 0.0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             for lane in range(lanes):
@@ -64,22 +68,21 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                 v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
                 aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, FAR)
             trace(intersect, scene, valid, floats)
+            # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
+                pixel[lane] = -1
                 if words[GEOM_ID * width + lane] == NO_HIT:
                     total[lane, OPEN] += 1.0
                     for c in range(3):
                         total[lane, DIRECT + c] += sky[c]
-                        batch[lane, k] += sky[c]
                     continue
                 far = floats[TFAR * width + lane]
                 if far > distance:
                     total[lane, OPEN] += 1.0
                 prim = np.int64(words[PRIM_ID * width + lane])
-                dx, dy, dz = (
-                    floats[DIR_X * width + lane],
-                    floats[DIR_Y * width + lane],
-                    floats[DIR_Z * width + lane],
-                )
+                dx = floats[DIR_X * width + lane]
+                dy = floats[DIR_Y * width + lane]
+                dz = floats[DIR_Z * width + lane]
                 hit_u, hit_v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
                 m = np.int64(row[prim, 12])
                 if m >= 0:
@@ -95,24 +98,28 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
                             total[lane, DIRECT + c] += radiance[c] * weight
-                            batch[lane, k] += radiance[c] * weight
                 front = front_facing(row, prim, dx, dy, dz)
-                entry = hit_entry(row, lookup, back_entry, size, prim, hit_u, hit_v, front)
-                if entry >= 0:
-                    for c in range(3):
-                        value = exitance[entry, c] * _f(0.31830987)
-                        total[lane, INDIRECT + c] += value
-                        batch[lane, k] += value
+                pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
+            for lane in range(lanes):
+                p = pixel[lane]
+                if p >= 0:
+                    total[lane, INDIRECT] += exitance[p, 0] * inverse_pi
+                    total[lane, INDIRECT + 1] += exitance[p, 1] * inverse_pi
+                    total[lane, INDIRECT + 2] += exitance[p, 2] * inverse_pi
+            if (s + 1) * N_POINTS // n_samples != k:
+                for lane in range(lanes):
+                    now = 0.0
+                    for c in range(6):
+                        now += total[lane, c]
+                    squares[lane] += (now - before[lane]) ** 2
+                    before[lane] = now
         scale = np.pi / n_samples
         for lane in range(lanes):
             i = begin + group + lane
-            squares = 0.0
-            for k in range(N_POINTS):
-                squares += batch[lane, k] * batch[lane, k]
             for c in range(6):
                 out[i, c] = total[lane, c] * scale
             out[i, OPEN] = total[lane, OPEN] / n_samples
-            out[i, SQUARE] = squares * scale * scale
+            out[i, SQUARE] = squares[lane] * scale * scale
 
 
 @njit(cache=True, nogil=True)

@@ -86,7 +86,7 @@ def direct_light(
     weigh = np.array([n_gather, N_HEMISPHERE], np.float64)
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
 
-    dark = np.zeros((n, 3), np.float32)
+    dark = np.zeros((2 * table.n_pixels, 4), np.float32)
     black, limits = np.zeros(3, np.float32), np.array([0.0, n_light], np.float64)
     found = np.zeros((n, N_COLUMNS), np.float32)
     few_shared = shared_bits_mask(N_HEMISPHERE)

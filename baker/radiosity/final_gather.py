@@ -65,8 +65,9 @@ def final_gather(
 
     Parameters
     ----------
-    exitance : (n, 3) float32, lx
-        Light that each texel entry reflects; emission is found by MIS with `n_light` shadow rays.
+    exitance : (sides * P * H * W, 4) float32, lx
+        Light that the texel at each pixel reflects (`TexelBuffer.hit_image`; RGB and one spare);
+        emission is found by MIS with `n_light` shadow rays.
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
     """

@@ -66,6 +66,7 @@ class FormFactorMatrix:
 
 def build_form_factors(
     patches: PatchSet,
+    hit_patch: NDArray[np.int32],
     surface: Surface,
     mask: NDArray[np.uint16],
     table: HitTable,
@@ -76,7 +77,13 @@ def build_form_factors(
     threads: int,
     progress: Progress,
 ) -> FormFactorMatrix:
-    """Cast `n_rays` from every patch and build the matrix."""
+    """Cast `n_rays` from every patch and build the matrix.
+
+    Parameters
+    ----------
+    hit_patch : (sides * P * H * W,) int32
+        Patch at each pixel, `TexelBuffer.hit_image` of `patches.patch` with -1 where nothing is.
+    """
     n = patches.n
     net = sobol_reversed(n_rays, seed, 5)
     shared = shared_bits_mask(n_rays)
@@ -101,7 +108,7 @@ def build_form_factors(
         origin, normal = (p.reshape(end - begin, n_rays, 3) for p in points)
         target = np.full((end - begin, n_rays), -1, np.int32)
         cast_form_factors(
-            origin, normal, table, patches.patch, new_caster(tracer), begin, net, shared, target, tally
+            origin, normal, table, hit_patch, new_caster(tracer), begin, net, shared, target, tally
         )
         target.sort(axis=1)
         column, count = np.zeros_like(target), np.zeros_like(target)

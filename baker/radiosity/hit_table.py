@@ -24,4 +24,4 @@ def build_hit_table(geometry: Geometry, texels: TexelBuffer, emitters: Emitters)
     row[:, 12] = -1
     row[emitters.triangle, 12] = np.arange(len(emitters.triangle))
     row[:, 13] = geometry.material
-    return HitTable(row, texels.lookup, texels.back_entry, texels.resolution)
+    return HitTable(row, texels.resolution, len(texels.lookup))

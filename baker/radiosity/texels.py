@@ -69,8 +69,6 @@ def build_texels(
         texel_albedo(surface, shading, begin, end, albedo)
 
     run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
-    lookup = np.full(atlas.n_pages * size * size, -1, np.int32)
-    lookup[pixel] = np.arange(n_front, dtype=np.int32)
     back_entry = np.full(n_front, -1, np.int32)
     back_entry[front[n_front:]] = np.arange(n_front, len(front), dtype=np.int32)
     main = geometry.instance[entry[first[:-1]]] if n_front else np.zeros(0, np.int32)
@@ -90,7 +88,7 @@ def build_texels(
         position=position[front],
         normal=np.where(back[:, None], -normal[front], normal[front]),
         albedo=albedo[front],
-        lookup=lookup,
+        lookup=_lookup(pixel, size, atlas.n_pages),
         back_entry=back_entry,
     )
     return texels, surface
@@ -119,6 +117,19 @@ def _overlaps(
     before = np.zeros(len(kept) + 1, np.int64)
     np.cumsum(kept, out=before[1:])
     return pixel, before[first], entry[kept], area[kept], chart
+
+
+def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
+    """Return the entry of each pixel, grown by one texel around charts (edge neighbours before corners)."""
+    pages = np.full((n_pages, size + 2, size + 2), -1, np.int32)
+    inner = pages[:, 1:-1, 1:-1]
+    page, rest = np.divmod(pixel, size * size)
+    inner[page, rest // size, rest % size] = np.arange(len(pixel), dtype=np.int32)
+    covered = pages.copy()
+    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1), (0, 0), (0, 2), (2, 0), (2, 2)):
+        beside = covered[:, down : down + size, right : right + size]
+        np.copyto(inner, beside, where=(inner < 0) & (beside >= 0))
+    return np.ascontiguousarray(inner).reshape(-1)
 
 
 def _metres2_per_texel(geometry: Geometry, size: int) -> NDArray[np.float32]:
