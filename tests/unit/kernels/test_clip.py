@@ -33,7 +33,7 @@ def test_areas_are_those_of_the_polygons():
         assert polygon_area(out, n) == pytest.approx(naive.shoelace(polygon)[0], abs=1e-12)
         if naive.shoelace(polygon)[0] > 1e-9:
             # The same corners, relative to the square.
-            ours = out[:n] + [x0, y0]
+            ours = out[:n] + np.array((x0, y0))
             assert all(np.linalg.norm(polygon - c, axis=1).min() < 1e-9 for c in ours)
             assert all(np.linalg.norm(ours - c, axis=1).min() < 1e-9 for c in polygon)
         assert (out[:n] >= -1e-12).all()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import naive
 import numpy as np
 import pytest
@@ -78,9 +80,7 @@ def test_the_larger_chart_keeps_a_texel():
     rng = np.random.default_rng(5)
     first = np.concatenate([[0], np.cumsum(rng.integers(1, 7, 200))]).astype(np.int64)
     chart = rng.integers(0, 3, 40).astype(np.int32)
-    entry = np.concatenate(
-        [np.sort(rng.choice(40, b - a, replace=False)) for a, b in zip(first, first[1:], strict=False)]
-    )
+    entry = np.concatenate([np.sort(rng.choice(40, b - a, replace=False)) for a, b in pairwise(first)])
     entry = entry.astype(np.int32)
     area = np.where(rng.random(len(entry)) < 0.3, 0, rng.random(len(entry))).astype(np.float32)
     texel_chart, kept = np.full(200, -1, np.int32), np.zeros(len(entry), bool)

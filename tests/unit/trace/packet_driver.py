@@ -8,12 +8,13 @@ import numpy as np
 from numba import njit
 
 from baker.trace.embree import Tracer
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, PRIM_ID, TFAR, TNEAR, new_packet, set_ray, trace
+from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, PRIM_ID, TFAR, TNEAR, new_caster, set_ray, trace
 
 
 @njit(nogil=True)
-def _cast(function, scene, width, origin, direction, near, far, valid_ray, geom, prim, u, v, reach):  # type: ignore[no-untyped-def]
-    valid, floats, words = new_packet(width)
+def _cast(occluded, caster, origin, direction, near, far, valid_ray, geom, prim, u, v, reach):  # type: ignore[no-untyped-def]
+    width, valid, floats, words = caster.width, caster.valid, caster.floats, caster.words
+    function = caster.occluded if occluded else caster.intersect
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         for lane in range(width):
@@ -26,7 +27,7 @@ def _cast(function, scene, width, origin, direction, near, far, valid_ray, geom,
                 )  # fmt: skip
                 floats[TNEAR * width + lane] = near[i]
                 valid[lane] = -1 if valid_ray[i] else 0
-        trace(function, scene, valid, floats)
+        trace(function, caster.scene, valid, floats)
         for lane in range(lanes):
             i = group + lane
             geom[i] = words[GEOM_ID * width + lane]
@@ -52,7 +53,7 @@ def cast(rays, origin, direction, near=0.0, far=1e30, *, width=0, valid=True, oc
     near, far = (np.float32(np.broadcast_to(x, n)).copy() for x in (near, far))
     geom, prim = np.zeros(n, np.uint32), np.zeros(n, np.uint32)
     u, v, reach = (np.zeros(n, np.float32) for _ in range(3))
-    function = tracer.occluded if occluded else tracer.intersect
     valid = np.broadcast_to(np.asarray(valid, bool), n).copy()
-    _cast(function, tracer.scene, tracer.width, origin, direction, near, far, valid, geom, prim, u, v, reach)
+    caster = new_caster(tracer)
+    _cast(occluded, caster, origin, direction, near, far, valid, geom, prim, u, v, reach)
     return geom.astype(np.int32), prim.astype(np.int32), u, v, reach
