@@ -26,6 +26,7 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
+from baker.finish import warm
 from baker.finish.finish import PagePlan, finish_page
 from baker.io.load import load_scene
 from baker.kernels.emitters import Emitters
@@ -114,6 +115,7 @@ def bake(
 
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record = Record(progress)
+    compiling = warm.start()
     try:
         with record.stage("load"):
             if not isinstance(scene, Scene):
@@ -125,6 +127,7 @@ def bake(
         world = prepare(scene, atlas, settings, record)
         transport = trace_transport(scene, world, channels, settings, record)
         world.rays.close()
+        warm.finish(compiling, progress)
         result = _finish(scene, atlas, world, transport, channels, settings, record)
         if folder is not None:
             from baker.io.output import write_bake

@@ -89,7 +89,8 @@ def denoise_page(
     if not covered.any():
         return result
     window = _window(covered)
-    inside, charts = covered[window], chart[window]
+    # Contiguous: the kernels would be compiled a second time for slices.
+    inside, charts = (np.ascontiguousarray(part[window]) for part in (covered, chart))
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
     picture = surround_charts(noisy, inside, charts, threads=threads)
     filtered = filter_lightmap(picture, threads=threads, memory_mb=memory_mb, progress=progress)

@@ -28,7 +28,6 @@ from baker.kernels.emitters import (
     Emitters,
     emitted_radiance,
 )  # fmt: skip
-from baker.kernels.texel_raster import morton_code
 
 # At most so many clusters are weighed for every tile of texels.
 MAX_CLUSTERS = 256
@@ -47,8 +46,13 @@ def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
         Materials as kernels see them.
     """
     candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
-    luminance = np.zeros(len(candidate))
-    _mean_luminance(shading, candidate, _LUMINANCE, luminance)
+    material = geometry.material[candidate]
+    luminance = shading.emission[material].astype(np.float64) @ _LUMINANCE
+    textured = np.flatnonzero(shading.emission_texture[material] >= 0)
+    if len(textured):
+        mean = np.zeros(len(textured))
+        _mean_luminance(shading, candidate[textured], _LUMINANCE, mean)
+        luminance[textured] = mean
     power = np.pi * geometry.area[candidate] * luminance
     two_sided = geometry.double_sided[candidate]
     power = np.where(two_sided, 2.0 * power, power)
@@ -86,7 +90,10 @@ def _spatial_order(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[n
     centre = geometry.position[geometry.triangle[triangle]].mean(axis=1).astype(np.float64)
     low = centre.min(axis=0)
     cell = ((centre - low) / max(float(np.ptp(centre, axis=0).max()), 1e-12) * 1023.0).astype(np.int64)
-    key = np.array([int(morton_code(x, z)) * 1024 + y for x, y, z in cell], np.uint64)
+    key = np.zeros(len(cell), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            key |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
     return np.argsort(key, kind="stable")
 
 
@@ -115,17 +122,16 @@ def _bounds(
 
 @njit(cache=True)
 def _mean_luminance(shading, chosen, weights, out):  # type: ignore[no-untyped-def]
-    """Average the luminance that triangles emit over a grid of points (one point if untextured)."""
+    """Average the luminance that textured triangles emit over a grid of points."""
     radiance = np.zeros(4)
     for i in range(len(chosen)):
         t = chosen[i]
-        grid = _GRID if shading.emission_texture[shading.material[t]] >= 0 else 1
         total = 0.0
-        for a in range(grid):
-            for b in range(grid):
-                u, v = (a + 0.5) / grid, (b + 0.5) / grid
+        for a in range(_GRID):
+            for b in range(_GRID):
+                u, v = (a + 0.5) / _GRID, (b + 0.5) / _GRID
                 if u + v > 1.0:
                     u, v = 1.0 - u, 1.0 - v
                 emitted_radiance(shading, t, u, v, radiance)
                 total += radiance[0] * weights[0] + radiance[1] * weights[1] + radiance[2] * weights[2]
-        out[i] = total / (grid * grid)
+        out[i] = total / (_GRID * _GRID)

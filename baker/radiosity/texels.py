@@ -63,10 +63,14 @@ def build_texels(
     normal = np.zeros((n_front, 3), np.float32)
     albedo = np.zeros((n_front, 3), np.float32)
     scale = _metres2_per_texel(geometry, size)
+    varied = len(shading.colour) > 1 or (shading.base_texture >= 0).any()
+    if not varied:
+        albedo = _plain_albedo(shading, first, entry, entry_area)
 
     def work(begin: int, end: int) -> None:
         texel_geometry(surface, scale, begin, end, area, centroid, position, normal)
-        texel_albedo(surface, shading, begin, end, albedo)
+        if varied:
+            texel_albedo(surface, shading, begin, end, albedo)
 
     run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
     back_entry = np.full(n_front, -1, np.int32)
@@ -117,6 +121,18 @@ def _overlaps(
     before = np.zeros(len(kept) + 1, np.int64)
     np.cumsum(kept, out=before[1:])
     return pixel, before[first], entry[kept], area[kept], chart
+
+
+def _plain_albedo(
+    shading: Shading, first: NDArray[np.int64], entry: NDArray[np.int32], entry_area: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return (n_front, 3) float32: area-weighted base colours, where nothing is textured."""
+    owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    weight = np.maximum(entry_area, 1e-9)
+    total = np.bincount(owner, weight, len(first) - 1)
+    colour = shading.base[shading.material[entry]]
+    summed = [np.bincount(owner, weight * colour[:, c], len(first) - 1) for c in range(3)]
+    return (np.stack(summed, axis=1) / total[:, None]).astype(np.float32)
 
 
 def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
