@@ -11,7 +11,7 @@ from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.progress import silent
 from baker.kernels.sampling import sobol_reversed
-from baker.kernels.surface import N_POINTS, OFFSET, free_point, place, place_points
+from baker.kernels.surface import INWARD, N_POINTS, OFFSET, free_point, place, place_points
 from baker.radiosity.texels import build_texels
 
 
@@ -71,7 +71,10 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     flat = corner[..., 0, :] * (1 - b1 - b2) + corner[..., 1, :] * b1 + corner[..., 2, :] * b2
     side = np.where(texels.back, -1.0, 1.0)[:, None, None] * geometry.face_normal[hit]
     away = OFFSET * np.maximum(np.abs(flat).max(axis=2), surface.least)[..., None]
-    np.testing.assert_allclose(origin, flat + away * side, atol=1e-6)
+    # Along the face, towards its middle: no rounding puts a point of its border behind the wall beside it.
+    middle = corner.mean(axis=2) - flat
+    inward = np.minimum(INWARD * away / np.linalg.norm(middle, axis=2, keepdims=True), 0.5)
+    np.testing.assert_allclose(origin, flat + away * side + inward * middle, atol=1e-6)
     np.testing.assert_allclose(normal, side, atol=1e-6)
     assert (((origin - flat) * side).sum(axis=2) > 0.5 * away[..., 0]).all()
 
@@ -187,10 +190,10 @@ def test_normals_that_make_no_sense_give_the_face_normal():
     for normal in (np.zeros((3, 3)), np.tile([0, 0, -1], (3, 1)), [[1, 0, 0], [-1, 0, 0], [0, 0, 0]]):
         np.testing.assert_allclose(place_one(corner, normal, 0.2, 0.3)[1], [0, 0, 1])
         np.testing.assert_allclose(place_one(corner, normal, 0.2, 0.3, flip=True)[1], [0, 0, -1])
-    # Barycentrics outside, by rounding, are pulled in.
-    np.testing.assert_allclose(
-        place_one(corner, np.tile([0, 0, 1], (3, 1)), 1.1, -0.1)[0], [1, 0, 1e-5], atol=1e-6
-    )
+    # Barycentrics outside, by rounding, are pulled in, and a little more towards the middle.
+    spot = place_one(corner, np.tile([0, 0, 1], (3, 1)), 1.1, -0.1)[0]
+    step = 1e-5 * INWARD * np.array([-2.0, 1.0]) / 5**0.5
+    np.testing.assert_allclose(spot, [1 + step[0], step[1], 1e-5], atol=1e-6)
 
 
 def test_a_buried_point_is_replaced_by_a_free_one(slanted):

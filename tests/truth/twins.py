@@ -1,0 +1,42 @@
+"""Slow or plain counterparts of kernels, and doors into kernels, for the tests of truth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from baker.trace.embree import Tracer
+from baker.trace.packets import GEOM_ID, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
+
+
+def closest_hits(tracer: Tracer, origin: Any, direction: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return primitive (n,) int64, -1 for none, and distance (n,) of rays, packet by packet."""
+    origin, direction = (np.ascontiguousarray(a, np.float32) for a in (origin, direction))
+    primitive, distance = np.full(len(origin), -1, np.int64), np.full(len(origin), np.inf)
+    caster = new_caster(tracer)
+    width, floats, words = caster.width, caster.floats, caster.words
+    for begin in range(0, len(origin), width):
+        lanes = min(width, len(origin) - begin)
+        caster.valid[:] = np.where(np.arange(len(caster.valid)) < lanes, -1, 0)
+        for lane in range(lanes):
+            set_ray(floats, words, width, lane, *origin[begin + lane], *direction[begin + lane], np.float32(1e30))
+        trace(caster.intersect, caster.scene, caster.valid, floats)
+        hit = words[GEOM_ID * width : GEOM_ID * width + lanes] != NO_HIT
+        span = slice(begin, begin + lanes)
+        primitive[span][hit] = words[PRIM_ID * width : PRIM_ID * width + lanes][hit]
+        distance[span][hit] = floats[TFAR * width : TFAR * width + lanes][hit]
+    return primitive, distance
+
+
+def radiosity_sweeps(form_factor: np.ndarray, source: np.ndarray, albedo: np.ndarray, n: int) -> np.ndarray:
+    """Return the irradiance after n Jacobi sweeps of E = F (s + rho E), by plain loops over patches."""
+    irradiance = np.zeros_like(source)
+    for _ in range(n):
+        after = np.zeros_like(source)
+        for i in range(len(source)):
+            for c in range(source.shape[1]):
+                after[i, c] = sum(
+                    form_factor[i, j] * (source[j, c] + albedo[j, c] * irradiance[j, c]) for j in range(len(source))
+                )
+        irradiance = after
+    return irradiance
