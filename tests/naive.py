@@ -40,7 +40,7 @@ def assert_uniform(tables):
 
 
 def intersect(position, triangle, origin, direction, near=0.0, far=np.inf):
-    """Return (distance in units of the direction's length, triangle or -1) by Moeller and Trumbore, float64."""
+    """Return (distance in units of the direction's length, triangle or -1) as Moeller and Trumbore."""
     corner = np.asarray(position, float)[np.asarray(triangle, int)]
     if not len(corner):
         return np.inf, -1
@@ -84,7 +84,7 @@ def inside(corner, point, slack=0.0):
 
 
 def cut_polygon(corner, x0, y0, width=1.0):
-    """Return the corners, in order, of the part of a triangle inside a square, by collecting all candidates."""
+    """Return the corners, in order, of what a square leaves of a triangle."""
     corner = [tuple(map(float, c)) for c in corner]
     square = [(x0, y0), (x0 + width, y0), (x0 + width, y0 + width), (x0, y0 + width)]
     points = [p for p in corner if x0 <= p[0] <= x0 + width and y0 <= p[1] <= y0 + width]
@@ -227,23 +227,11 @@ def pyramid(image):
 # ---- lookups ----
 
 
-def hit_entry(uv, page, double_sided, lookup, back_entry, size, t, u, v, front):
-    """Return the texel entry at barycentrics of a triangle: -2 for a black back, -1 where no texel is near."""
+def hit_pixel(uv, page, double_sided, size, n_pages, t, u, v, front):
+    """Return the flat pixel at barycentrics of a triangle: backs behind all fronts, -1 is black."""
     if not front and not double_sided[t]:
-        return -2
-    pages = np.asarray(lookup).reshape(-1, size, size)
+        return -1
     x, y = ((1 - u - v) * uv[t, 0] + u * uv[t, 1] + v * uv[t, 2]).astype(float) * size
     column, row = (int(np.clip(int(c), 0, size - 1)) for c in (x, y))
-    entry = pages[page[t], row, column]
-    if entry < 0:
-        near = [
-            ((c + 0.5 - x) ** 2 + (r + 0.5 - y) ** 2, r, c)
-            for r in range(max(row - 1, 0), min(row + 2, size))
-            for c in range(max(column - 1, 0), min(column + 2, size))
-            if pages[page[t], r, c] >= 0
-        ]
-        if not near:
-            return -1
-        _, row, column = min(near)
-        entry = pages[page[t], row, column]
-    return int(entry if front else back_entry[entry])
+    pixel = (int(page[t]) * size + row) * size + column
+    return pixel if front else pixel + n_pages * size * size

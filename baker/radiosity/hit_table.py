@@ -18,7 +18,8 @@ def build_hit_table(geometry: Geometry, texels: TexelBuffer, emitters: Emitters)
     row[:, 2:4] = uv[:, 1] - uv[:, 0]
     row[:, 4:6] = uv[:, 2] - uv[:, 0]
     row[:, 6] = geometry.page
-    row[:, 7] = geometry.double_sided
+    # Slivers that own no texel may be all that has two sides: then there is no back to look up.
+    row[:, 7] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, 8:11] = geometry.face_normal
     row[:, 11] = geometry.area
     row[:, 12] = -1
