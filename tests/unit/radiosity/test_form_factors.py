@@ -1,0 +1,174 @@
+"""The form-factor matrix of rooms: whole rows, reciprocity, neighbours, determinism; buried points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+from tiny_scenes import Quad, box_quads, grey, quad_world
+
+from baker.core.progress import silent
+from baker.radiosity.buried import find_buried
+from baker.radiosity.form_factors import build_form_factors
+from baker.radiosity.patches import build_patches
+from baker.radiosity.points import points_of
+
+
+def factors(world, patches, mask=None, threads=1, n_rays=256):
+    return build_form_factors(
+        patches, world.texels.hit_image(patches.patch, -1) if patches.n else np.zeros(576, np.int32), world.surface, world.free if mask is None else mask, world.table, world.rays.tracer,
+        n_rays=n_rays, seed=0, threads=threads, progress=silent,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def cube():
+    world = quad_world(box_quads((0, 0, 0), (1, 1, 1), inward=True), 45, inset=0.2)
+    patches = build_patches(world.texels, max_patches=400)
+    return world, patches, factors(world, patches)
+
+
+def by_wall(world, patches, matrix):
+    """Return (6, 6) form factors between whole walls."""
+    wall = world.texels.instance[patches.member[patches.first[:-1]]]
+    dense = csr_matrix((matrix.value, matrix.column, matrix.first), shape=(patches.n, patches.n)).toarray()
+    flux = patches.area[:, None] * dense
+    return np.array(
+        [
+            [flux[np.ix_(wall == a, wall == b)].sum() / patches.area[wall == a].sum() for b in range(6)]
+            for a in range(6)
+        ]
+    )
+
+
+def test_rows_are_whole_in_a_closed_room(cube):
+    _, patches, matrix = cube
+    assert (matrix.sky == 0).all()
+    assert (matrix.lost < 0.02).all()
+    np.testing.assert_allclose(matrix.row_sums() + matrix.lost, 1, atol=1e-3)
+    assert (matrix.value >= 0).all()
+    assert matrix.rays == patches.n * 256
+    assert all(
+        (np.diff(matrix.column[a:b]) > 0).all() for a, b in zip(matrix.first, matrix.first[1:], strict=False)
+    )
+    assert 0 < matrix.row_error < 0.5
+    assert 0 < matrix.reciprocity_error < 1
+
+
+def test_fluxes_are_reciprocal(cube):
+    _, patches, matrix = cube
+    dense = csr_matrix((matrix.value, matrix.column, matrix.first), shape=(patches.n, patches.n)).toarray()
+    flux = patches.area[:, None] * dense
+    np.testing.assert_allclose(flux, flux.T, rtol=1e-4, atol=1e-9)
+
+
+def test_walls_see_each_other_as_the_closed_forms_say(cube):
+    """Opposite unit squares 0.1998249, adjacent ones 0.2000438 (Howell's catalogue C-11 and C-14)."""
+    world, patches, matrix = cube
+    ours = by_wall(world, patches, matrix)
+    for a in range(6):
+        assert ours[a, a] == 0
+        for b in range(6):
+            if a != b:
+                truth = 0.1998249 if a // 2 == b // 2 else 0.2000438
+                assert ours[a, b] == pytest.approx(truth, abs=0.004)
+
+
+def test_threads_change_no_byte(cube):
+    world, patches, matrix = cube
+    again = factors(world, patches, threads=2)
+    for name in ("first", "column", "value", "sky", "lost"):
+        assert getattr(again, name).tobytes() == getattr(matrix, name).tobytes()
+
+
+def test_open_scenes_and_black_backs():
+    """A floor under a one-sided board that faces away, and under the sky."""
+    floor = Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))
+    lid = Quad((-50, 1, -50), (0, 0, 100), (100, 0, 0))
+    world = quad_world([floor, lid], 24, inset=0.1)
+    patches = build_patches(world.texels, max_patches=80)
+    matrix = factors(world, patches, n_rays=128)
+    on_floor = world.texels.instance[patches.member[patches.first[:-1]]] == 0
+    # The lid's front faces up: below it is black, above it is all sky.
+    assert (matrix.lost[on_floor] > 0.99).all()
+    assert (matrix.sky[~on_floor] == 1).all()
+    np.testing.assert_array_equal(matrix.row_sums(), 0)
+    np.testing.assert_allclose(matrix.row_sums() + matrix.sky + matrix.lost, 1, atol=0.01)
+    low = Quad((-1, 0.2, -1), (0, 0, 3), (3, 0, 0), grey(double_sided=True))
+    both = quad_world([floor, low], 24, inset=0.1)
+    patches = build_patches(both.texels, max_patches=120)
+    matrix = factors(both, patches, n_rays=256)
+    on_floor = both.texels.instance[patches.member[patches.first[:-1]]] == 0
+    assert (matrix.lost == 0).all()
+    assert (matrix.row_sums()[on_floor] > 0.8).all()
+    np.testing.assert_allclose(matrix.row_sums() + matrix.sky, 1, atol=0.03)
+
+
+def test_no_patches_give_no_factors():
+    world = quad_world(box_quads((0, 0, 0), (1, 1, 1), inward=True), 24)
+    nothing = build_patches(
+        type("T", (), {
+            "resolution": 24, "pixel": np.zeros(0, np.int64), "normal": np.zeros((0, 3), np.float32),
+            "chart": np.zeros(0, np.int32), "back": np.zeros(0, bool), "area": np.zeros(0, np.float32),
+        })
+    )  # fmt: skip
+    matrix = factors(world, nothing)
+    assert matrix.first.tolist() == [0]
+    assert matrix.rays == 0
+
+
+def sunk_crate(double_sided=False):
+    """A floor with a crate that stands in it."""
+    floor = Quad((0, 0, 0), (0, 0, 4), (4, 0, 0))
+    crate = box_quads(
+        (1.03, -0.51, 1.07), (2.53, 1.0, 2.41), inward=False, material=grey(double_sided=double_sided)
+    )
+    return quad_world([floor, *crate], 96, inset=0.2)
+
+
+@pytest.fixture(scope="module")
+def buried():
+    world = sunk_crate()
+    runs = [
+        find_buried(
+            world.texels, world.surface, world.table, world.rays.tracer, seed=0, threads=t, progress=silent
+        )
+        for t in (1, 2)
+    ]
+    assert runs[0][0].tobytes() == runs[1][0].tobytes()
+    return world, *runs[0]
+
+
+def test_points_inside_the_crate_are_buried(buried):
+    world, mask, rays = buried
+    origin, _ = points_of(world.surface, world.free, np.arange(world.texels.n))
+    good = (mask[:, None] >> np.arange(16, dtype=np.uint16) & 1).astype(bool)
+    on_floor = world.texels.instance == 0
+    x, z = origin[..., 0], origin[..., 2]
+    slack = 0.02
+    inside = (x > 1.03 + slack) & (x < 2.53 - slack) & (z > 1.07 + slack) & (z < 2.41 - slack)
+    outside = (x < 1.03 - slack) | (x > 2.53 + slack) | (z < 1.07 - slack) | (z > 2.41 + slack)
+    assert inside[on_floor].sum() > 500
+    assert not good[on_floor][inside[on_floor]].any()
+    assert good[on_floor][outside[on_floor]].all()
+    assert rays > world.texels.n * 4
+
+
+def test_half_buried_texels_keep_their_free_half(buried):
+    world, mask, _ = buried
+    on_floor = np.flatnonzero(world.texels.instance == 0)
+    part = on_floor[(mask[on_floor] != 0) & (mask[on_floor] != 0xFFFF)]
+    assert len(part) > 20
+    origin, _ = points_of(world.surface, mask, part)
+    x, z = origin[..., 0], origin[..., 2]
+    assert ((x < 1.05) | (x > 2.51) | (z < 1.09) | (z > 2.39)).mean() > 0.999
+
+
+def test_nothing_is_buried_where_every_back_shines():
+    world = sunk_crate(double_sided=True)
+    table = world.table._replace(row=np.where(np.arange(16) == 7, np.float32(1), world.table.row))
+    mask, rays = find_buried(
+        world.texels, world.surface, table, world.rays.tracer, seed=0, threads=1, progress=silent
+    )
+    assert (mask == 0xFFFF).all()
+    assert rays == 0

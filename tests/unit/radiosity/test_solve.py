@@ -1,0 +1,146 @@
+"""The solve against dense linear algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from baker.core.errors import Cancelled
+from baker.core.progress import silent
+from baker.radiosity.form_factors import FormFactorMatrix
+from baker.radiosity.solve import MAX_ALBEDO, TOLERANCE, apply, energy_audit, solve_radiosity
+
+
+def room(n, seed, openness=0.0):
+    """A reciprocal matrix of n patches of unequal area whose rows sum to 1 - openness; the last sees nothing."""
+    rng = np.random.default_rng(seed)
+    area = rng.uniform(0.2, 5, n)
+    flux = rng.random((n, n)) ** 3
+    flux += flux.T
+    np.fill_diagonal(flux, 0)
+    goal = area * (1 - openness)
+    for _ in range(400):
+        scale = np.sqrt(goal / flux.sum(axis=1))
+        flux = scale[:, None] * flux * scale
+    flux[-1] = flux[:, -1] = 0
+    dense = flux / area[:, None]
+    rows = csr_matrix(dense.astype(np.float32))
+    sky = (1 - rows.toarray().sum(axis=1)).astype(np.float32)
+    matrix = FormFactorMatrix(
+        rows.indptr.astype(np.int64), rows.indices.astype(np.int32), rows.data, sky, 0 * sky, 0.0, 0.0, 0
+    )
+    return matrix, rows.toarray().astype(float), area, rng
+
+
+def dense_solution(dense, source, albedo):
+    """Return F (I - rho F)^-1 s, column by column."""
+    eye = np.eye(len(dense))
+    return np.stack(
+        [dense @ np.linalg.solve(eye - albedo[:, c, None] * dense, source[:, c]) for c in range(3)], axis=1
+    )
+
+
+@pytest.mark.parametrize("openness", [0.0, 0.3])
+@pytest.mark.parametrize("albedo", [0.0, 0.2, 0.8, 0.95, 0.999, "colours"])
+def test_the_answer_is_that_of_a_dense_solve(albedo, openness):
+    matrix, dense, area, rng = room(50, 1, openness)
+    if albedo == "colours":
+        value = rng.random((50, 3)) * [1.0, 0.5, 0.05]
+        value[:5] = 0
+    else:
+        value = np.full((50, 3), albedo)
+    source = rng.random((50, 3)) * np.maximum(value, 1e-3) * [1, 20, 0.01]
+    solution = solve_radiosity(matrix, source, value, area, bounces=None, progress=silent)
+    truth = dense_solution(dense, source, np.minimum(value, MAX_ALBEDO))
+    scale = source.max(axis=0)
+    np.testing.assert_allclose(solution.irradiance / scale, truth / scale, rtol=2e-3, atol=2e-4)
+    assert solution.residual < 20 * TOLERANCE
+    assert 0 <= solution.iterations < 60
+
+
+def test_the_residual_is_what_it_says():
+    matrix, dense, area, rng = room(40, 2)
+    albedo, source = np.full((40, 3), 0.7), rng.random((40, 3))
+    solution = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)
+    exitance = source + albedo * solution.irradiance
+    rest = dense @ exitance - solution.irradiance
+    assert np.abs(rest).max() < 1e-4
+    np.testing.assert_allclose(apply(matrix, exitance), dense @ exitance, rtol=1e-6)
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 2, 3, 10, 200])
+def test_bounces_are_terms_of_the_neumann_series(bounces):
+    matrix, dense, area, rng = room(30, 3, 0.1)
+    albedo, source = rng.random((30, 3)) * 0.9, rng.random((30, 3))
+    solution = solve_radiosity(matrix, source, albedo, area, bounces=bounces, progress=silent)
+    # The gather adds one bounce: light of the first reflection comes from `source` itself.
+    term, truth = source, np.zeros((30, 3))
+    for _ in range(max(bounces - 1, 0)):
+        arriving = dense @ term
+        truth += arriving
+        term = np.clip(albedo, 1e-4, MAX_ALBEDO) * arriving
+    np.testing.assert_allclose(solution.irradiance, truth, rtol=1e-5, atol=1e-9)
+    assert solution.iterations == max(bounces - 1, 0)
+    if bounces == 200:
+        whole = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)
+        np.testing.assert_allclose(whole.irradiance, truth, rtol=1e-3)
+
+
+def test_no_light_and_light_of_one_colour():
+    matrix, dense, area, rng = room(20, 4)
+    albedo = np.full((20, 3), 0.6)
+    dark = solve_radiosity(matrix, np.zeros((20, 3)), albedo, area, bounces=None, progress=silent)
+    assert (dark.irradiance == 0).all()
+    assert (dark.iterations, dark.residual) == (0, 0.0)
+    source = np.zeros((20, 3))
+    source[:, 1] = rng.random(20)
+    green = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)
+    assert (green.irradiance[:, [0, 2]] == 0).all()
+    np.testing.assert_allclose(green.irradiance, dense_solution(dense, source, albedo), rtol=1e-3, atol=1e-6)
+    assert np.isfinite(green.residual)
+
+
+def test_no_patches():
+    none = np.zeros(0, np.float32)
+    matrix = FormFactorMatrix(np.zeros(1, np.int64), np.zeros(0, np.int32), none, none, none, 0, 0, 0)
+    solution = solve_radiosity(
+        matrix, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), bounces=None, progress=silent
+    )
+    assert solution.irradiance.shape == (0, 3)
+    assert solution.residual == 0
+
+
+def test_a_furnace_multiplies_light():
+    """A closed room that reflects rho everywhere holds 1 / (1 - rho) of its light."""
+    rng = np.random.default_rng(5)
+    n, area = 24, rng.uniform(1, 3, 24)
+    dense = np.float32(np.tile(area / area.sum(), (n, 1)))
+    rows = csr_matrix(dense)
+    none = np.zeros(n, np.float32)
+    matrix = FormFactorMatrix(rows.indptr.astype(np.int64), rows.indices, rows.data, none, none, 0, 0, 0)
+    for rho in (0.1, 0.5, 0.95, 0.99):
+        source = np.full((n, 3), rho)
+        solution = solve_radiosity(matrix, source, source, area, bounces=None, progress=silent)
+        np.testing.assert_allclose(solution.irradiance, rho / (1 - rho), rtol=2e-3)
+
+
+def test_cancel():
+    matrix, _, area, rng = room(20, 6)
+    for bounces in (None, 5):
+        with pytest.raises(Cancelled):
+            solve_radiosity(
+                matrix, rng.random((20, 3)), np.full((20, 3), 0.9), area, bounces=bounces,
+                progress=lambda stage, fraction, detail="": fraction > 0,
+            )  # fmt: skip
+
+
+def test_light_is_neither_made_nor_lost():
+    matrix, _, area, rng = room(40, 7, 0.2)
+    albedo, direct = rng.random((40, 3)) * 0.9, rng.random((40, 3))
+    reflected = albedo * direct
+    solution = solve_radiosity(matrix, reflected, albedo, area, bounces=None, progress=silent)
+    audit = energy_audit(matrix, area, direct, reflected, solution.irradiance, albedo)
+    assert audit["emitted"] == pytest.approx((area[:, None] * direct).sum() / 3)
+    assert audit["emitted"] == pytest.approx(audit["absorbed"] + audit["escaped"], rel=1e-4)
+    assert audit["escaped"] > 0.05 * audit["emitted"]
