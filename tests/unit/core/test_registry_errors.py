@@ -44,7 +44,7 @@ def test_files_register_themselves(plugins):
 def test_a_name_is_taken_once():
     registry = Registry("baker.lights")
     assert registry.register("mine")(len) is len
-    with pytest.raises(ValueError, match="'mine' is registered twice in baker.lights"):
+    with pytest.raises(ValueError, match=r"'mine' is registered twice in baker\.lights"):
         registry.register("mine")(max)
     assert registry.get("mine") is len
 

@@ -33,14 +33,37 @@ def test_a_name_like_no_other_brings_the_list():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("resolution", 15), ("resolution", 16385), ("resolution", "wide"), ("resolution", 512.5),
-        ("density", 0), ("density", -1), ("max_pages", 0), ("max_pages", 257), ("padding", -1), ("padding", 65),
-        ("uv", "maybe"), ("unwrapper", "blender"), ("quality", "best"), ("samples", 0), ("samples", 65537),
-        ("light_samples", 0), ("ao_samples", 0), ("sky_strength", -0.1), ("bounces", -1), ("bounces", 1001),
-        ("dtype", "int"), ("up", "x"), ("scale", 0), ("seed", -1), ("seed", 2**31), ("threads", 0), ("threads", 1025),
-        ("denoise", "perhaps"), ("channels", 5),
+        ("resolution", 15),
+        ("resolution", 16385),
+        ("resolution", "wide"),
+        ("resolution", 512.5),
+        ("density", 0),
+        ("density", -1),
+        ("max_pages", 0),
+        ("max_pages", 257),
+        ("padding", -1),
+        ("padding", 65),
+        ("uv", "maybe"),
+        ("unwrapper", "blender"),
+        ("quality", "best"),
+        ("samples", 0),
+        ("samples", 65537),
+        ("light_samples", 0),
+        ("ao_samples", 0),
+        ("sky_strength", -0.1),
+        ("bounces", -1),
+        ("bounces", 1001),
+        ("dtype", "int"),
+        ("up", "x"),
+        ("scale", 0),
+        ("seed", -1),
+        ("seed", 2**31),
+        ("threads", 0),
+        ("threads", 1025),
+        ("denoise", "perhaps"),
+        ("channels", 5),
     ],
-)  # fmt: skip
+)
 def test_a_value_out_of_range_is_named(name, value):
     with pytest.raises(SettingsError) as caught:
         make_settings({name: value})
@@ -52,10 +75,16 @@ def test_a_value_out_of_range_is_named(name, value):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("resolution", 16), ("resolution", 16384), ("samples", 1), ("bounces", 0), ("seed", 2**31 - 1),
-        ("sky_strength", 0), ("padding", 0), ("threads", 1024),
+        ("resolution", 16),
+        ("resolution", 16384),
+        ("samples", 1),
+        ("bounces", 0),
+        ("seed", 2**31 - 1),
+        ("sky_strength", 0),
+        ("padding", 0),
+        ("threads", 1024),
     ],
-)  # fmt: skip
+)
 def test_the_ends_of_ranges_belong_to_them(name, value):
     assert getattr(make_settings({name: value}), name) == value
 

@@ -40,9 +40,19 @@ def lamps(n, seed, two_sided=0.2):
     material = rng.integers(0, 5, n).astype(np.int32)
     sides = (rng.random(n) < two_sided) & (material != 4)
     geometry = Geometry(
-        position, np.repeat(normal, 3, axis=0), np.zeros((3 * n, 2), np.float32), np.arange(3 * n, dtype=np.int32),
-        triangle, normal, area, zero, zero, zero, material, sides,
-    )  # fmt: skip
+        position,
+        np.repeat(normal, 3, axis=0),
+        np.zeros((3 * n, 2), np.float32),
+        np.arange(3 * n, dtype=np.int32),
+        triangle,
+        normal,
+        area,
+        zero,
+        zero,
+        zero,
+        material,
+        sides,
+    )
     emission = np.float32([[1, 1, 1], [10, 0, 0], [0.1, 0.2, 0.3], [0, 0, 0], [5, 5, 50]])
     none, uv = np.full(5, -1, np.int32), np.zeros((1, 2), np.float32)
     shading = Shading(
@@ -188,12 +198,14 @@ def test_a_sphere_around_points():
 
 
 def test_the_two_halves_of_mis_make_one_whole():
-    """n_l p_l w_l + n_h p_h w_h is the integrand for every direction, and each half alone stays below it."""
-    world = quad_world([
-        Quad((0, 1, 0), (1, 0, 0), (0, 0, 1), grey(0.5, 3.0)),
-        Quad((2, 1, 0), (1, 0, 0), (0, 0.4, 1), grey(0.5, 1.0, double_sided=True)),
-        Quad((0, 0, 0), (1, 0, 0), (0, 0, -1), grey(0.5)),
-    ])  # fmt: skip
+    """n_l p_l w_l + n_h p_h w_h is the integrand for every direction."""
+    world = quad_world(
+        [
+            Quad((0, 1, 0), (1, 0, 0), (0, 0, 1), grey(0.5, 3.0)),
+            Quad((2, 1, 0), (1, 0, 0), (0, 0.4, 1), grey(0.5, 1.0, double_sided=True)),
+            Quad((0, 0, 0), (1, 0, 0), (0, 0, -1), grey(0.5)),
+        ]
+    )
     emitters, row = world.emitters, world.table.row
     rng = np.random.default_rng(2)
     weights, dark = [], 0
@@ -209,9 +221,18 @@ def test_the_two_halves_of_mis_make_one_whole():
         d /= distance
         n_light, n_hemisphere = rng.integers(1, 300, 2)
         found = emitter_hit(
-            row, emitters.row, chance, running, t, m, *np.float32(d), *np.float32(normal), np.float32(distance),
-            float(n_light), int(n_hemisphere),
-        )  # fmt: skip
+            row,
+            emitters.row,
+            chance,
+            running,
+            t,
+            m,
+            *np.float32(d),
+            *np.float32(normal),
+            np.float32(distance),
+            float(n_light),
+            int(n_hemisphere),
+        )
         facing = -d @ world.geometry.face_normal[t]
         cosine = float(d @ normal)
         lit = cosine > 0 and (facing > 0 or world.geometry.double_sided[t])

@@ -95,9 +95,20 @@ def test_gather_is_the_sum_over_its_rays(room, rays_of):
     net, shared, begin, origin, normal, exitance, lamps, n_light, truth = rays_of
     out = np.full((room.texels.n, N_COLUMNS), -1, np.float32)
     gather(
-        origin, normal, room.table, exitance, lamps, room.shading, new_caster(room.rays.tracer), begin, net, shared,
-        SKY, np.array([REACH, n_light], np.float64), out,
-    )  # fmt: skip
+        origin,
+        normal,
+        room.table,
+        exitance,
+        lamps,
+        room.shading,
+        new_caster(room.rays.tracer),
+        begin,
+        net,
+        shared,
+        SKY,
+        np.array([REACH, n_light], np.float64),
+        out,
+    )
     ours = out[begin : begin + len(origin)]
     assert (out[:begin] == -1).all()
     assert (out[begin + len(origin) :] == -1).all()
@@ -131,7 +142,7 @@ def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
             ao_distance=REACH,
             threads=threads,
             **options,
-        )  # fmt: skip
+        )
         for threads in (1, 2)
     ]
     for name in ("indirect", "direct", "open", "variance"):
@@ -169,8 +180,10 @@ def test_shadow_rays_add_what_they_reach(room):
     before = out.copy()
     add_visible(new_caster(room.rays.tracer), origin, ray, weight.astype(np.float32), colour, begin, out)
     mesh = room.geometry.position, room.geometry.triangle
-    hit = [[naive.intersect(*mesh, o, d, 0, 0.999)[1] for o, d in zip(a, b, strict=True)]
-           for a, b in zip(origin, ray[..., :3], strict=True)]  # fmt: skip
+    hit = [
+        [naive.intersect(*mesh, o, d, 0, 0.999)[1] for o, d in zip(a, b, strict=True)]
+        for a, b in zip(origin, ray[..., :3], strict=True)
+    ]
     seen = np.array(hit) < 0
     truth = (weight * seen).mean(axis=1)[:, None] * np.tile(colour, 2)
     np.testing.assert_allclose(out[begin : begin + n] - before[begin : begin + n], truth, atol=2e-6)
@@ -192,21 +205,39 @@ def rectangle_irradiance(point, normal, corners):
 
 @pytest.mark.parametrize("n_light", [16, 64])
 def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
-    """Light samples and hemisphere rays together give E = L x projected solid angle, alone each gives less."""
+    """Light samples and hemisphere rays together give L x projected solid angle, each alone less."""
     lamp = Quad((0.3, 0.4, 0.3), (0.5, 0, 0), (0, 0, 0.6), grey(0.0, 5.0))
     floor = Quad((0, 0, 0), (0, 0, 1), (1, 0, 0), grey(0.5))
     world = quad_world([floor, lamp], 32, inset=0.3)
     options = {"seed": 0, "threads": 1, "progress": silent}
     n_gather = 64
     direct = direct_light(
-        world.surface, world.free, world.table, (), world.emitters, world.shading, world.rays.tracer,
-        n_light=n_light, n_gather=n_gather, **options,
-    )  # fmt: skip
+        world.surface,
+        world.free,
+        world.table,
+        (),
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_light=n_light,
+        n_gather=n_gather,
+        **options,
+    )
     gathered = final_gather(
-        world.texels.n_front, world.surface, world.free, world.table, np.zeros((len(world.texels.lookup), 4), np.float32),
-        world.emitters, world.shading, world.rays.tracer, n_samples=n_gather, n_light=n_light, sky=(0, 0, 0),
-        ao_distance=1.0, **options,
-    )  # fmt: skip
+        world.texels.n_front,
+        world.surface,
+        world.free,
+        world.table,
+        np.zeros((len(world.texels.lookup), 4), np.float32),
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_samples=n_gather,
+        n_light=n_light,
+        sky=(0, 0, 0),
+        ao_distance=1.0,
+        **options,
+    )
     own = np.flatnonzero(world.texels.instance == 0)
     corners = [(0.3, 0.4, 0.3), (0.8, 0.4, 0.3), (0.8, 0.4, 0.9), (0.3, 0.4, 0.9)]
     truth = 5.0 * np.array([rectangle_irradiance(world.texels.position[i], [0, 1, 0], corners) for i in own])
@@ -234,9 +265,19 @@ def test_dark_lights_cast_nothing(room):
     )
     world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))])
     direct = direct_light(
-        world.surface, world.free, world.table, lights, world.emitters, world.shading, world.rays.tracer,
-        n_light=4, n_gather=4, seed=0, threads=2, progress=silent,
-    )  # fmt: skip
+        world.surface,
+        world.free,
+        world.table,
+        lights,
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_light=4,
+        n_gather=4,
+        seed=0,
+        threads=2,
+        progress=silent,
+    )
     assert not direct.complete.any()
     assert not direct.weighted.any()
     assert not direct.variance.any()

@@ -72,8 +72,12 @@ def test_pixels_beside_a_chart_know_its_texels():
     covered.reshape(-1)[world.texels.pixel] = True
     for r in range(16):
         for c in range(16):
-            near = [lookup[y, x] for y in range(max(r - 1, 0), min(r + 2, 16)) for x in range(max(c - 1, 0), min(c + 2, 16))
-                    if covered[y, x]]  # fmt: skip
+            near = [
+                lookup[y, x]
+                for y in range(max(r - 1, 0), min(r + 2, 16))
+                for x in range(max(c - 1, 0), min(c + 2, 16))
+                if covered[y, x]
+            ]
             assert (
                 lookup[r, c] == (world.texels.lookup[r * 16 + c] if covered[r, c] else -1)
                 or lookup[r, c] in near

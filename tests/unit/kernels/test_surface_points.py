@@ -1,4 +1,4 @@
-"""The points rays start from: uniform in what triangles take of a texel, on the surface, on the right side."""
+"""The points rays start from: uniform in what triangles take of a texel, on the right side."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from baker.core.progress import silent
 from baker.kernels.sampling import sobol_reversed
 from baker.kernels.surface import INWARD, N_POINTS, OFFSET, free_point, place, place_points
 from baker.radiosity.texels import build_texels
-
 
 EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 

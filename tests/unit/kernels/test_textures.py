@@ -131,7 +131,7 @@ def test_albedo_is_the_mean_over_the_area(painted):
     world, quads, _ = painted
     texels = world.texels
     own = np.flatnonzero(texels.instance[: texels.n_front] == 1)
-    # A ramp from 0 to 1: the mean over a texel is the ramp at its centroid; 16 strata err by a few percent of it.
+    # A ramp from 0 to 1: the mean over a texel is the ramp at its centroid, up to the 16 strata.
     ramp = texels.position[own, :2] - [2, 0]
     inner = (np.abs(ramp - 0.5) < 0.4).all(axis=1)
     assert inner.sum() > 40

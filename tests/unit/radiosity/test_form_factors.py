@@ -16,9 +16,17 @@ from baker.radiosity.points import points_of
 
 def factors(world, patches, mask=None, threads=1, n_rays=256):
     return build_form_factors(
-        patches, world.texels.hit_image(patches.patch, -1) if patches.n else np.zeros(576, np.int32), world.surface, world.free if mask is None else mask, world.table, world.rays.tracer,
-        n_rays=n_rays, seed=0, threads=threads, progress=silent,
-    )  # fmt: skip
+        patches,
+        world.texels.hit_image(patches.patch, -1) if patches.n else np.zeros(576, np.int32),
+        world.surface,
+        world.free if mask is None else mask,
+        world.table,
+        world.rays.tracer,
+        n_rays=n_rays,
+        seed=0,
+        threads=threads,
+        progress=silent,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -107,11 +115,19 @@ def test_open_scenes_and_black_backs():
 def test_no_patches_give_no_factors():
     world = quad_world(box_quads((0, 0, 0), (1, 1, 1), inward=True), 24)
     nothing = build_patches(
-        type("T", (), {
-            "resolution": 24, "pixel": np.zeros(0, np.int64), "normal": np.zeros((0, 3), np.float32),
-            "chart": np.zeros(0, np.int32), "back": np.zeros(0, bool), "area": np.zeros(0, np.float32),
-        })
-    )  # fmt: skip
+        type(
+            "T",
+            (),
+            {
+                "resolution": 24,
+                "pixel": np.zeros(0, np.int64),
+                "normal": np.zeros((0, 3), np.float32),
+                "chart": np.zeros(0, np.int32),
+                "back": np.zeros(0, bool),
+                "area": np.zeros(0, np.float32),
+            },
+        )
+    )
     matrix = factors(world, nothing)
     assert matrix.first.tolist() == [0]
     assert matrix.rays == 0

@@ -28,9 +28,13 @@ def cylinder_texels(size=64):
     normal = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)[keep]
     n = len(pixel)
     return SimpleNamespace(
-        resolution=size, pixel=pixel.astype(np.int64), normal=normal.astype(np.float32), chart=np.zeros(n, np.int32),
-        back=np.zeros(n, bool), area=(rng.random(n) * (rng.random(n) < 0.95)).astype(np.float32),
-    )  # fmt: skip
+        resolution=size,
+        pixel=pixel.astype(np.int64),
+        normal=normal.astype(np.float32),
+        chart=np.zeros(n, np.int32),
+        back=np.zeros(n, bool),
+        area=(rng.random(n) * (rng.random(n) < 0.95)).astype(np.float32),
+    )
 
 
 def assert_sound(patches, texels):
@@ -66,7 +70,7 @@ def test_blocks_of_one_texel(texels):
     assert patches.block == 1
     assert patches.n == texels.n
     assert_sound(patches, texels)
-    assert MAX_PATCHES >= patches.n
+    assert patches.n <= MAX_PATCHES
 
 
 @pytest.mark.parametrize("most", [600, 200, 60, 1])
@@ -112,9 +116,13 @@ def test_means_weigh_by_what_they_are_told(texels):
 
 def test_no_texels():
     nothing = SimpleNamespace(
-        resolution=16, pixel=np.zeros(0, np.int64), normal=np.zeros((0, 3), np.float32), chart=np.zeros(0, np.int32),
-        back=np.zeros(0, bool), area=np.zeros(0, np.float32),
-    )  # fmt: skip
+        resolution=16,
+        pixel=np.zeros(0, np.int64),
+        normal=np.zeros((0, 3), np.float32),
+        chart=np.zeros(0, np.int32),
+        back=np.zeros(0, bool),
+        area=np.zeros(0, np.float32),
+    )
     patches = build_patches(nothing)
     assert patches.n == 0
     assert patches.first.tolist() == [0]

@@ -13,7 +13,7 @@ from baker.radiosity.solve import MAX_ALBEDO, TOLERANCE, apply, energy_audit, so
 
 
 def room(n, seed, openness=0.0):
-    """A reciprocal matrix of n patches of unequal area whose rows sum to 1 - openness; the last sees nothing."""
+    """A reciprocal matrix whose rows sum to 1 - openness; the last patch sees nothing."""
     rng = np.random.default_rng(seed)
     area = rng.uniform(0.2, 5, n)
     flux = rng.random((n, n)) ** 3

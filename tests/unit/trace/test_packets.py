@@ -173,7 +173,7 @@ def test_no_ray_escapes_through_an_edge():
 
 
 def test_few_rays_escape_through_a_vertex():
-    """Embree keeps tiny cracks at vertices: no ray of a bake aims at one exactly, and few of those that do leak."""
+    """Embree keeps tiny cracks at vertices: few of the rays aimed exactly at one leak, none beside it."""
     rng = np.random.default_rng(13)
     position, triangle = closed_room(2000, rng)
     origin, direction = rays_at_seams(position, triangle, np.zeros(100_000), rng)
@@ -224,7 +224,7 @@ def test_errors_of_the_library_are_sentences():
     class Answers:
         code = 4
 
-        def rtcGetDeviceError(self, device):  # noqa: N802 - Embree's name
+        def rtcGetDeviceError(self, device):
             return self.code
 
     library, rays._library = rays._library, Answers()

@@ -1,0 +1,135 @@
+"""What every family of lights promises, and the closed form of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baker.core.scene import PunctualLight
+from baker.lights.family import LIGHT_FAMILIES
+
+POSITION, DIRECTION = np.array([0.3, 2.0, -0.4]), np.array([0.48, -0.8, 0.36])
+INNER, OUTER = 0.3, 0.8
+
+
+def toward(point):
+    """Return vectors from points to the light's position, their length, and the cosine off its axis."""
+    way = POSITION - point
+    length = np.linalg.norm(way, axis=-1)
+    return way, length, -(way @ DIRECTION) / length
+
+
+def point_truth(point, normal):
+    way, length, _ = toward(point)
+    return np.maximum((way * normal).sum(-1), 0) / length**3
+
+
+def spot_truth(point, normal):
+    _, _, axis = toward(point)
+    share = np.clip((axis - np.cos(OUTER)) / (np.cos(INNER) - np.cos(OUTER)), 0, 1)
+    return point_truth(point, normal) * share**2
+
+
+def directional_truth(point, normal):
+    return np.maximum(-(normal @ DIRECTION), 0)
+
+
+# A new family adds its own line.
+TRUTH = {"point": point_truth, "spot": spot_truth, "directional": directional_truth}
+
+
+def light_of(kind, **more):
+    return PunctualLight(kind, kind, 0, (1, 1, 1), tuple(POSITION), tuple(DIRECTION), INNER, OUTER, **more)
+
+
+def points(n=60, seed=0):
+    rng = np.random.default_rng(seed)
+    origin = rng.uniform(-2, 2, (n, 16, 3))
+    normal = rng.normal(size=(n, 16, 3))
+    return np.float32(origin), np.float32(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
+
+
+def fill(kind, origin, normal, light=None):
+    ray = np.full((*origin.shape[:2], 4), np.nan, np.float32)
+    weight = np.full(origin.shape[:2], np.nan, np.float32)
+    before = origin.copy(), normal.copy()
+    assert LIGHT_FAMILIES.get(kind)(light or light_of(kind), origin, normal, ray, weight) is None
+    assert (origin == before[0]).all()
+    assert (normal == before[1]).all()
+    return ray, weight
+
+
+def test_every_family_has_a_closed_form():
+    assert LIGHT_FAMILIES.names() == sorted(TRUTH)
+
+
+@pytest.mark.parametrize("kind", sorted(TRUTH))
+def test_weights_are_the_closed_form(kind):
+    origin, normal = points()
+    ray, weight = fill(kind, origin, normal)
+    truth = TRUTH[kind](origin.astype(float), normal.astype(float))
+    np.testing.assert_allclose(weight, truth, rtol=2e-5, atol=1e-6)
+    assert (weight > 0).sum() > 20
+    assert np.isfinite(ray).all()
+    # Nothing shines from behind the horizon.
+    behind = (ray[..., :3].astype(float) * normal).sum(-1) < -1e-6
+    assert behind.sum() > 100
+    assert (weight[behind] == 0).all()
+
+
+@pytest.mark.parametrize("kind", sorted(TRUTH))
+def test_rays_end_just_before_the_light(kind):
+    origin, normal = points(seed=1)
+    ray, _ = fill(kind, origin, normal)
+    if kind == "directional":
+        np.testing.assert_allclose(ray[..., :3], np.broadcast_to(-DIRECTION, origin.shape), atol=1e-6)
+        assert (ray[..., 3] > 1e20).all()
+        return
+    end = origin + ray[..., 3:].astype(float) * ray[..., :3]
+    distance = np.linalg.norm(end - POSITION, axis=-1)
+    length = np.linalg.norm(POSITION - origin, axis=-1)
+    assert (distance < 1e-4 * length).all()
+    assert (ray[..., 3] < 1).all()
+
+
+@pytest.mark.parametrize("kind", sorted(TRUTH))
+def test_a_candela_a_metre_and_a_lux(kind):
+    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, whatever the family."""
+    light = PunctualLight(kind, "", 0, (1, 1, 1), (0, 1, 0), (0, -1, 0), 0.2, 0.5)
+    up = np.zeros((1, 16, 3), np.float32)
+    up[..., 1] = 1
+    _, weight = fill(kind, np.zeros((1, 16, 3), np.float32), up, light)
+    np.testing.assert_allclose(weight, 1, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", sorted(TRUTH))
+def test_odd_points(kind):
+    """No texel, and a point at the light itself: nothing that is not a number."""
+    none = np.zeros((0, 16, 3), np.float32)
+    assert fill(kind, none, none)[1].shape == (0, 16)
+    at = np.float32(np.tile(POSITION, (1, 16, 1)))
+    normal = points(1)[1]
+    ray, weight = fill(kind, at, normal)
+    assert np.isfinite(ray).all()
+    assert np.isfinite(weight).all()
+
+
+def test_the_fall_off_of_a_spot():
+    origin = np.zeros((1, 16, 3), np.float32)
+    normal = np.zeros((1, 16, 3), np.float32)
+    angle = np.array([0, 0.1, 0.29, 0.31, 0.4, 0.5, 0.6, 0.7, 0.79, 0.81, 1.0, 1.5, 2.0, 3.0, 3.1, 0.3])
+    # Points on a unit sphere around the light, facing it: the weight is the cone's share alone.
+    axis, side = DIRECTION, np.cross(DIRECTION, [0, 1, 0])
+    side = side / np.linalg.norm(side)
+    way = np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * side
+    origin[0], normal[0] = POSITION + way, -way
+    _, weight = fill("spot", origin, normal)
+    share = np.clip((np.cos(angle) - np.cos(OUTER)) / (np.cos(INNER) - np.cos(OUTER)), 0, 1) ** 2
+    np.testing.assert_allclose(weight[0], share, atol=1e-5)
+    assert (weight[0][angle <= INNER] > 0.9999).all()
+    assert (weight[0][angle > OUTER] == 0).all()
+    # An inner cone as wide as the outer one is a sharp edge, no division by zero.
+    light = PunctualLight("spot", "", 0, (1, 1, 1), tuple(POSITION), tuple(DIRECTION), OUTER, OUTER)
+    _, sharp = fill("spot", origin, normal, light)
+    np.testing.assert_allclose(sharp[0][angle < OUTER - 0.02], 1, atol=1e-5)
+    assert (sharp[0][angle > OUTER] == 0).all()
