@@ -129,9 +129,11 @@ def weigh_reciprocal(
 
 
 @njit(cache=True, nogil=True)
-def scale_symmetric(first, column, value, area, goal, factor, steps):  # type: ignore[no-untyped-def]
+def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: ignore[no-untyped-def]
     """Find factors d (P,) so that d_i F_ij d_j has row sums `goal`, keeping A_i F_ij symmetric.
 
+    `slack` (P,) is how uncertain a goal is: d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without it a
+    large patch whose few rays all missed a small one would take from the small one what that saw well.
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008 (damped form).
     """
     for _ in range(steps):
@@ -140,4 +142,4 @@ def scale_symmetric(first, column, value, area, goal, factor, steps):  # type: i
             for k in range(first[i], first[i + 1]):
                 total += value[k] * factor[column[k]]
             if total > 0.0:
-                factor[i] = math.sqrt(factor[i] * goal[i] / total)
+                factor[i] = math.sqrt(factor[i] * (goal[i] + slack[i]) / (total + slack[i]))

@@ -28,6 +28,8 @@ from baker.trace.packets import new_caster
 STAGE = "form factors"
 _TILE = 256
 _BALANCE_STEPS = 30
+# How many rays' worth of its own measurement a row sum may give way to what other patches saw.
+_SLACK = 4.0
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,9 @@ def _balanced(
     factor = np.ones(n)
     running = np.concatenate([[0.0], np.cumsum(merged, dtype=np.float64)])
     row_error = float(np.abs(running[merged_first[1:]] - running[merged_first[:-1]] - goal).max(initial=0.0))
-    scale_symmetric(merged_first, merged_column, merged, area, goal, factor, _BALANCE_STEPS)
+    # The goal's own noise: nothing in a closed room, a few rays where most leave the scene.
+    slack = _SLACK * (1.0 - goal) * n / max(rays, 1)
+    scale_symmetric(merged_first, merged_column, merged, goal, slack, factor, _BALANCE_STEPS)
     row = np.repeat(np.arange(n), np.diff(merged_first))
     balanced = (merged * factor[row] * factor[merged_column]).astype(np.float32)
     return FormFactorMatrix(

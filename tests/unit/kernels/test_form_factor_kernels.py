@@ -82,7 +82,7 @@ def test_rows_are_balanced_and_stay_reciprocal():
     goal = rng.uniform(0.6, 1.0, n)
     rows = csr_matrix(dense)
     factor = np.ones(n)
-    scale_symmetric(*parts(rows), area, goal, factor, 100)
+    scale_symmetric(*parts(rows), goal, np.zeros(n), factor, 100)
     balanced = factor[:, None] * dense * factor
     keep = np.arange(n) != 7
     np.testing.assert_allclose(balanced.sum(axis=1)[keep], goal[keep], rtol=1e-6)
@@ -91,5 +91,10 @@ def test_rows_are_balanced_and_stay_reciprocal():
     np.testing.assert_allclose(flux, flux.T, rtol=1e-5)
     # Rows that are right already stay as they are.
     again = np.ones(n)
-    scale_symmetric(*parts(rows), area, dense.sum(axis=1, dtype=float), again, 5)
+    scale_symmetric(*parts(rows), dense.sum(axis=1, dtype=float), np.zeros(n), again, 5)
+    # Slack is taken from what is missing, row by row.
+    slack, factor = rng.uniform(0, 0.2, n), np.ones(n)
+    scale_symmetric(*parts(rows), goal, slack, factor, 200)
+    reached = (factor[:, None] * dense * factor).sum(axis=1)
+    np.testing.assert_allclose(reached[keep], (goal + slack * (1 - factor))[keep], rtol=1e-6)
     np.testing.assert_allclose(again, 1, atol=1e-6)

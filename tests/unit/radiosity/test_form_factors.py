@@ -188,3 +188,22 @@ def test_nothing_is_buried_where_every_back_shines():
     )
     assert (mask == 0xFFFF).all()
     assert rays == 0
+
+
+def test_small_patches_keep_what_large_ones_missed():
+    """Few rays of a huge lid meet the floor under it; the floor's own rays all see the lid."""
+    floor = Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))
+    lid = Quad((-50, 1, -50), (0, 0, 100), (100, 0, 0), grey(double_sided=True))
+    world = quad_world([floor, lid], 24, inset=0.1)
+    patches = build_patches(world.texels, max_patches=120)
+    matrix = factors(world, patches, n_rays=128)
+    on_floor = world.texels.instance[patches.member[patches.first[:-1]]] == 0
+    np.testing.assert_allclose(matrix.row_sums()[on_floor], 1, atol=0.01)
+    # A house on open ground: its walls see half ground, half sky.
+    ground = Quad((-50, 0, -50), (0, 0, 100), (100, 0, 0))
+    world = quad_world([*box_quads((-2, 0.01, -2), (2, 4, 2), inward=False), ground], 48, inset=0.1)
+    patches = build_patches(world.texels, max_patches=1000)
+    matrix = factors(world, patches, n_rays=128)
+    wall = np.isin(world.texels.instance[patches.member[patches.first[:-1]]], [0, 1, 4, 5])
+    seen = 1 - matrix.sky[wall] - matrix.lost[wall]
+    assert matrix.row_sums()[wall].mean() == pytest.approx(seen.mean(), rel=0.03)
