@@ -1,0 +1,251 @@
+"""The rate of Embree alone: packets of rays as a bake casts them, and nothing done with what they hit.
+
+Two loops each: `ready` reads packets that were made before the clock starts; `made` also makes the rays,
+as the bake's own kernels do. Both use the bake's own points, directions, packet width, tiles and threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import silent
+from baker.kernels.emitters import Emitters
+from baker.kernels.rays import FAR, aim_texel, lane_seeds
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
+from baker.kernels.surface import N_POINTS
+from baker.pipeline import World
+from baker.radiosity.points import points_of
+from baker.trace.packets import new_caster, set_ray, trace
+
+# Rows of a packet that hold the ray; the hit needs only its geometry number reset.
+RAY_ROWS = 12
+GEOM_ROW = 18
+# Texels in a tile, and the most rays that are kept ready at once (about 50 bytes each).
+TILE = 256
+MOST_READY = 4_000_000
+
+
+@njit(cache=True, nogil=True)
+def _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far):  # type: ignore[no-untyped-def]
+    k = s * N_POINTS // len(net)
+    for lane in range(lanes):
+        u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+        v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+        aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, far)
+
+
+@njit(cache=True, nogil=True)
+def _aim_lamp(
+    floats, words, valid, width, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative
+):  # type: ignore[no-untyped-def]
+    """Aim at points uniform on the emitters' area; lanes that cannot be lit take no part, as in a bake."""
+    k = s * N_POINTS // len(net)
+    for lane in range(lanes):
+        i = group + lane
+        u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
+        v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+        m = min(np.searchsorted(cumulative, u, side="right"), len(cumulative) - 1)
+        low = cumulative[m - 1] if m else np.float32(0.0)
+        u = min(max((u - low) / (cumulative[m] - low), np.float32(0.0)), np.float32(1.0))
+        b1, b2 = triangle_barycentric(u, v)
+        d = np.zeros(3, np.float32)
+        square = np.float32(0.0)
+        facing = np.float32(0.0)
+        emitted = np.float32(0.0)
+        for c in range(3):
+            edge1, edge2 = corner[m, 3 + c] - corner[m, c], corner[m, 6 + c] - corner[m, c]
+            d[c] = corner[m, c] + b1 * edge1 + b2 * edge2 - origin[i, k, c]
+            square += d[c] * d[c]
+            facing += d[c] * normal[i, k, c]
+            emitted -= d[c] * corner[m, 9 + c]
+        length = np.sqrt(square)
+        valid[lane] = -1 if facing > 0.0 and emitted > 0.0 else 0
+        set_ray(
+            floats, words, width, lane, origin[i, k, 0], origin[i, k, 1], origin[i, k, 2],
+            d[0] / length, d[1] / length, d[2] / length, length * np.float32(0.9999),
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _made(function, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
+    """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
+    width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
+    seeds = np.zeros((width, 2), np.uint32)
+    mixed = np.uint32(0)
+    for group in range(0, len(origin), width):
+        lanes = min(width, len(origin) - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
+        for lane in range(width):
+            valid[lane] = -1 if lane < lanes else 0
+        for s in range(len(net)):
+            _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far)
+            trace(function, scene, valid, floats)
+            mixed ^= words[GEOM_ROW * width]
+    return mixed
+
+
+@njit(cache=True, nogil=True)
+def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, bank, lanes_on):  # type: ignore[no-untyped-def]
+    """Write the packets of a tile to `bank` (packets, 12 * width) and their lanes to `lanes_on`.
+
+    With emitters in `corner` the rays go there, else over the hemisphere.
+    """
+    width, valid, floats, words = caster.width, caster.valid, caster.floats, caster.words
+    seeds = np.zeros((width, 2), np.uint32)
+    packet = 0
+    for group in range(0, len(origin), width):
+        lanes = min(width, len(origin) - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
+        for lane in range(width):
+            valid[lane] = -1 if lane < lanes else 0
+        for s in range(len(net)):
+            if len(corner):
+                _aim_lamp(
+                    floats, words, valid, width, origin, normal, group, lanes, net, shared, seeds, s,
+                    corner, cumulative,
+                )  # fmt: skip
+            else:
+                _aim_hemisphere(
+                    floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far
+                )
+            bank[packet, :] = floats[: RAY_ROWS * width]
+            lanes_on[packet, :] = valid[:width]
+            packet += 1
+
+
+@njit(cache=True, nogil=True)
+def _ready(function, caster, bank, lanes_on):  # type: ignore[no-untyped-def]
+    """Trace stored packets; return a number that depends on them."""
+    width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
+    mixed = np.uint32(0)
+    for packet in range(len(bank)):
+        for j in range(RAY_ROWS * width):
+            floats[j] = bank[packet, j]
+        for lane in range(width):
+            valid[lane] = lanes_on[packet, lane]
+            words[GEOM_ROW * width + lane] = np.uint32(0xFFFFFFFF)
+        trace(function, scene, valid, floats)
+        mixed ^= words[GEOM_ROW * width]
+    return mixed
+
+
+@dataclass(frozen=True)
+class _Tile:
+    begin: int
+    origin: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    bank: NDArray[np.float32]
+    lanes_on: NDArray[np.int32]
+    rays: int
+
+
+class BareRays:
+    """Rays of one kind from texels spread over the whole page, kept ready to be traced again and again.
+
+    Parameters
+    ----------
+    world : World
+        See `baker.pipeline.prepare`.
+    n_samples : int
+        Rays per texel.
+    occlusion : bool
+        Ask only whether something is in the way.
+    distance : float
+        Reach in metres, inf for no end.
+    to_lamps : bool
+        Aim at emissive triangles instead of over the hemisphere.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        n_samples: int,
+        seed: int,
+        threads: int,
+        occlusion: bool,
+        distance: float = np.inf,
+        to_lamps: bool = False,
+    ) -> None:
+        self._tracer = world.rays.tracer
+        self._function = self._tracer.occluded if occlusion else self._tracer.intersect
+        self._threads = threads
+        self._net = sobol_reversed(n_samples, seed, 6)
+        self._shared = shared_bits_mask(n_samples)
+        self._far = np.float32(min(distance, float(FAR)))
+        self._made_too = not to_lamps
+        corner, cumulative = _lamp_corners(world.emitters, wanted=to_lamps)
+        n = world.texels.n_front
+        tiles = -(-n // TILE)
+        every = max(1, -(-n * n_samples // MOST_READY))
+        self._tiles = [
+            self._tile(world, number * TILE, min((number + 1) * TILE, n), corner, cumulative)
+            for number in range(0, tiles, every)
+        ]
+        self.rays = sum(tile.rays for tile in self._tiles)
+
+    def _tile(
+        self, world: World, begin: int, end: int, corner: NDArray[np.float32], cumulative: NDArray[np.float32]
+    ) -> _Tile:
+        origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
+        width, n_samples = self._tracer.width, len(self._net)
+        packets = -(-(end - begin) // width) * n_samples
+        bank = np.zeros((packets, RAY_ROWS * width), np.float32)
+        lanes_on = np.zeros((packets, width), np.int32)
+        caster = new_caster(self._tracer)
+        _store(
+            caster, origin, normal, begin, self._net, self._shared, self._far, corner, cumulative,
+            bank, lanes_on,
+        )  # fmt: skip
+        return _Tile(begin, origin, normal, bank, lanes_on, (end - begin) * n_samples)
+
+    def rate(self, *, ready: bool) -> float:
+        """Trace all rays once and return Mrays/s.
+
+        Parameters
+        ----------
+        ready : bool
+            Use the stored packets; else make the rays inside the clock (hemisphere rays only).
+        """
+        if not ready and not self._made_too:
+            raise ValueError("rays to lamps are only measured ready-made")
+        local = threading.local()
+
+        def work(begin: int, end: int) -> None:
+            if not hasattr(local, "caster"):
+                local.caster = new_caster(self._tracer)
+            for tile in self._tiles[begin:end]:
+                if ready:
+                    _ready(self._function, local.caster, tile.bank, tile.lanes_on)
+                else:
+                    _made(
+                        self._function, local.caster, tile.origin, tile.normal, tile.begin,
+                        self._net, self._shared, self._far,
+                    )  # fmt: skip
+
+        start = perf_counter()
+        run_tiles(len(self._tiles), 4, work, threads=self._threads, stage="bare", progress=silent)
+        return self.rays / (perf_counter() - start) / 1e6
+
+    def warm(self) -> None:
+        """Compile the loops on the first tile."""
+        first, self._tiles = self._tiles, self._tiles[:1]
+        self.rate(ready=True)
+        if self._made_too:
+            self.rate(ready=False)
+        self._tiles = first
+
+
+def _lamp_corners(emitters: Emitters, *, wanted: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return (M, 12) corners and normal of the emissive triangles, and (M,) running share of area."""
+    if not wanted or not len(emitters.row):
+        return np.zeros((0, 12), np.float32), np.zeros(0, np.float32)
+    area = emitters.row[:, 12].astype(np.float64)
+    return np.ascontiguousarray(emitters.row[:, :12]), (np.cumsum(area) / area.sum()).astype(np.float32)

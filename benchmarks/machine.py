@@ -1,0 +1,58 @@
+"""What a measurement was made on: processor, cores, memory, versions, date."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("baker", "numpy", "scipy", "numba", "embreex", "xatlas", "pyoidn", "OpenEXR")
+
+
+def describe() -> dict[str, str | float | int]:
+    """Return the machine and the versions as one flat table."""
+    found: dict[str, str | float | int] = {
+        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        "memory_gb": _memory(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+    }
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+def load() -> float:
+    """Return how many processes want a core, averaged over the last minute; 0 where it is unknown."""
+    return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else 0.0
+
+
+def _processor() -> str:
+    facts: dict[str, str] = {}
+    path = Path("/proc/cpuinfo")
+    if path.exists():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            key, _, value = line.partition(":")
+            facts.setdefault(key.strip(), value.strip())
+    name = facts.get("model name") or platform.processor() or "unknown"
+    if "model" in facts and "cpu family" in facts:
+        # Virtual machines often tell no more than the maker's name; family and model say the generation.
+        name += f" (family {facts['cpu family']}, model {facts['model']})"
+    if "avx512f" in facts.get("flags", ""):
+        name += ", AVX-512"
+    elif "avx2" in facts.get("flags", ""):
+        name += ", AVX2"
+    return name
+
+
+def _memory() -> float:
+    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+        return round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**30, 1)
+    return 0.0

@@ -1,0 +1,121 @@
+"""Rates of the bake's ray stages beside those of the loops of `bare`, measured in turn in one process."""
+
+from __future__ import annotations
+
+import statistics
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from bare import BareRays
+
+from baker.channels.channel import CHANNELS
+from baker.core.parallel import thread_count
+from baker.core.progress import silent
+from baker.core.settings import BakeSettings, make_settings
+from baker.io.load import load_scene
+from baker.pipeline import Record, World, prepare, trace_transport
+from baker.unwrap.unwrap import unwrap_scene
+
+# Stage of the bake -> kind of bare rays it is put beside.
+BESIDE = {
+    "final gather": "closest hit",
+    "form factors": "closest hit",
+    "buried texels": "closest hit",
+    "direct light": "towards lamps",
+    "ambient occlusion": "occlusion within the AO distance",
+}
+
+
+def measure(
+    scene_path: Path, *, resolution: int, samples: int, repeat: int, sky: str | None
+) -> dict[str, Any]:
+    """Trace a scene's transport and the bare loops `repeat` times in turn.
+
+    Returns
+    -------
+    dict
+        scene, resolution, triangles, texels; `stages` {stage: {seconds, rays, rate}} and
+        `bare` {kind: {ready, made}}: Mrays/s, the best of all turns; `spread` has the medians.
+    """
+    values: dict[str, Any] = {
+        "resolution": resolution,
+        "samples": samples,
+        "light_samples": samples,
+        "uv": "auto",
+    }
+    if sky:
+        values["sky"] = sky
+    settings = make_settings(values)
+    scene = load_scene(scene_path, up=settings.up, scale=settings.scale)
+    world = prepare(scene, unwrap_scene(scene, settings, silent), settings, Record(silent))
+    kinds = _kinds(world, settings)
+    for rays in kinds.values():
+        rays.warm()
+    _turn(scene, world, make_settings({**values, "samples": 1, "light_samples": 1}))
+    turns: list[dict[str, tuple[float, int]]] = []
+    bare: dict[str, dict[str, list[float]]] = {kind: {"ready": [], "made": []} for kind in kinds}
+    for _ in range(repeat):
+        turns.append(_turn(scene, world, settings))
+        for kind, rays in kinds.items():
+            bare[kind]["ready"].append(rays.rate(ready=True))
+            if kind != "towards lamps":
+                bare[kind]["made"].append(rays.rate(ready=False))
+    stages = {}
+    for name in turns[0]:
+        seconds = [turn[name][0] for turn in turns]
+        rays_cast = turns[0][name][1]
+        stages[name] = {
+            "seconds": min(seconds),
+            "median": statistics.median(seconds),
+            "rays": rays_cast,
+            "rate": rays_cast / min(seconds) / 1e6,
+            "beside": BESIDE[name],
+        }
+    result = {
+        "scene": scene_path.name,
+        "resolution": resolution,
+        "triangles": len(world.geometry.triangle),
+        "texels": world.texels.n_front,
+        "width": world.rays.tracer.width,
+        "stages": stages,
+        "bare": {kind: {loop: max(r) for loop, r in loops.items() if r} for kind, loops in bare.items()},
+        "bare_median": {
+            kind: {loop: statistics.median(r) for loop, r in loops.items() if r}
+            for kind, loops in bare.items()
+        },
+    }
+    world.rays.close()
+    return result
+
+
+def _kinds(world: World, settings: BakeSettings) -> dict[str, BareRays]:
+    threads, n = thread_count(settings.threads), settings.hemisphere_samples
+    same: dict[str, Any] = {"n_samples": n, "seed": settings.seed, "threads": threads}
+    kinds = {
+        "closest hit": BareRays(world, occlusion=False, **same),
+        "occlusion within the AO distance": BareRays(
+            world, occlusion=True, distance=settings.ao_reach(world.geometry.diagonal), **same
+        ),
+        "occlusion, unlimited": BareRays(world, occlusion=True, **same),
+    }
+    if len(world.emitters.row):
+        kinds["towards lamps"] = BareRays(world, occlusion=True, to_lamps=True, **same)
+    return kinds
+
+
+def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[float, int]]:
+    """Cast all rays of a bake once; return seconds and rays of each stage."""
+    record = Record(silent)
+    trace_transport(scene, world, {"irradiance": CHANNELS.get("irradiance")}, settings, record)
+    trace_transport(scene, world, {"ao": CHANNELS.get("ao")}, settings, record)
+    # Whatever `prepare` does to find buried points is timed there, once; here its rays are cast again.
+    from baker.radiosity.buried import find_buried
+
+    start = perf_counter()
+    _, cast = find_buried(
+        world.texels, world.surface, world.table, world.rays.tracer,
+        seed=settings.seed, threads=thread_count(settings.threads), progress=silent,
+    )  # fmt: skip
+    record.timings["buried texels"], record.rays["buried texels"] = perf_counter() - start, cast
+    return {name: (record.timings[name], cast) for name, cast in record.rays.items() if cast}
