@@ -71,24 +71,32 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     """Return the emitters with the chances that points (m, w, 3) float32, metres, give their clusters."""
     chance = np.zeros(len(emitters.power), np.float32)
     cumulative = np.zeros_like(chance)
-    if len(chance):
-        cluster_chances(emitters, *bounding_sphere(origin.reshape(-1, 3)), chance, cumulative)
+    if len(chance) and len(origin):
+        cluster_chances(emitters, origin, chance, cumulative)
     return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
 
 
-def bounding_sphere(position: NDArray[np.float32]) -> tuple[float, float, float, float]:
-    """Return x, y, z, radius of a sphere around (n, 3) points: their box's centre and half diagonal."""
-    low, high = position.min(axis=0).astype(np.float64), position.max(axis=0).astype(np.float64)
-    x, y, z = 0.5 * (low + high)
-    return float(x), float(y), float(z), float(0.5 * np.linalg.norm(high - low))
+@njit(cache=True, nogil=True)
+def bounding_sphere(origin):  # type: ignore[no-untyped-def]
+    """Return x, y, z, radius of a sphere around points (m, w, 3): their box's centre and half diagonal."""
+    low = np.full(3, 1.0e30)
+    high = np.full(3, -1.0e30)
+    for i in range(origin.shape[0]):
+        for k in range(origin.shape[1]):
+            for a in range(3):
+                low[a] = min(low[a], origin[i, k, a])
+                high[a] = max(high[a], origin[i, k, a])
+    half = 0.5 * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2 + (high[2] - low[2]) ** 2)
+    return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]), half
 
 
 @njit(cache=True, nogil=True)
-def cluster_chances(emitters, x, y, z, radius, chance, cumulative):  # type: ignore[no-untyped-def]
-    """Fill `chance` and `cumulative` (C,) float32 for points within a sphere.
+def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
+    """Fill `chance` and `cumulative` (C,) float32 for points (m, w, 3), taken as their bounding sphere.
 
     A cluster's chance is zero only if no point of the sphere can see the front of its triangles.
     """
+    x, y, z, radius = bounding_sphere(origin)
     total = 0.0
     n = len(chance)
     for c in range(n):

@@ -104,8 +104,11 @@ def weigh_reciprocal(
 
     `other` is the transpose of F in CSR: row i has the entries F_ji. The variance of A_i F_ij is
     proportional to A_i, so the best weights are A_j for the own estimate and A_i for the other's.
+    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| of the two raw estimates.
     """
     at = 0
+    exchanged = 0.0
+    unlike = 0.0
     for i in range(len(first) - 1):
         out_first[i] = at
         a = first[i]
@@ -115,17 +118,21 @@ def weigh_reciprocal(
             cb = other_column[b] if b < other_first[i + 1] else 2147483647
             j = min(ca, cb)
             both = area[i] + area[j]
-            f = 0.0
+            own = 0.0
+            other = 0.0
             if ca == j:
-                f += value[a] * area[j] / both
+                own = value[a]
                 a += 1
             if cb == j:
-                f += other_value[b] * area[j] / both
+                other = other_value[b]
                 b += 1
+            exchanged += area[i] * own
+            unlike += abs(area[i] * own - area[j] * other)
             out_column[at] = j
-            out_value[at] = f
+            out_value[at] = (own + other) * area[j] / both
             at += 1
     out_first[len(first) - 1] = at
+    return exchanged, unlike
 
 
 @njit(cache=True, nogil=True)
@@ -137,9 +144,14 @@ def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: 
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008 (damped form).
     """
     for _ in range(steps):
+        most = 0.0
         for i in range(len(first) - 1):
             total = 0.0
             for k in range(first[i], first[i + 1]):
                 total += value[k] * factor[column[k]]
             if total > 0.0:
-                factor[i] = math.sqrt(factor[i] * (goal[i] + slack[i]) / (total + slack[i]))
+                new = math.sqrt(factor[i] * (goal[i] + slack[i]) / (total + slack[i]))
+                most = max(most, abs(new - factor[i]))
+                factor[i] = new
+        if most < 1.0e-6:
+            break

@@ -149,14 +149,12 @@ def _balanced(
     merged_first = np.zeros(n + 1, np.int64)
     merged_column = np.zeros(2 * len(column), np.int32)
     merged = np.zeros(2 * len(column), np.float32)
-    weigh_reciprocal(
+    exchanged, unlike = weigh_reciprocal(
         first, column, value, other.indptr.astype(np.int64), other.indices, other.data, area,
         merged_first, merged_column, merged,
     )  # fmt: skip
     merged_column, merged = merged_column[: merged_first[-1]], merged[: merged_first[-1]]
-    weighted = raw.multiply(area[:, None]).tocsr()
-    total = float(weighted.sum())
-    reciprocity = float(abs(weighted - weighted.T).sum()) / max(total, 1e-300)
+    reciprocity = unlike / max(exchanged, 1e-300)
     goal = 1.0 - sky.astype(np.float64) - lost
     factor = np.ones(n)
     running = np.concatenate([[0.0], np.cumsum(merged, dtype=np.float64)])

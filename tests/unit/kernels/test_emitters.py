@@ -72,7 +72,10 @@ def lamps(n, seed, two_sided=0.2):
 
 def chances(emitters, centre, radius):
     chance, running = np.zeros((2, len(emitters.power)), np.float32)
-    cluster_chances(emitters, *map(float, centre), float(radius), chance, running)
+    # Two points whose box has this centre and half diagonal.
+    reach = np.full(3, radius / np.sqrt(3.0))
+    origin = np.float32([[centre - reach, centre + reach]])
+    cluster_chances(emitters, origin, chance, running)
     assert chance.any()
     return chance, running
 
@@ -191,7 +194,7 @@ def test_nothing_to_choose():
 
 def test_a_sphere_around_points():
     point = np.float32(np.random.default_rng(0).normal(size=(50, 3)))
-    x, y, z, radius = bounding_sphere(point[10:40])
+    x, y, z, radius = bounding_sphere(point[10:40].reshape(10, 3, 3))
     distance = np.linalg.norm(point[10:40] - [x, y, z], axis=1)
     assert (distance <= radius * (1 + 1e-6)).all()
     assert radius <= np.sqrt(3) * distance.max()
