@@ -35,6 +35,9 @@ __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
 # The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
 REACH = 96
+# Mirrored texels around the picture: the filter tints its outermost ones (grey with 5 % noise came out 6 % red
+# in the corners, 0.4 % with this margin).
+MARGIN = 16
 # Half window of the slopes at chart borders, texels.
 SLOPE_RADIUS = 4
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -93,7 +96,9 @@ def denoise_page(
     inside, charts = (np.ascontiguousarray(part[window]) for part in (covered, chart))
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
     picture = surround_charts(noisy, inside, charts, threads=threads)
-    filtered = filter_lightmap(picture, threads=threads, memory_mb=memory_mb, progress=progress)
+    wide = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
+    wide = filter_lightmap(wide, threads=threads, memory_mb=memory_mb, progress=progress)
+    filtered = np.ascontiguousarray(wide[MARGIN:-MARGIN, MARGIN:-MARGIN])
     if standard_error is None:
         error = estimate_error(noisy @ LUMINANCE, charts, inside, threads=threads)
     else:
