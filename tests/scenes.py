@@ -1,4 +1,4 @@
-"""Closed-form scenes as code: quads and triangles with texel-exact lightmap uv, built without any importer."""
+"""Closed-form scenes as code: quads and triangles with texel-exact lightmap uv, without any importer."""
 
 from __future__ import annotations
 
@@ -242,7 +242,9 @@ def form_factors(
     world, _ = prepared(builder, seed=seed)
     patches = build_patches(world.texels)
     matrix = build_form_factors(
-        patches, world.surface, world.mask, world.table, world.rays.tracer,
+        patches,
+        world.texels.hit_image(patches.patch, fill=-1),
+        world.surface, world.mask, world.table, world.rays.tracer,
         n_rays=n_rays, seed=seed, threads=2, progress=silent,
     )  # fmt: skip
     return world, patches, matrix

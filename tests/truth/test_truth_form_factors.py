@@ -58,7 +58,7 @@ def test_perpendicular_unit_squares_with_a_common_edge():
 
 
 def test_the_cube_closes():
-    assert PARALLEL + 4 * PERPENDICULAR == pytest.approx(1, abs=1e-6)
+    assert pytest.approx(1, abs=1e-6) == PARALLEL + 4 * PERPENDICULAR
     truth = np.full((6, 6), PERPENDICULAR)
     for k in range(6):
         truth[k, k], truth[k, k ^ 1] = 0.0, PARALLEL
@@ -112,7 +112,7 @@ def unequal_room(builder):
 def test_closed_room_of_unequal_areas_loses_nothing(n_rays):
     builder = SceneBuilder(64)
     unequal_room(builder)
-    world, patches, matrix = form_factors(builder, n_rays=n_rays)
+    _world, patches, matrix = form_factors(builder, n_rays=n_rays)
     assert patches.area.max() / patches.area.min() > 3
     # Rays aimed at edges do not leak: not one of all rays finds the sky or the outside of a wall.
     assert matrix.sky.max() == 0

@@ -7,10 +7,10 @@ import pytest
 from scenes import SceneBuilder, icosphere
 from ztest import assert_unbiased
 
-SEEDS = 6
+SEEDS = 12
 
 
-def furnace_box(albedo, size=64, texels=12):
+def furnace_box(albedo, size=32, texels=6):
     builder = SceneBuilder(size)
     quads = builder.box((0, 0, 0), (1, 2, 3), builder.material(albedo, 1.0), texels, inward=True)
     return builder, list(quads.values())
@@ -30,15 +30,15 @@ def test_closed_box_glows_everywhere_alike(albedo, denoise):
     for seed in range(SEEDS):
         result = builder.bake(seed=seed, denoise=denoise)
         value = np.concatenate([q.values(result).reshape(-1, 3) for q in quads])
-        assert len(value) == 6 * 144
+        assert len(value) == 6 * 36
         means.append(value.mean())
         # Noise of 64 rays a texel: the emitters' half of the estimate has under 2 % (the rest is even).
         assert value.std() < 0.02 * truth
         assert np.abs(value - truth).max() < 0.12 * truth
-        # The three colours see the same rays; the denoiser, a network, tints single texels at chart corners.
+        # The three colours see the same rays; the denoiser, a network, tints texels by a hair.
         tint = np.ptp(value, axis=1) / value.mean(axis=1)
         assert np.median(tint) < (0.003 if denoise else 1e-6)
-        assert tint.max() < (0.08 if denoise else 1e-5)
+        assert tint.max() < (0.02 if denoise else 1e-5)
     # 0.5 % of the truth: the direct light of all patches shares no sample, so six bakes average well.
     assert_unbiased(means, truth, least=0.005)
 
@@ -93,7 +93,7 @@ def test_sky_over_a_floor_beside_a_wall_is_half_hidden():
     assert floor.normal @ [0, 1, 0] == 1
     values = [floor.values(builder.bake(seed=seed, sky="1", samples=64))[..., 0] for seed in range(4)]
     assert_unbiased([v.mean() for v in values], np.pi / 2, least=0.002)
-    # Which rays go left is decided by one stratified coordinate: no texel is off by more than a stratum or two.
+    # Which rays go left is decided by one stratified coordinate: texels are off by a few strata.
     assert np.abs(np.array(values) - np.pi / 2).max() < np.pi / 8
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from baker.trace.embree import RayScene
 from scenes import SceneBuilder, icosphere, unit
 from twins import closest_hits
+
+from baker.trace.embree import RayScene
 
 
 def turn(angles):
@@ -35,7 +36,7 @@ def cube(matrix):
 SHAPES = {
     "cube": cube(np.eye(3)),
     "turned cube": cube(turn((0.3, 0.7, 1.1))),
-    "far away": cube(turn((0.3, 0.7, 1.1))) + [1000.0, -300.0, 70.0],
+    "far away": cube(turn((0.3, 0.7, 1.1))) + np.array([1000.0, -300.0, 70.0]),
     "sphere": icosphere(2, inward=True),
 }
 
@@ -64,7 +65,7 @@ def test_dark_inside_a_hull_however_bright_outside(name):
     builder.triangles(SHAPES[name], builder.material(0.9), 16 if len(SHAPES[name]) == 12 else 3)
     builder.light("directional", 1.0e5, direction=tuple(unit(np.array([0.3, -0.8, 0.5]))))
     middle = SHAPES[name].reshape(-1, 3).mean(axis=0)
-    builder.light("point", 1.0e5, position=tuple(middle + [0.0, 3.0, 0.0]))
+    builder.light("point", 1.0e5, position=tuple(middle + np.array([0.0, 3.0, 0.0])))
     result = builder.bake(sky="10000", channels=["irradiance", "ao"], ao_distance="inf")
     inside = result.status > 0
     assert inside.sum() > 1000

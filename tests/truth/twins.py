@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from baker.trace.embree import Tracer
 from baker.trace.packets import GEOM_ID, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
 
@@ -19,7 +20,9 @@ def closest_hits(tracer: Tracer, origin: Any, direction: Any) -> tuple[np.ndarra
         lanes = min(width, len(origin) - begin)
         caster.valid[:] = np.where(np.arange(len(caster.valid)) < lanes, -1, 0)
         for lane in range(lanes):
-            set_ray(floats, words, width, lane, *origin[begin + lane], *direction[begin + lane], np.float32(1e30))
+            set_ray(
+                floats, words, width, lane, *origin[begin + lane], *direction[begin + lane], np.float32(1e30)
+            )
         trace(caster.intersect, caster.scene, caster.valid, floats)
         hit = words[GEOM_ID * width : GEOM_ID * width + lanes] != NO_HIT
         span = slice(begin, begin + lanes)
@@ -36,7 +39,8 @@ def radiosity_sweeps(form_factor: np.ndarray, source: np.ndarray, albedo: np.nda
         for i in range(len(source)):
             for c in range(source.shape[1]):
                 after[i, c] = sum(
-                    form_factor[i, j] * (source[j, c] + albedo[j, c] * irradiance[j, c]) for j in range(len(source))
+                    form_factor[i, j] * (source[j, c] + albedo[j, c] * irradiance[j, c])
+                    for j in range(len(source))
                 )
         irradiance = after
     return irradiance

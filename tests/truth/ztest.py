@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-# Chance that a right program fails one call (seeds are fixed, so it does so always or never).
-LEVEL = 0.01
+# Chance that a right program fails one call (seeds are fixed, so it does so always or never). The tests
+# make some hundred calls.
+LEVEL = 0.001
 
 
 def critical(n_tests: int, degrees: float = np.inf) -> float:
