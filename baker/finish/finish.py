@@ -14,6 +14,9 @@ from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
 
 STAGE = "finish"
+# A layer whose noise is below this share of the light (RMS over texels) is left as it was sampled: filtering
+# it costs a second pass and gained nothing (Cornell, 64 samples: 0.33 % median error with, 0.35 % without).
+NOT_WORTH_FILTERING = 0.02
 
 
 @dataclass(frozen=True)
@@ -64,11 +67,13 @@ def finish_page(
     grown : (H, W) bool, texels filled by the growth
     """
     total = np.zeros_like(layers[0][0])
+    light = _light(plan, layers)
     for value, error in layers:
-        if not value.any():
+        if not value[plan.valid].any():
             continue
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
-        if denoise:
+        noise = float(np.sqrt(np.square(error[plan.valid] / light, dtype=np.float64).mean()))
+        if denoise and noise > NOT_WORTH_FILTERING:
             repaired = denoise_page(
                 repaired, plan.covered, plan.chart, standard_error=error, threads=threads, progress=progress
             )
@@ -77,3 +82,11 @@ def finish_page(
     grown_value, grown = dilate(total, plan.covered, plan.chart, dilation, threads=threads)
     np.clip(grown_value, 0.0, upper, out=grown_value)
     return grown_value, grown
+
+
+def _light(plan: PagePlan, layers: list[tuple[NDArray[np.float32], NDArray[np.float32]]]) -> NDArray[np.float32]:
+    """Return the sum of layers (n_valid,) at valid texels, dark ones raised to a tenth of the mean."""
+    total = np.zeros(int(plan.valid.sum()), np.float32)
+    for value, _ in layers:
+        total += value[plan.valid].mean(axis=1)
+    return np.maximum(total, max(0.1 * float(total.mean(dtype=np.float64)), 1e-30) if total.size else 0.0)
