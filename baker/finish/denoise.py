@@ -36,7 +36,7 @@ __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 # The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
 REACH = 96
 # Mirrored texels around the picture: the filter tints its outermost ones (grey with 5 % noise came out 6 %
-# in the corners, 0.4 % with this margin).
+# red in the corners, 0.4 % with this margin).
 MARGIN = 16
 # Half window of the slopes at chart borders, texels.
 SLOPE_RADIUS = 4

@@ -94,7 +94,7 @@ def test_converged_solution_is_that_of_the_dense_system(system):
 def test_furnace_after_each_bounce():
     """pi L (1 + rho + ... + rho^N) after N bounces; pi L with none."""
     rho = 0.6
-    for bounces in (0, 1, 2, 5):
+    for bounces in (0, 1, 4):
         means = []
         for seed in range(8):
             builder = SceneBuilder(64)
@@ -111,7 +111,7 @@ def test_many_bounces_converge_to_the_default():
     on = (default.status != 0) & (default.status != 2)
     page = default.lightmaps["irradiance"].value[on]
     before = np.inf
-    for bounces in (0, 1, 2, 4, 8, 40):
+    for bounces in (0, 1, 3, 40):
         value = builder.bake(samples=32, bounces=bounces).lightmaps["irradiance"].value[on]
         # Every bounce only adds light, and all rays are the same; the solver stops at 1e-5 of the whole.
         assert (value <= page + 1e-4 * page.max()).all()

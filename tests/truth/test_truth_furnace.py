@@ -21,8 +21,9 @@ def covered(result, channel="irradiance"):
     return result.lightmaps[channel].value[result.status == 1].astype(np.float64)
 
 
-@pytest.mark.parametrize("denoise", [False, True])
-@pytest.mark.parametrize("albedo", [0.2, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize(
+    ("albedo", "denoise"), [(0.2, False), (0.5, False), (0.8, False), (0.95, False), (0.5, True), (0.95, True)]
+)
 def test_closed_box_glows_everywhere_alike(albedo, denoise):
     builder, quads = furnace_box(albedo)
     truth = np.pi / (1 - albedo)
