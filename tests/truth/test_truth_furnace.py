@@ -22,7 +22,8 @@ def covered(result, channel="irradiance"):
 
 
 @pytest.mark.parametrize(
-    ("albedo", "denoise"), [(0.2, False), (0.5, False), (0.8, False), (0.95, False), (0.5, True), (0.95, True)]
+    ("albedo", "denoise"),
+    [(0.2, False), (0.5, False), (0.8, False), (0.95, False), (0.5, True), (0.95, True)],
 )
 def test_closed_box_glows_everywhere_alike(albedo, denoise):
     builder, quads = furnace_box(albedo)
