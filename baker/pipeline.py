@@ -379,7 +379,8 @@ def _unconverged(layers: tuple[Any, ...]) -> NDArray[np.bool_]:
     lit = value > 0
     floor = 0.05 * float(np.median(value[lit])) if lit.any() else 0.0
     noisy: NDArray[np.bool_] = error > UNCONVERGED * np.maximum(value, floor)
-    return noisy & lit
+    noisy &= lit
+    return noisy
 
 
 def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:

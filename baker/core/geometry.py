@@ -6,6 +6,7 @@ Every instance is expanded: a triangle here is one that a ray can hit and that o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,13 +68,13 @@ def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
     -------
     Geometry
     """
-    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in _COLUMNS}
+    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}
     double_sided = np.array([m.double_sided for m in scene.materials], bool)
     start = 0
     for index, (instance, layout) in enumerate(zip(scene.instances, atlas.layouts, strict=True)):
         mesh = scene.meshes[instance.mesh]
         matrix = instance.world_from_object
-        # Transform each mesh vertex once, so that vertices split at charts stay bitwise equal and rays find no gap.
+        # Each mesh vertex once: vertices split at charts stay bitwise equal and rays find no gap.
         position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
         normal = mesh.normal.astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
@@ -91,7 +92,9 @@ def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
         columns["chart"].append(layout.chart)
         columns["material"].append(mesh.material)
         start += len(layout.vertex)
-    data = {name: np.concatenate(parts) if parts else _COLUMNS[name] for name, parts in columns.items()}
+    data: dict[str, Any] = {
+        name: np.concatenate(parts) if parts else _COLUMNS[name] for name, parts in columns.items()
+    }
     face_normal, area = face_normals(data["position"], data["triangle"])
     return Geometry(**data, face_normal=face_normal, area=area, double_sided=double_sided[data["material"]])
 
@@ -107,7 +110,7 @@ def face_normals(
     return normal.astype(np.float32), (0.5 * length).astype(np.float32)
 
 
-_COLUMNS: dict[str, NDArray[np.generic]] = {
+_COLUMNS: dict[str, NDArray[Any]] = {
     "position": np.zeros((0, 3), np.float32), "normal": np.zeros((0, 3), np.float32),
     "uv": np.zeros((0, 2), np.float32), "vertex_source": np.zeros(0, np.int32),
     "triangle": np.zeros((0, 3), np.int32), "page": np.zeros(0, np.int32),

@@ -93,7 +93,8 @@ def denoise_page(
         return result
     window = _window(covered)
     # Contiguous: the kernels would be compiled a second time for slices.
-    inside, charts = (np.ascontiguousarray(part[window]) for part in (covered, chart))
+    inside = np.ascontiguousarray(covered[window])
+    charts = np.ascontiguousarray(chart[window])
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
     picture = surround_charts(noisy, inside, charts, threads=threads)
     wide = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")

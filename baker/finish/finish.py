@@ -84,7 +84,9 @@ def finish_page(
     return grown_value, grown
 
 
-def _light(plan: PagePlan, layers: list[tuple[NDArray[np.float32], NDArray[np.float32]]]) -> NDArray[np.float32]:
+def _light(
+    plan: PagePlan, layers: list[tuple[NDArray[np.float32], NDArray[np.float32]]]
+) -> NDArray[np.float32]:
     """Return the sum of layers (n_valid,) at valid texels, dark ones raised to a tenth of the mean."""
     total = np.zeros(int(plan.valid.sum()), np.float32)
     for value, _ in layers:

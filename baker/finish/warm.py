@@ -23,11 +23,12 @@ def start() -> subprocess.Popen[bytes] | None:
     """Start compiling in the background, if the kernels are not on disk yet."""
     from baker.kernels.page_guard import hold_to_samples
 
-    folder = Path(hold_to_samples._cache.cache_path)
+    folder = Path(hold_to_samples._cache.cache_path)  # type: ignore[attr-defined]
     if any(folder.glob("page_guard.hold_to_samples-*.nbi")):
         return None
     command = [sys.executable, "-m", "baker.finish.warm"]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    silence = subprocess.DEVNULL
+    return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
 
 
 def finish(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
@@ -62,9 +63,7 @@ def main() -> None:
     for components in (3, 1):
         value = noise.random((_SIZE, _SIZE, components), np.float32)
         error = np.full((_SIZE, _SIZE), 0.3, np.float32)
-        finish_page(
-            plan, [(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent
-        )
+        finish_page(plan, [(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent)
 
 
 if __name__ == "__main__":

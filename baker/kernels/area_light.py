@@ -119,10 +119,10 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
 
 
 @njit(cache=True, nogil=True)
-def emitter_hit(
+def emitter_hit(  # type: ignore[no-untyped-def]
     row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
-):  # type: ignore[no-untyped-def]
-    """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0 for its back)."""
+):
+    """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0: back)."""
     front = front_facing(row, prim, dx, dy, dz)
     if not front and lamp[m, TWO_SIDED] == _f(0.0):
         return 0.0

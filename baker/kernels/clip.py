@@ -86,7 +86,7 @@ def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
-    """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 the square is inside."""
+    """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 square inside."""
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]
     )

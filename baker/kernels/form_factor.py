@@ -25,7 +25,8 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
-    patch : (sides * P * H * W,) int32, patch at each pixel (`hits.hit_pixel`), -1 for none; net : (R, 2) uint32
+    patch : (sides * P * H * W,) int32, patch at each pixel (`hits.hit_pixel`), -1: none
+    net : (R, 2) uint32
     target : (m, R) int32 output, patch hit or -1
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
     """
@@ -97,9 +98,9 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def weigh_reciprocal(
+def weigh_reciprocal(  # type: ignore[no-untyped-def]
     first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
-):  # type: ignore[no-untyped-def]
+):
     """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
 
     `other` is the transpose of F in CSR: row i has the entries F_ji. The variance of A_i F_ij is

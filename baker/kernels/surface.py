@@ -57,7 +57,7 @@ class Surface(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
-    """Return b1 = a x + b y + c and b2 = d x + e y + f of triangle t for texel-space (x, y), as six floats."""
+    """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f of triangle t for texel-space (x, y)."""
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     ax, ay = float(uv[i0, 0]) * size, float(uv[i0, 1]) * size
     bx, by = float(uv[i1, 0]) * size - ax, float(uv[i1, 1]) * size - ay
@@ -107,7 +107,7 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
                 lz -= weight * below * vz
     step = OFFSET * max(abs(px), abs(py), abs(pz), least)
     away = sign * step
-    # Also step along the face: rounding must not put a point of its border behind the wall that meets it there.
+    # Also along the face: rounding must not put a point of its border behind the wall that meets it there.
     mx = (p[i0, 0] + p[i1, 0] + p[i2, 0]) / 3.0 - px
     my = (p[i0, 1] + p[i1, 1] + p[i2, 1]) / 3.0 - py
     mz = (p[i0, 2] + p[i1, 2] + p[i2, 2]) / 3.0 - pz

@@ -27,10 +27,10 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
         low_y, high_y = min(low_y, y), max(high_y, y)
     # A border exactly on a texel's edge belongs to the texel that is filled, not to its neighbour.
     tiny = 1.0e-4
-    first_x = max(int(math.floor(low_x + tiny)), 0)
-    first_y = max(int(math.floor(low_y + tiny)), 0)
-    last_x = min(max(int(math.ceil(high_x - tiny)) - 1, first_x), size - 1)
-    last_y = min(max(int(math.ceil(high_y - tiny)) - 1, first_y), size - 1)
+    first_x = max(math.floor(low_x + tiny), 0)
+    first_y = max(math.floor(low_y + tiny), 0)
+    last_x = min(max(math.ceil(high_x - tiny) - 1, first_x), size - 1)
+    last_y = min(max(math.ceil(high_y - tiny) - 1, first_y), size - 1)
     return min(first_x, size - 1), min(first_y, size - 1), last_x, last_y
 
 

@@ -43,7 +43,7 @@ _LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255.0)
 def _linear_image(image: NDArray[Any]) -> NDArray[np.float32]:
     if image.dtype != np.uint8:
         return image.astype(np.float32)
-    linear = _LINEAR_FROM_BYTE[image]
+    linear: NDArray[np.float32] = _LINEAR_FROM_BYTE[image]
     linear[..., 3] = image[..., 3] / np.float32(255.0)
     return linear
 
@@ -111,8 +111,8 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
     # A uv of many repeats keeps its fraction only.
     x = (u - math.floor(u / 2.0) * 2.0 if pack.wrap[k, 0] != 2 else min(max(u, -1.0), 2.0)) * w - 0.5
     y = (v - math.floor(v / 2.0) * 2.0 if pack.wrap[k, 1] != 2 else min(max(v, -1.0), 2.0)) * h - 0.5
-    x0 = int(math.floor(x))
-    y0 = int(math.floor(y))
+    x0 = math.floor(x)
+    y0 = math.floor(y)
     fx = x - x0
     fy = y - y0
     for c in range(4):

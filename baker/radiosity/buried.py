@@ -60,8 +60,7 @@ def find_buried(
         )
         return hits
 
-    suspect = look(np.arange(n), 1, _STRIDE, 3).any(axis=1)
-    suspect = _with_neighbours(texels, suspect)
+    suspect = _with_neighbours(texels, (look(np.arange(n), 1, _STRIDE, 3) > 0).max(axis=1))
     chosen = np.flatnonzero(suspect)
     hits = look(chosen, _RAYS_PER_POINT, 1, 4)
     good = hits <= _SHARE * _RAYS_PER_POINT

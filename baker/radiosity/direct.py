@@ -100,7 +100,8 @@ def direct_light(
             area[begin:end] = out[begin:end, :3].sum(axis=1)
         if len(emitters.power):
             gather(
-                origin, normal, table, dark, lamps, shading, caster, begin, few, few_shared, black, limits, found
+                origin, normal, table, dark, lamps, shading, caster, begin, few, few_shared, black, limits,
+                found,
             )  # fmt: skip
             out[begin:end, 3:] += found[begin:end, DIRECT : DIRECT + 3]
         if families:

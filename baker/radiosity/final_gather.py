@@ -81,8 +81,8 @@ def final_gather(
         origin, normal = points_of(surface, mask, np.arange(begin, end))
         lamps = lamps_for(emitters, origin)
         gather(
-            origin, normal, table, exitance, lamps, shading, new_caster(tracer), begin, net, shared, radiance, limits,
-            out,
+            origin, normal, table, exitance, lamps, shading, new_caster(tracer), begin, net, shared, radiance,
+            limits, out,
         )  # fmt: skip
 
     run_tiles(n_front, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_samples)

@@ -69,7 +69,7 @@ def build_patches(texels: TexelBuffer, *, max_patches: int = MAX_PATCHES) -> Pat
     np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
     # A texel without area (a sliver) still needs a share, however small, so that its patch has one.
     weight = np.maximum(texels.area, 1e-12).astype(np.float64)
-    area = np.bincount(number, weight, n_patches)
+    area = np.bincount(number, weight, n_patches).astype(np.float64)
     running = np.cumsum(weight[order])
     before = np.concatenate([[0.0], running])[first[:-1]]
     owner = np.repeat(np.arange(n_patches), np.diff(first))

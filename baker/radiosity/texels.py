@@ -101,7 +101,7 @@ def build_texels(
 def _overlaps(
     geometry: Geometry, size: int, n_pages: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
-    """Return pixel (n,), first (n + 1,), entry and area (m,), chart (n,) of covered texels in Morton order."""
+    """Return pixel (n,), first (n + 1,), entry and area (m,), chart (n,) of texels in Morton order."""
     count = np.zeros(n_pages * size * size, np.int32)
     count_overlaps(geometry.uv, geometry.triangle, geometry.page, size, count)
     pixel = np.flatnonzero(count)

@@ -88,4 +88,4 @@ def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ign
 @njit(cache=True, nogil=True)
 def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
     """Trace the lanes whose `valid` is -1; results are written into the packet."""
-    call_embree(function, valid.ctypes.data, scene, floats.ctypes.data, 0)
+    call_embree(function, valid.ctypes.data, scene, floats.ctypes.data, 0)  # type: ignore[call-arg]
