@@ -27,7 +27,7 @@ import machine
 import numpy as np
 from numpy.typing import NDArray
 from process import bake
-from report import table
+from report import put_into, table
 
 ROOT = Path(__file__).resolve().parent.parent
 HERE = Path(__file__).resolve().parent
@@ -53,11 +53,17 @@ class Row:
 def main(argv: list[str] | None = None) -> int:
     """Bake with both in turn, judge both, print the tables."""
     options = _options(argv)
-    with tempfile.TemporaryDirectory(prefix="baker-against-cycles-") as name:
-        result = _compare(options, Path(name))
+    if options.source:
+        result = json.loads(options.source.read_text(encoding="utf-8"))
+    else:
+        with tempfile.TemporaryDirectory(prefix="baker-against-cycles-") as name:
+            result = _compare(options, Path(name))
     if options.json:
         options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    print(_tables(result, markdown=options.markdown))
+    if options.into:
+        put_into(options.into, "against_cycles.py", _tables(result, markdown=True))
+    else:
+        print(_tables(result, markdown=options.markdown))
     return 0
 
 
@@ -65,7 +71,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--python", required=True, help="Python that has bpy and mitsuba")
+    parser.add_argument("--python", default=sys.executable, help="Python that has bpy and mitsuba")
     parser.add_argument(
         "--scene", type=Path, default=ROOT / "assets" / "cornell.glb", help="plain colours only"
     )
@@ -78,6 +84,8 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--truth", type=Path, help="keep the truth here, and use it again if it is there")
     parser.add_argument("--json", type=Path, help="write all numbers to this file")
     parser.add_argument("--markdown", action="store_true", help="tables as Markdown")
+    parser.add_argument("--from", dest="source", type=Path, help="show an earlier --json file; bake nothing")
+    parser.add_argument("--into", type=Path, help="put the Markdown tables between the marks in this file")
     return parser.parse_args(argv)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 STAGES = (
@@ -44,6 +45,16 @@ def report(result: dict[str, Any], *, markdown: bool) -> str:
         parts.append(("Memory", _large))
     mark = "### " if markdown else ""
     return "\n\n".join(f"{mark}{title}\n\n{make(result, markdown)}" for title, make in parts) + "\n"
+
+
+def put_into(path: Path, script: str, tables: str) -> None:
+    """Replace what stands between the two marks of a script in a document."""
+    begin, end = f"<!-- tables by benchmarks/{script} -->", "<!-- end of tables -->"
+    before, found, rest = path.read_text(encoding="utf-8").partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise SystemExit(f"{path} has no lines '{begin}' and '{end}' to put the tables between")
+    path.write_text(f"{before}{begin}\n\n{tables}\n{end}{after}", encoding="utf-8")
 
 
 def _text(cell: str | float | int) -> str:

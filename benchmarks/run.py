@@ -20,13 +20,12 @@ from typing import Any
 
 import machine
 from process import Run, bake
-from report import report
+from report import put_into, report
 from scenes import write_blobs
 
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
 # The hall is lit by the sky as well.
 SKY = {"hall": "2000,2600,3400", "interior": "2000,2600,3400"}
-BEGIN, END = "<!-- tables by benchmarks/run.py -->", "<!-- end of tables -->"
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -40,7 +39,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.json:
         options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if options.into:
-        _put_into(options.into, report(result, markdown=True))
+        put_into(options.into, "run.py", report(result, markdown=True))
     else:
         print(report(result, markdown=options.markdown))
     return 0
@@ -205,15 +204,6 @@ def _large(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict[
             what = f"{most} triangles" + (", unwrapped" if flags else ", own uv")
             found.append({"what": what, "resolution": size, "samples": few, "run": run.plain()})
     return found
-
-
-def _put_into(path: Path, tables: str) -> None:
-    text = path.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not end:
-        raise SystemExit(f"{path} has no lines '{BEGIN}' and '{END}' to put the tables between")
-    path.write_text(f"{before}{BEGIN}\n\n{tables}\n{END}{after}", encoding="utf-8")
 
 
 def _say(what: str) -> None:
