@@ -20,9 +20,18 @@ if TYPE_CHECKING:
     from baker.core.scene import Scene
 
 __all__ = [
-    "BakerError", "Cancelled", "InputError", "ResourceError", "SettingsError", "bake", "load", "unwrap",
+    "BakerError", "Cancelled", "InputError", "ResourceError", "Scene", "SettingsError", "bake", "load", "unwrap",
 ]  # fmt: skip
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    """Import `baker.Scene` when it is first asked for: NumPy takes a moment."""
+    if name == "Scene":
+        from baker.core.scene import Scene
+
+        return Scene
+    raise AttributeError(f"module 'baker' has no attribute '{name}'")
 
 
 def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:

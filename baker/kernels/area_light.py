@@ -35,9 +35,9 @@ _SHORT = np.float32(0.9999)
 
 
 @njit(cache=True, nogil=True)
-def mis_weighted(radiance, cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
-    """Return radiance * cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
-    return radiance * cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
+def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+    """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
+    return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
 
 
 @njit(cache=True, nogil=True)
@@ -88,16 +88,17 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     light = abs(light)
                 if cosine <= _f(0.0) or light <= _f(1.0e-6):
                     continue
-                for c in range(3):
-                    radiance[c] = row[m, RADIANCE + c]
+                steradian = density * square / light
+                first_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[0])
+                second_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[1])
                 if row[m, TEXTURED] > _f(0.0):
                     emitted_radiance(shading, triangle[m], b1, b2, radiance)
-                steradian = density * square / light
+                else:
+                    for c in range(3):
+                        radiance[c] = row[m, RADIANCE + c]
                 for c in range(3):
-                    value[lane, c] = mis_weighted(radiance[c], cosine, steradian, n_samples, hemisphere[0])
-                    value[lane, 3 + c] = mis_weighted(
-                        radiance[c], cosine, steradian, n_samples, hemisphere[1]
-                    )
+                    value[lane, c] = radiance[c] * first_weight
+                    value[lane, 3 + c] = radiance[c] * second_weight
                 set_ray(floats, words, width, lane, ox, oy, oz, dx, dy, dz, _SHORT)
                 valid[lane] = -1
                 any_lane = True
@@ -131,4 +132,4 @@ def emitter_hit(  # type: ignore[no-untyped-def]
     if cosine <= 0.0 or light <= 1.0e-6:
         return 0.0
     density = emitter_density(lamp, chance, cumulative, m) * distance * distance / light
-    return mis_weighted(1.0, cosine, density, n_light, n_hemisphere)
+    return mis_weighted(cosine, density, n_light, n_hemisphere)

@@ -84,8 +84,8 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                 dy = floats[DIR_Y * width + lane]
                 dz = floats[DIR_Z * width + lane]
                 hit_u, hit_v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
-                m = np.int64(row[prim, 12])
-                if m >= 0:
+                if row[prim, 12] >= _f(0.0):
+                    m = np.int64(row[prim, 12])
                     i = group + lane
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,

@@ -246,7 +246,7 @@ def test_the_two_halves_of_mis_make_one_whole():
         # The density is one over solid angle, written out.
         c = int(emitters.row[m, 16])
         density = chance[c] * emitters.row[m, 14] / world.geometry.area[t] * distance**2 / abs(facing)
-        light = mis_weighted(1.0, cosine, float(density), float(n_light), float(n_hemisphere))
+        light = mis_weighted(cosine, float(density), float(n_light), float(n_hemisphere))
         total = n_light * density * light + n_hemisphere * cosine / np.pi * found
         assert total == pytest.approx(cosine, rel=2e-4)
         weights.append(n_light * density * light / cosine)
