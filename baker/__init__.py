@@ -20,8 +20,16 @@ if TYPE_CHECKING:
     from baker.core.scene import Scene
 
 __all__ = [
-    "BakerError", "Cancelled", "InputError", "ResourceError", "Scene", "SettingsError", "bake", "load", "unwrap",
-]  # fmt: skip
+    "BakerError",
+    "Cancelled",
+    "InputError",
+    "ResourceError",
+    "Scene",
+    "SettingsError",
+    "bake",
+    "load",
+    "unwrap",
+]
 __version__ = "0.1.0"
 
 

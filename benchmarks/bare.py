@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import silent
 from baker.kernels.emitters import Emitters
-from baker.kernels.rays import FAR, aim_texel, lane_seeds
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
 from baker.pipeline import World
@@ -33,12 +33,11 @@ MOST_READY = 4_000_000
 
 
 @njit(cache=True, nogil=True)
-def _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far):  # type: ignore[no-untyped-def]
+def _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far):  # type: ignore[no-untyped-def]
     k = s * N_POINTS // len(net)
-    for lane in range(lanes):
-        u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-        v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
-        aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, far)
+    if s == 0 or k != (s - 1) * N_POINTS // len(net):
+        load_frames(frame, origin, normal, group, lanes, k)
+    aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, far)
 
 
 @njit(cache=True, nogil=True)
@@ -49,8 +48,8 @@ def _aim_lamp(
     k = s * N_POINTS // len(net)
     for lane in range(lanes):
         i = group + lane
-        u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-        v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+        u = texel_scramble(net[s, 0], seeds[0, lane], shared)
+        v = texel_scramble(net[s, 1], seeds[1, lane], shared)
         m = min(np.searchsorted(cumulative, u, side="right"), len(cumulative) - 1)
         low = cumulative[m - 1] if m else np.float32(0.0)
         u = min(max((u - low) / (cumulative[m] - low), np.float32(0.0)), np.float32(1.0))
@@ -77,7 +76,7 @@ def _aim_lamp(
 def _made(function, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
     """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
     width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     mixed = np.uint32(0)
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -85,7 +84,7 @@ def _made(function, caster, origin, normal, begin, net, shared, far):  # type: i
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
-            _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far)
+            _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
             trace(function, scene, valid, floats)
             mixed ^= words[GEOM_ROW * width]
     return mixed
@@ -98,7 +97,7 @@ def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, 
     With emitters in `corner` the rays go there, else over the hemisphere.
     """
     width, valid, floats, words = caster.width, caster.valid, caster.floats, caster.words
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     packet = 0
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -113,7 +112,7 @@ def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, 
                 )  # fmt: skip
             else:
                 _aim_hemisphere(
-                    floats, words, width, origin, normal, group, lanes, net, shared, seeds, s, far
+                    floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far
                 )
             bank[packet, :] = floats[: RAY_ROWS * width]
             lanes_on[packet, :] = valid[:width]

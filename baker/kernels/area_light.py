@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
+from baker.kernels.alpha import presence_at
 from baker.kernels.emitters import (
     NORMAL,
     RADIANCE,
@@ -23,7 +24,7 @@ from baker.kernels.emitters import (
     sample_emitter,
 )  # fmt: skip
 from baker.kernels.hits import front_facing
-from baker.kernels.rays import lane_seeds
+from baker.kernels.rays import lane_seeds, new_lanes
 from baker.kernels.sampling import texel_scramble
 from baker.kernels.surface import N_POINTS
 from baker.trace.packets import TFAR, set_ray, trace
@@ -34,13 +35,13 @@ _INV_PI = 1.0 / math.pi
 _SHORT = np.float32(0.9999)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
     """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
     return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, out, second):  # type: ignore[no-untyped-def]
     """Add the light-sampled share of irradiance of texels.
 
@@ -55,12 +56,13 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     valid, floats, words = caster.valid, caster.floats, caster.words
     row, first, triangle = lamps.row, lamps.first, lamps.triangle
     chance, cumulative = lamps.chance, lamps.cumulative
+    any_alpha = len(shading.alpha.slot) > 0
     point = np.zeros(3, np.float32)
     radiance = np.zeros(4)
     value = np.zeros((width, 6))
     batch = np.zeros((width, N_POINTS))
     total = np.zeros((width, 6))
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, _ = new_lanes()
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         total[:] = 0.0
@@ -73,8 +75,8 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
             for lane in range(lanes):
                 valid[lane] = 0
                 i = group + lane
-                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
+                u = texel_scramble(net[s, 0], seeds[0, lane], shared)
+                v = texel_scramble(net[s, 1], seeds[1, lane], shared)
                 m, density, b1, b2 = sample_emitter(row, first, chance, cumulative, u, v, point)
                 ox, oy, oz = origin[i, k, 0], origin[i, k, 1], origin[i, k, 2]
                 dx, dy, dz = point[0] - ox, point[1] - oy, point[2] - oz
@@ -88,6 +90,13 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     light = abs(light)
                 if cosine <= _f(0.0) or light <= _f(1.0e-6):
                     continue
+                if any_alpha:
+                    # What is not there does not shine; rays that find an emitter know that already.
+                    there = presence_at(shading, triangle[m], b1, b2)
+                    if there <= 0.0:
+                        continue
+                    for c in range(3):
+                        radiance[c] *= there
                 steradian = density * square / light
                 first_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[0])
                 second_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[1])
@@ -119,7 +128,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                 out[begin + group + lane, c] += total[lane, c]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def emitter_hit(  # type: ignore[no-untyped-def]
     row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
 ):

@@ -12,7 +12,7 @@ from numba import njit
 MAX_CORNERS = 9
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
     """Cut a triangle (3, 2) by the unit square at (x0, y0); return the corner count of `out`.
 
@@ -47,7 +47,7 @@ def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def polygon_area(corner, n):  # type: ignore[no-untyped-def]
     """Return the area of the convex polygon of the first n corners (never negative)."""
     twice = 0.0
@@ -59,7 +59,7 @@ def polygon_area(corner, n):  # type: ignore[no-untyped-def]
     return 0.5 * twice
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
     """Return the point (x, y) that a uniform (u, v) of the unit square maps to, uniform in the polygon."""
     if n < 3:
@@ -84,7 +84,7 @@ def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
     return corner[0, 0], corner[0, 1]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
     """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 square inside."""
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (

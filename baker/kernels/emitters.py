@@ -76,7 +76,7 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def bounding_sphere(origin):  # type: ignore[no-untyped-def]
     """Return x, y, z, radius of a sphere around points (m, w, 3): their box's centre and half diagonal."""
     low = np.full(3, 1.0e30)
@@ -90,7 +90,7 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
     return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]), half
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
     """Fill `chance` and `cumulative` (C,) float32 for points (m, w, 3), taken as their bounding sphere.
 
@@ -129,7 +129,7 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
         cumulative[c] = running
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
     """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2.
 
@@ -165,7 +165,7 @@ def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore
     return m, picked / total * share / row[m, AREA], b1, b2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
     """Return the density per m2 with which `sample_emitter` picks a point of emitter m."""
     total = cumulative[len(cumulative) - 1]
@@ -174,7 +174,7 @@ def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
     return chance[np.int64(row[m, CLUSTER])] / total * row[m, SHARE] / row[m, AREA]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def emitted_radiance(shading, t, b1, b2, out):  # type: ignore[no-untyped-def]
     """Write the radiance (cd/m2) that triangle t emits at barycentrics to `out` (4,)."""
     m = shading.material[t]

@@ -15,12 +15,11 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.hits import front_facing, hit_pixel
-from baker.kernels.rays import FAR, aim_texel, lane_seeds
-from baker.kernels.sampling import texel_scramble
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, trace
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, target, tally):  # type: ignore[no-untyped-def]
     """Cast the rays of patches.
 
@@ -33,17 +32,15 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
     row, size, n_pixels = table.row, table.size, table.n_pixels
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         lane_seeds(begin + group, lanes, 30, seeds)
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for r in range(len(net)):
-            for lane in range(lanes):
-                u = texel_scramble(net[r, 0], seeds[lane, 0], shared)
-                v = texel_scramble(net[r, 1], seeds[lane, 1], shared)
-                aim_texel(floats, words, width, lane, origin, normal, group + lane, r, u, v, FAR)
+            load_frames(frame, origin, normal, group, lanes, r)
+            aim_lanes(floats, words, width, frame, seeds, net[r, 0], net[r, 1], shared, FAR)
             trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 p = group + lane
@@ -64,7 +61,7 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
                     tally[begin + p, 1] += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-def]
     """Merge equal targets of rows that are sorted: which, how often each, and how many differ."""
     for i in range(len(target)):
@@ -81,7 +78,7 @@ def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-
         lengths[i] = m
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-untyped-def]
     """Write irradiance = F exitance, both (P, 3) float64."""
     for i in range(len(first) - 1):
@@ -97,7 +94,7 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
         irradiance[i, 2] = blue
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def weigh_reciprocal(  # type: ignore[no-untyped-def]
     first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
 ):
@@ -136,7 +133,7 @@ def weigh_reciprocal(  # type: ignore[no-untyped-def]
     return exchanged, unlike
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: ignore[no-untyped-def]
     """Find factors d (P,) so that d_i F_ij d_j has row sums `goal`, keeping A_i F_ij symmetric.
 

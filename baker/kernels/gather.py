@@ -17,8 +17,7 @@ from numba import njit
 from baker.kernels.area_light import emitter_hit
 from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
 from baker.kernels.hits import front_facing, hit_pixel
-from baker.kernels.rays import FAR, aim_texel, lane_seeds
-from baker.kernels.sampling import texel_scramble
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
 from baker.kernels.surface import N_POINTS
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, trace
 
@@ -28,7 +27,7 @@ INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, sky, limits, out):  # type: ignore[no-untyped-def]
     """Write the gathered light of texels.
 
@@ -48,7 +47,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     before = np.zeros(width)
     squares = np.zeros(width)
     pixel = np.zeros(width, np.int64)
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     distance = _f(limits[0])
     # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
     inverse_pi = _f(1.0 / np.pi)
@@ -63,10 +62,9 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
         squares[:] = 0.0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
-            for lane in range(lanes):
-                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
-                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, FAR)
+            if s == 0 or k != (s - 1) * N_POINTS // n_samples:
+                load_frames(frame, origin, normal, group, lanes, k)
+            aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
             trace(intersect, scene, valid, floats)
             # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
@@ -122,7 +120,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
             out[i, SQUARE] = squares[lane] * scale * scale
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def open_share(origin, normal, caster, begin, net, shared, distance, out):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
 
@@ -132,7 +130,7 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
     width, scene, occluded = caster.width, caster.scene, caster.occluded
     valid, floats, words = caster.valid, caster.floats, caster.words
     count = np.zeros(width, np.int64)
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
@@ -141,10 +139,9 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
             valid[lane] = -1 if lane < lanes else 0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
-            for lane in range(lanes):
-                u = texel_scramble(net[s, 0], seeds[lane, 0], shared)
-                v = texel_scramble(net[s, 1], seeds[lane, 1], shared)
-                aim_texel(floats, words, width, lane, origin, normal, group + lane, k, u, v, distance)
+            if s == 0 or k != (s - 1) * N_POINTS // n_samples:
+                load_frames(frame, origin, normal, group, lanes, k)
+            aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, distance)
             trace(occluded, scene, valid, floats)
             for lane in range(lanes):
                 if floats[TFAR * width + lane] >= _f(0.0):

@@ -30,13 +30,13 @@ class HitTable(NamedTuple):
 
 # The functions below take the table's arrays one by one: handing a tuple of arrays to a function costs
 # Numba an atomic reference count per array and call, which tripled the time of a hit.
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def front_facing(row, prim, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Tell whether a ray of direction d meets the front of the triangle."""
     return row[prim, 8] * dx + row[prim, 9] * dy + row[prim, 10] * dz < np.float32(0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def hit_pixel(row, size, n_pixels, prim, u, v, front):  # type: ignore[no-untyped-def]
     """Return the flat pixel at barycentrics (u, v) of a triangle (+ n_pixels on its back), or BACK_FACE."""
     if not front and row[prim, 7] == np.float32(0.0):

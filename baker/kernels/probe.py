@@ -6,12 +6,11 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.hits import front_facing
-from baker.kernels.rays import FAR, aim_texel, lane_seeds
-from baker.kernels.sampling import texel_scramble
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PRIM_ID, trace
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def back_face_hits(origin, normal, table, caster, begin, net, rays_per_point, hits):  # type: ignore[no-untyped-def]
     """Count rays that hit the back of a one-sided surface.
 
@@ -22,7 +21,7 @@ def back_face_hits(origin, normal, table, caster, begin, net, rays_per_point, hi
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
     row = table.row
-    seeds = np.zeros((width, 2), np.uint32)
+    seeds, frame = new_lanes()
     none = np.uint32(0)
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -31,10 +30,9 @@ def back_face_hits(origin, normal, table, caster, begin, net, rays_per_point, hi
             valid[lane] = -1 if lane < lanes else 0
         for sample in range(len(net)):
             point = sample // rays_per_point
-            for lane in range(lanes):
-                u = texel_scramble(net[sample, 0], seeds[lane, 0], none)
-                v = texel_scramble(net[sample, 1], seeds[lane, 1], none)
-                aim_texel(floats, words, width, lane, origin, normal, group + lane, point, u, v, FAR)
+            if sample % rays_per_point == 0:
+                load_frames(frame, origin, normal, group, lanes, point)
+            aim_lanes(floats, words, width, frame, seeds, net[sample, 0], net[sample, 1], none, FAR)
             trace(intersect, scene, valid, floats)
             for lane in range(lanes):
                 if words[GEOM_ID * width + lane] == NO_HIT:

@@ -24,7 +24,7 @@ _u = np.uint32
 _INV_2_24 = np.float32(5.9604645e-08)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def hash_u32(x):  # type: ignore[no-untyped-def]
     """Return a well-mixed uint32 of a uint32 (Wellons' lowbias32)."""
     x = _u(x ^ (x >> _u(16)))
@@ -34,13 +34,13 @@ def hash_u32(x):  # type: ignore[no-untyped-def]
     return _u(x ^ (x >> _u(16)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def hash_combine(a, b):  # type: ignore[no-untyped-def]
     """Return a uint32 that depends on both uint32 arguments."""
     return hash_u32(_u(hash_u32(_u(a)) ^ _u(_u(b) * _u(0x9E3779B9) + _u(0x7F4A7C15))))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def reverse_bits(x):  # type: ignore[no-untyped-def]
     """Return the uint32 with its bits in reverse order."""
     x = _u(((x >> _u(1)) & _u(0x55555555)) | ((x & _u(0x55555555)) << _u(1)))
@@ -50,7 +50,7 @@ def reverse_bits(x):  # type: ignore[no-untyped-def]
     return _u((x >> _u(16)) | (x << _u(16)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
     """Owen-scramble a bit-reversed uint32: each bit is flipped by a hash of the bits below it."""
     x = _u(x + seed)
@@ -60,7 +60,7 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
     return _u(x ^ _u(x * _u(0x8D22F6E6)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     """Return a number in [0, 1): the shared bits kept, the rest scrambled with the texel's seed.
 
@@ -73,7 +73,7 @@ def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     return np.float32(reverse_bits(y) >> _u(8)) * _INV_2_24
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sobol_reversed(n, seed, dimension_pair):  # type: ignore[no-untyped-def]
     """Return (n, 2) uint32: a globally scrambled (0,2)-sequence, bit-reversed.
 
@@ -101,7 +101,7 @@ def shared_bits_mask(n_samples: int) -> np.uint32:
     return np.uint32((1 << min(int(math.log2(max(n_samples, 1))) // 2, 4)) - 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     """Map the unit square to the cosine-weighted hemisphere about +z; pdf = cos / pi.
 
@@ -112,9 +112,8 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     wide = abs(a) > abs(b)
     r = a if wide else b
     other = b if wide else a
-    t = np.float32(0.0)
-    if r != np.float32(0.0):
-        t = np.float32(0.78539816) * other / r
+    # No branch, so that loops over lanes can be vectorised; r = 0 only where `other` is 0, too.
+    t = np.float32(0.78539816) * other / (r if r != np.float32(0.0) else np.float32(1.0))
     t2 = t * t
     c = np.float32(1.0) + t2 * (
         np.float32(-0.5)
@@ -129,7 +128,7 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     return x, y, math.sqrt(max(np.float32(0.0), np.float32(1.0) - r * r))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     """Return two unit vectors (six floats) that make a right-handed frame with the unit normal."""
     sign = np.float32(1.0) if nz >= np.float32(0.0) else np.float32(-1.0)
@@ -141,7 +140,7 @@ def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
     """Map the unit square to uniform barycentrics (b1, b2) of a triangle, keeping strata compact.
 

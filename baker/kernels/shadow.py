@@ -11,7 +11,7 @@ from baker.trace.packets import TFAR, set_ray, trace
 _f = np.float32
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def add_visible(caster, origin, ray, weight, colour, begin, out):  # type: ignore[no-untyped-def]
     """Add colour * mean over a texel's 16 points of weight * visibility to out[begin:], both column blocks.
 

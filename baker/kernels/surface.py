@@ -55,7 +55,7 @@ class Surface(NamedTuple):
     least: np.float32
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
     """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f of triangle t for texel-space (x, y)."""
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
@@ -71,7 +71,7 @@ def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  # type: ignore[no-untyped-def]
     """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
 
@@ -120,7 +120,7 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
     normal[n, k, 2] = sign * nz / length
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
     """Write points of texel entries: origin and normal (m, w, 3) float32, world.
 
@@ -191,7 +191,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
             bary[n, w, 1] = b2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def free_point(bits, k):  # type: ignore[no-untyped-def]
     """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
     bits = np.int64(bits)

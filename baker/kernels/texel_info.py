@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from baker.kernels.alpha import presence_at
 from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area
 from baker.kernels.surface import N_POINTS, inverse_uv, place, place_points
 from baker.kernels.textures import sample_texture
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):  # type: ignore[no-untyped-def]
     """Fill the geometry of front entries begin to end.
 
@@ -60,7 +61,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
             normal[i, axis] = facing[0, 0, axis]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _centroid(polygon, n):  # type: ignore[no-untyped-def]
     """Return the area centroid of a convex polygon; the mean of its corners if it has no area."""
     total = polygon_area(polygon, n)
@@ -82,7 +83,7 @@ def _centroid(polygon, n):  # type: ignore[no-untyped-def]
     return x, y
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
     """Interpolate a per-vertex (V, 2) uv at barycentrics of triangle t."""
     b0 = 1.0 - b1 - b2
@@ -90,7 +91,7 @@ def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
     return b0 * uv[i, 0] + b1 * uv[j, 0] + b2 * uv[k, 0], b0 * uv[i, 1] + b1 * uv[j, 1] + b2 * uv[k, 1]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
     """Return the width in image uv of the part of a texel that one of its points stands for."""
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
@@ -105,9 +106,12 @@ def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
     return np.sqrt(image / max(lightmap, 1.0e-12) / N_POINTS)
 
 
-@njit(cache=True, nogil=True)
-def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyped-def]
-    """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def texel_albedo(surface, shading, begin, end, albedo, area):  # type: ignore[no-untyped-def]
+    """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32.
+
+    Of surfaces that let light through, only what is there counts: `area` (n,) float32 is cut to its share.
+    """
     origin = np.zeros((1, N_POINTS, 3), np.float32)
     normal = np.zeros((1, N_POINTS, 3), np.float32)
     hit = np.zeros((1, N_POINTS), np.int32)
@@ -117,12 +121,16 @@ def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyp
     every = np.arange(N_POINTS).astype(np.uint8).reshape(1, N_POINTS)
     chosen = np.zeros(1, np.int64)
     coloured = len(shading.colour) > 1
+    any_alpha = len(shading.alpha.slot) > 0
+    share = np.ones(N_POINTS)
     for i in range(begin, end):
         first = shading.material[surface.entry[surface.first[i]]]
         plain = not coloured
         for e in range(surface.first[i], surface.first[i + 1]):
             m = shading.material[surface.entry[e]]
             plain = plain and m == first and shading.base_texture[m] < 0
+            if any_alpha:
+                plain = plain and shading.alpha.slot[surface.entry[e]] < 0
         if plain:
             for c in range(3):
                 albedo[i, c] = shading.base[first, c]
@@ -131,6 +139,15 @@ def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyp
         place_points(surface, free, chosen, every, origin, normal, hit, bary)
         for c in range(3):
             albedo[i, c] = 0.0
+        if any_alpha:
+            total = 0.0
+            for k in range(N_POINTS):
+                share[k] = presence_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
+                total += share[k]
+            area[i] *= total / N_POINTS
+            # A texel of nothing but holes has the colour of its texture, for what it is worth.
+            for k in range(N_POINTS):
+                share[k] = share[k] * N_POINTS / total if total > 0.0 else 1.0
         for k in range(N_POINTS):
             t = hit[0, k]
             m = shading.material[t]
@@ -142,7 +159,7 @@ def texel_albedo(surface, shading, begin, end, albedo):  # type: ignore[no-untyp
                 width = texel_footprint(surface, shading.base_uv, t)
                 sample_texture(shading.pack, shading.base_texture[m], u, v, width, rgba)
             for c in range(3):
-                value = shading.base[m, c] * rgba[c] / N_POINTS
+                value = shading.base[m, c] * rgba[c] / N_POINTS * share[k]
                 if coloured:
                     i0, i1, i2 = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
                     value *= (

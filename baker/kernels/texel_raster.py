@@ -14,7 +14,7 @@ from numba import njit
 from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, square_touches
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
     low_x = low_y = 1.0e30
     high_x = high_y = -1.0e30
@@ -34,7 +34,7 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
     return min(first_x, size - 1), min(first_y, size - 1), last_x, last_y
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def count_overlaps(uv, triangle, page, size, count):  # type: ignore[no-untyped-def]
     """Add to `count` (P * H * W,) int32 how many triangles touch each texel's square."""
     corner = np.zeros((3, 2))
@@ -47,7 +47,7 @@ def count_overlaps(uv, triangle, page, size, count):  # type: ignore[no-untyped-
                     count[base + y * size + x] += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore[no-untyped-def]
     """Write each texel's triangles and their areas (in texels) behind `start` (P * H * W,) int64.
 
@@ -72,7 +72,7 @@ def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore
                     start[base + y * size + x] = at + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def keep_main_chart(first, entry, area, chart, texel_chart, kept):  # type: ignore[no-untyped-def]
     """Choose for each texel the chart with the largest area; mark its entries in `kept`.
 
@@ -104,7 +104,7 @@ def keep_main_chart(first, entry, area, chart, texel_chart, kept):  # type: igno
                     break
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def morton_code(x, y):  # type: ignore[no-untyped-def]
     """Interleave the bits of two numbers below 65536 (Morton, 1966)."""
     code = np.uint64(0)
@@ -114,7 +114,7 @@ def morton_code(x, y):  # type: ignore[no-untyped-def]
     return code
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def morton_keys(pixel, size, key):  # type: ignore[no-untyped-def]
     """Write to `key` (n,) uint64 the Morton order of flat pixel numbers (page first)."""
     for i in range(len(pixel)):

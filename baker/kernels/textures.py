@@ -87,7 +87,7 @@ def pack_textures(images: Sequence[tuple[NDArray[Any], tuple[str, str]]]) -> Tex
     return TexturePack(pixels, level, n_levels, wrap)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
     if mode == 0:
         return i % n
@@ -97,7 +97,25 @@ def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
     return min(max(i, 0), n - 1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
+    """Return the bilinear alpha of texture k at (u, v) in its finest level; arrays as of `TexturePack`."""
+    offset, w, h = level[k, 0, 0], level[k, 0, 1], level[k, 0, 2]
+    x = (u - math.floor(u / 2.0) * 2.0 if wrap[k, 0] != 2 else min(max(u, -1.0), 2.0)) * w - 0.5
+    y = (v - math.floor(v / 2.0) * 2.0 if wrap[k, 1] != 2 else min(max(v, -1.0), 2.0)) * h - 0.5
+    x0 = np.int64(math.floor(x))
+    y0 = np.int64(math.floor(y))
+    fx = x - x0
+    fy = y - y0
+    left, right = _wrapped(x0, w, wrap[k, 0]), _wrapped(x0 + 1, w, wrap[k, 0])
+    upper = offset + _wrapped(y0, h, wrap[k, 1]) * w
+    lower = offset + _wrapped(y0 + 1, h, wrap[k, 1]) * w
+    above = (1.0 - fx) * pixels[upper + left, 3] + fx * pixels[upper + right, 3]
+    below = (1.0 - fx) * pixels[lower + left, 3] + fx * pixels[lower + right, 3]
+    return (1.0 - fy) * above + fy * below
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-def]
     """Write the linear RGBA of texture k at (u, v) to `out` (4,).
 

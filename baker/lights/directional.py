@@ -27,7 +27,7 @@ def directional_light(
     _parallel(np.array(light.direction, np.float64), normal, ray, weight)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
     for i in range(ray.shape[0]):
         for k in range(ray.shape[1]):

@@ -120,7 +120,7 @@ def _bounds(
     return centre, radius, axis, spread
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _mean_luminance(shading, chosen, weights, out):  # type: ignore[no-untyped-def]
     """Average the luminance that textured triangles emit over a grid of points."""
     radiance = np.zeros(4)

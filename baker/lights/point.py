@@ -32,7 +32,7 @@ def point_light(
     inverse_square(np.array(light.position, np.float64), origin, normal, ray, weight)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def inverse_square(position, origin, normal, ray, weight):  # type: ignore[no-untyped-def]
     """Fill rays to a position and weights cos / r^2."""
     for i in range(origin.shape[0]):

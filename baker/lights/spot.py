@@ -33,7 +33,7 @@ def spot_light(
     _cone(np.array(light.direction, np.float64), outer, scale, ray, weight)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
     """Multiply weights by the cone's fall-off."""
     for i in range(ray.shape[0]):

@@ -48,14 +48,14 @@ def rays_of(room):
     lamps = lamps_for(room.emitters, origin)
     corner = room.geometry.uv[room.geometry.triangle]
     entry_at = room.texels.hit_image(np.arange(room.texels.n), -1)
-    seeds = np.zeros((1, 2), np.uint32)
+    seeds = np.zeros((2, 16), np.uint32)
     emitter_of = {int(t): m for m, t in enumerate(room.emitters.triangle)}
     for i in range(end - begin):
         lane_seeds(begin + i, 1, 25, seeds)
         batch = np.zeros(N_POINTS)
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
-            u, v = (texel_scramble(net[s, a], seeds[0, a], shared) for a in (0, 1))
+            u, v = (texel_scramble(net[s, a], seeds[a, 0], shared) for a in (0, 1))
             direction = naive.frame(normal[i, k]) @ naive.cosine_direction(float(u), float(v))
             t, prim = naive.intersect(room.geometry.position, room.geometry.triangle, origin[i, k], direction)
             truth[i, OPEN] += (t > REACH) / n_samples
