@@ -33,6 +33,7 @@ from baker.kernels.emitters import Emitters
 from baker.kernels.hits import HitTable
 from baker.kernels.surface import Surface
 from baker.lights.emissive import build_emitters
+from baker.radiosity.alpha import see_through
 from baker.radiosity.buried import find_buried
 from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
@@ -163,7 +164,9 @@ def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) 
             geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
         )
     with record.stage("ray tree"):
-        rays = RayScene(geometry.position, geometry.triangle, threads=threads)
+        rays = RayScene(
+            geometry.position, geometry.triangle, threads=threads, see_through=see_through(shading)
+        )
         emitters = build_emitters(geometry, shading)
         table = build_hit_table(geometry, texels, emitters)
     with record.stage("buried texels"):

@@ -26,7 +26,7 @@ class TexelBuffer:
     first : (n_front + 1,) int64, `entry` : (m,) int32, `entry_area` : (m,) float32
         Triangles that each front texel's square touches, and their areas inside it in texels.
     chart, instance : (n,) int32
-    area : (n,) float32, m2 of surface inside the texel
+    area : (n,) float32, m2 of surface inside the texel; of what lets light through, the share that is there
     centroid : (n_front, 2) float32, of that surface in the page, texels from the texel's centre
     position : (n, 3) float32, metres, at that centroid
     normal : (n, 3) float32, unit, shading, flipped on back entries

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene, Texture
+from baker.kernels.alpha import AlphaTable, no_alpha
 from baker.kernels.textures import TexturePack, pack_textures
+from baker.radiosity.alpha import build_alpha
 
 
 class Shading(NamedTuple):
@@ -23,6 +25,7 @@ class Shading(NamedTuple):
     base_uv, emission_uv : (V, 2) float32, by lightmap vertex (of the material its triangles have)
     colour : (V, 3) float32, linear vertex colour
     triangle : (T, 3) int32, lightmap vertices; material : (T,) int32
+    alpha : AlphaTable
     """
 
     pack: TexturePack
@@ -35,6 +38,7 @@ class Shading(NamedTuple):
     colour: NDArray[np.float32]
     triangle: NDArray[np.int32]
     material: NDArray[np.int32]
+    alpha: AlphaTable = no_alpha()
 
 
 def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
@@ -60,17 +64,20 @@ def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
 
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
     emission_texture = np.array([number(m.emission_texture) for m in scene.materials], np.int32)
+    pack = pack_textures(images)
+    base_uv = _corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
-        pack=pack_textures(images),
+        pack=pack,
         base=np.array([m.base_colour[:3] for m in scene.materials], np.float32).reshape(-1, 3),
         emission=np.array([m.emission for m in scene.materials], np.float32).reshape(-1, 3),
         base_texture=base_texture,
         emission_texture=emission_texture,
-        base_uv=_corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials]),
+        base_uv=base_uv,
         emission_uv=_corner_uv(scene, geometry, [m.emission_texture for m in scene.materials]),
         colour=_vertex_colour(scene, geometry),
         triangle=geometry.triangle,
         material=geometry.material,
+        alpha=build_alpha(scene, geometry, pack, base_texture, base_uv),
     )
 
 

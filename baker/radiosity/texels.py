@@ -63,14 +63,14 @@ def build_texels(
     normal = np.zeros((n_front, 3), np.float32)
     albedo = np.zeros((n_front, 3), np.float32)
     scale = _metres2_per_texel(geometry, size)
-    varied = len(shading.colour) > 1 or (shading.base_texture >= 0).any()
+    varied = len(shading.colour) > 1 or (shading.base_texture >= 0).any() or len(shading.alpha.row) > 0
     if not varied:
         albedo = _plain_albedo(shading, first, entry, entry_area)
 
     def work(begin: int, end: int) -> None:
         texel_geometry(surface, scale, begin, end, area, centroid, position, normal)
         if varied:
-            texel_albedo(surface, shading, begin, end, albedo)
+            texel_albedo(surface, shading, begin, end, albedo, area)
 
     run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
     back_entry = np.full(n_front, -1, np.int32)

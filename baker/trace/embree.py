@@ -42,6 +42,8 @@ _SIGNATURES = {
     "rtcSetSceneFlags": ("", "pi"), "rtcSetSceneBuildQuality": ("", "pi"), "rtcCommitScene": ("", "p"),
     "rtcNewGeometry": ("p", "pi"), "rtcReleaseGeometry": ("", "p"), "rtcCommitGeometry": ("", "p"),
     "rtcSetSharedGeometryBuffer": ("", "piuipzzz"), "rtcAttachGeometry": ("u", "pp"),
+    "rtcSetGeometryUserData": ("", "pp"), "rtcSetGeometryIntersectFilterFunction": ("", "pp"),
+    "rtcSetGeometryOccludedFilterFunction": ("", "pp"),
 }  # fmt: skip
 _TYPES: dict[str, Any] = {
     "p": ctypes.c_void_p, "i": ctypes.c_int, "u": ctypes.c_uint, "z": ctypes.c_size_t, "l": ctypes.c_ssize_t,
@@ -110,6 +112,26 @@ class Tracer(NamedTuple):
     width: int
 
 
+class SeeThrough(NamedTuple):
+    """Triangles of which a function decides, hit by hit, whether they block.
+
+    Attributes
+    ----------
+    chosen : (T,) bool
+    function : int
+        Address of `void f(RTCFilterFunctionNArguments*)`; it sets `valid` of hits that do not count to 0.
+    data : int
+        Address that the function finds as `geometryUserPtr`.
+    owner : object
+        Keeps function and data alive.
+    """
+
+    chosen: NDArray[np.bool_]
+    function: int
+    data: int
+    owner: Any
+
+
 class RayScene:
     """Triangles that rays can be cast at.
 
@@ -122,6 +144,8 @@ class RayScene:
         0.7 % do (17 % without the flag): Embree's own limit.
     threads : int
         Threads of the tree's build; 0 means all.
+    see_through : SeeThrough, optional
+        A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
 
     Raises
     ------
@@ -130,14 +154,28 @@ class RayScene:
     """
 
     def __init__(
-        self, position: NDArray[np.float32], triangle: NDArray[Any], *, robust: bool = True, threads: int = 0
+        self,
+        position: NDArray[np.float32],
+        triangle: NDArray[Any],
+        *,
+        robust: bool = True,
+        threads: int = 0,
+        see_through: SeeThrough | None = None,
     ) -> None:
         library = _library()
         self._library = library
-        # Embree reads 16 bytes from each vertex: one spare row keeps the last read inside.
-        self._position = np.zeros((len(position) + 1, 3), np.float32)
-        self._position[:-1] = position
-        self._triangle = np.ascontiguousarray(triangle, np.uint32)
+        self._see_through = see_through
+        n = len(position)
+        # Row n belongs to triangles that a geometry leaves out: Embree skips those with a vertex that is no
+        # number. It reads 16 bytes from each vertex: one spare row keeps the last read inside.
+        self._position = np.zeros((n + (1 if see_through is None else 2), 3), np.float32)
+        self._position[:n] = position
+        self._triangles = [np.ascontiguousarray(triangle, np.uint32)]
+        if see_through is not None:
+            self._position[n] = np.nan
+            chosen = see_through.chosen[:, None]
+            whole = self._triangles[0]
+            self._triangles = [np.where(left_out, np.uint32(n), whole) for left_out in (chosen, ~chosen)]
         config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
         self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
         if not self._device:
@@ -149,13 +187,14 @@ class RayScene:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
         library.rtcSetSceneFlags(self._scene, _SCENE_ROBUST if robust else 0)
         library.rtcSetSceneBuildQuality(self._scene, _QUALITY_MEDIUM)
-        if len(self._triangle):
-            self._add_triangles()
+        if len(triangle):
+            for indices, see in zip(self._triangles, (None, see_through), strict=False):
+                self._add_triangles(indices, see)
         library.rtcCommitScene(self._scene)
         self._check("building the ray tree")
         self.tracer = self._tracer()
 
-    def _add_triangles(self) -> None:
+    def _add_triangles(self, triangle: NDArray[np.uint32], see_through: SeeThrough | None) -> None:
         library = self._library
         geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
         library.rtcSetSharedGeometryBuffer(
@@ -169,8 +208,12 @@ class RayScene:
             len(self._position) - 1,
         )
         library.rtcSetSharedGeometryBuffer(
-            geometry, _BUFFER_INDEX, 0, _FORMAT_UINT3, self._triangle.ctypes.data, 0, 12, len(self._triangle)
+            geometry, _BUFFER_INDEX, 0, _FORMAT_UINT3, triangle.ctypes.data, 0, 12, len(triangle)
         )
+        if see_through is not None:
+            library.rtcSetGeometryUserData(geometry, see_through.data)
+            library.rtcSetGeometryIntersectFilterFunction(geometry, see_through.function)
+            library.rtcSetGeometryOccludedFilterFunction(geometry, see_through.function)
         library.rtcCommitGeometry(geometry)
         library.rtcAttachGeometry(self._scene, geometry)
         library.rtcReleaseGeometry(geometry)

@@ -1,0 +1,95 @@
+"""Which triangles let light through, and what decides where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.geometry import Geometry
+from baker.core.scene import Scene
+from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, TEXTURE, UV, AlphaTable, no_alpha
+from baker.kernels.textures import TexturePack
+from baker.trace.embree import SeeThrough
+
+
+def build_alpha(
+    scene: Scene,
+    geometry: Geometry,
+    pack: TexturePack,
+    base_texture: NDArray[np.int32],
+    base_uv: NDArray[np.float32],
+) -> AlphaTable:
+    """Find the triangles of MASK and BLEND materials whose alpha may fall below what blocks.
+
+    Parameters
+    ----------
+    base_texture : (M,) int32
+        Number in `pack` of each material's base colour texture, -1 for none.
+    base_uv : (V, 2) float32
+        Its image uv by lightmap vertex; (1, 2) if nothing is textured.
+    """
+    mode = np.array([m.alpha_mode for m in scene.materials])
+    # Alpha from which on nothing passes; opaque materials block at any.
+    blocks = np.array(
+        [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
+    )
+    candidate = np.flatnonzero(np.isin(mode, ("MASK", "BLEND"))[geometry.material])
+    if not len(candidate):
+        return no_alpha()
+    material = geometry.material[candidate]
+    factor = np.array([m.base_colour[3] for m in scene.materials], np.float32)
+    alpha = factor[material][:, None] * _corner_alpha(scene, geometry, candidate)
+    lowest = np.array([1.0 if k < 0 else _least(pack, int(k)) for k in base_texture], np.float32)
+    chosen = np.flatnonzero(alpha.min(axis=1) * lowest[material] < blocks[material])
+    if not len(chosen):
+        return no_alpha()
+    triangle, material, alpha = candidate[chosen], material[chosen], alpha[chosen]
+    slot = np.full(len(geometry.triangle), -1, np.int32)
+    slot[triangle] = np.arange(len(triangle), dtype=np.int32)
+    row = np.zeros((len(triangle), ROW_LENGTH), np.float32)
+    if len(base_uv) > 1:
+        uv = base_uv[geometry.triangle[triangle]]
+        row[:, UV : UV + 2] = uv[:, 0]
+        row[:, UV + 2 : UV + 4] = uv[:, 1] - uv[:, 0]
+        row[:, UV + 4 : UV + 6] = uv[:, 2] - uv[:, 0]
+    row[:, ALPHA] = alpha[:, 0]
+    row[:, ALPHA + 1 : ALPHA + 3] = alpha[:, 1:] - alpha[:, :1]
+    row[:, CUTOFF] = np.where(mode[material] == "MASK", blocks[material], np.float32(-1.0))
+    row[:, TEXTURE] = base_texture[material]
+    return AlphaTable(slot, row)
+
+
+def see_through(shading: Any) -> SeeThrough | None:
+    """Return what the ray tree has to know of triangles that let light through, None without any.
+
+    Parameters
+    ----------
+    shading : Shading
+        Materials as kernels see them.
+    """
+    if not len(shading.alpha.row):
+        return None
+    # Loading the compiled function takes time that other scenes need not spend.
+    from baker.kernels.alpha_filter import filter_of
+
+    return filter_of(shading.alpha, shading.pack)
+
+
+def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return (n, 3) float32: the vertex colours' alpha at the corners of triangles, 1 without colours."""
+    alpha = np.ones((len(triangle), 3), np.float32)
+    owner = geometry.instance[triangle]
+    for index in np.unique(owner):
+        colour = scene.meshes[scene.instances[index].mesh].colour
+        if colour is not None:
+            own = owner == index
+            alpha[own] = colour[geometry.vertex_source[geometry.triangle[triangle[own]]], 3]
+    return alpha
+
+
+def _least(pack: TexturePack, k: int) -> float:
+    """Return the smallest alpha of a texture."""
+    offset, width, height = (int(x) for x in pack.level[k, 0])
+    return float(pack.pixels[offset : offset + width * height, 3].min(initial=1.0))
