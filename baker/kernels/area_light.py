@@ -90,16 +90,18 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     light = abs(light)
                 if cosine <= _f(0.0) or light <= _f(1.0e-6):
                     continue
+                there = 1.0
                 if any_alpha:
                     # What is not there does not shine; rays that find an emitter know that already.
                     there = presence_at(shading, triangle[m], b1, b2)
                     if there <= 0.0:
                         continue
-                    for c in range(3):
-                        radiance[c] *= there
                 steradian = density * square / light
                 first_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[0])
                 second_weight = mis_weighted(cosine, steradian, n_samples, hemisphere[1])
+                if any_alpha:
+                    first_weight *= there
+                    second_weight *= there
                 if row[m, TEXTURED] > _f(0.0):
                     emitted_radiance(shading, triangle[m], b1, b2, radiance)
                 else:

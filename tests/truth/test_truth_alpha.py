@@ -1,0 +1,213 @@
+"""Light through MASK and BLEND surfaces: holes where the uv says, shares of alpha, nothing more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closed_forms import point_irradiance
+from scenes import SceneBuilder, prepared
+
+from baker.core.scene import Texture
+
+SUN = (0.0, -1.0, 0.0)
+HIGH = 0.5
+
+
+def alpha_material(
+    builder, mode, alpha=1.0, *, cutoff=0.5, image=None, wrap="clamp", emission=0.0, albedo=0.0
+):
+    """Add a two-sided material; `image` (H, W) is the alpha of its texture."""
+    number = builder.material(albedo, emission, double_sided=True)
+    texture = None
+    if image is not None:
+        rgba = np.ones((*np.shape(image), 4), np.float32)
+        rgba[..., 3] = image
+        texture = Texture(rgba, wrap=(wrap, wrap))
+    builder.materials[number] = replace(
+        builder.materials[number],
+        base_colour=(albedo, albedo, albedo, alpha),
+        base_colour_texture=texture,
+        alpha_mode=mode,
+        alpha_cutoff=cutoff,
+    )
+    return number
+
+
+def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
+    """A black floor of 2 x 2 m under square cards of (material of builder) at rising heights."""
+    builder = SceneBuilder(96)
+    floor = builder.quad(
+        (-half, 0, -half), (0, 0, 2 * half), (2 * half, 0, 0), builder.material(0.0), (texels, texels)
+    )
+    for k, make in enumerate(cards):
+        # Columns of the card's uv run along z, rows along x, as the floor's do.
+        builder.quad((-1, HIGH + 0.1 * k, -1), (0, 0, 2), (2, 0, 0), make(builder), (8, 8))
+    if light:
+        builder.light(light, 1.0, **(where or {"direction": SUN}))
+    return builder, floor
+
+
+def masked(**settings):
+    return lambda builder: alpha_material(builder, "MASK", **settings)
+
+
+def blended(alpha, **settings):
+    return lambda builder: alpha_material(builder, "BLEND", alpha, **settings)
+
+
+def bilinear(image, u, v, wrap):
+    """Sample an image (H, W) by a sum over its pixels' tents: the slow twin of the kernel's lookup."""
+    high, wide = image.shape
+    total = np.zeros(np.shape(u))
+    for row in range(-2 * high, 3 * high):
+        for column in range(-2 * wide, 3 * wide):
+            weight = np.clip(1 - np.abs(u * wide - 0.5 - column), 0, 1)
+            weight = weight * np.clip(1 - np.abs(v * high - 0.5 - row), 0, 1)
+            r, c = (
+                {
+                    "clamp": min(max(i, 0), n - 1),
+                    "repeat": i % n,
+                    "mirror": i % n if (i // n) % 2 == 0 else n - 1 - i % n,
+                }[wrap]
+                for i, n in ((row, high), (column, wide))
+            )
+            total += weight * image[r, c]
+    return total
+
+
+LEAF = np.array([[0.9, 0.1, 0.6], [0.2, 0.4, 1.0], [0.0, 0.8, 0.3], [0.5, 0.7, 0.1]])
+
+
+@pytest.mark.parametrize("cutoff", [0.3, 0.7])
+@pytest.mark.parametrize("wrap", ["clamp", "repeat", "mirror"])
+def test_mask_casts_the_shadow_of_its_texture(wrap, cutoff):
+    builder, floor = floor_under(masked(image=LEAF, cutoff=cutoff, wrap=wrap))
+    mesh = builder.meshes[1]
+    spread = mesh.texcoord[0] * np.float32([1.4, 1.2]) - np.float32([0.2, 0.1])
+    builder.meshes[1] = replace(mesh, texcoord=(spread, mesh.texcoord[1]))
+    found = floor.values(builder.bake(bounces=0))[..., 0]
+    point = floor.points(8)
+    u, v = (point[..., 2] + 1) / 2 * 1.4 - 0.2, (point[..., 0] + 1) / 2 * 1.2 - 0.1
+    lit = bilinear(LEAF, u, v, wrap) < cutoff
+    bright, dark = lit.all(axis=2), ~lit.any(axis=2)
+    assert bright.sum() > 100
+    assert dark.sum() > 100
+    assert (found[dark] == 0).all()
+    assert np.allclose(found[bright], 1.0, rtol=1e-5)
+    assert found.mean() == pytest.approx(lit.mean(), abs=0.004)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "cutoff", "light"), [(0.4, 0.5, 1), (0.5, 0.5, 0), (0.3, 0.3, 0), (0.6, 0.7, 1)]
+)
+def test_factor_alone_decides_a_mask(alpha, cutoff, light):
+    builder, floor = floor_under(masked(alpha=alpha, cutoff=cutoff))
+    assert np.allclose(floor.values(builder.bake(bounces=0)), light, rtol=1e-5)
+
+
+def test_opaque_materials_ignore_alpha():
+    image = np.zeros((2, 2))
+    builder, floor = floor_under(lambda b: alpha_material(b, "OPAQUE", 0.0, image=image))
+    assert (floor.values(builder.bake(bounces=0)) == 0).all()
+    world, _ = prepared(builder)
+    assert len(world.shading.alpha.slot) == 0
+
+
+def test_vertex_alpha_counts():
+    builder, floor = floor_under(masked(cutoff=0.5))
+    mesh = builder.meshes[1]
+    # Alpha rises from 0 at x = -1 to 1 at x = 1 (corners in the order of `SceneBuilder.quad`).
+    colour = np.ones((4, 4), np.float32)
+    colour[:, 3] = (mesh.position[:, 0] + 1) / 2
+    builder.meshes[1] = replace(mesh, colour=colour)
+    found = floor.values(builder.bake(bounces=0))[..., 0]
+    assert np.allclose(found[:20], 1.0, rtol=1e-5)
+    assert (found[20:] == 0).all()
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_blend_lets_the_rest_of_alpha_through(layers):
+    light = (0.0, 2.0, 0.0)
+    builder, floor = floor_under(*[blended(0.25)] * layers, light="point", position=light)
+    found = floor.values(builder.bake(bounces=0))[..., 0]
+    truth = floor.texel_mean(lambda p: point_irradiance(light, p, (0, 1, 0)))
+    # 40 x 40 texels of 16 rays each: the mean's standard error is 0.27 %.
+    share = 0.75**layers
+    error = np.sqrt(share * (1 - share) / found.size / 16)
+    assert (found / truth).mean() == pytest.approx(share, abs=4 * error)
+    # Single texels scatter as 16 independent tries do: neither all alike nor in clumps.
+    assert (found / truth).std() == pytest.approx(np.sqrt(share * (1 - share) / 16), rel=0.1)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.25, 1.0])
+def test_ambient_occlusion_through_blend(alpha):
+    """A closed box of glass: every ray of the floor inside meets it once."""
+    builder = SceneBuilder(96)
+    floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
+    builder.box((-2, -1, -2), (2, 1, 2), alpha_material(builder, "BLEND", alpha), 8)
+    found = floor.values(builder.bake(channels=["ao"], ao_samples=64, ao_distance="inf"), "ao")
+    error = np.sqrt(alpha * (1 - alpha) / found.size / 64)
+    assert found.mean() == pytest.approx(1 - alpha, abs=4 * error + 1e-6)
+
+
+def test_sky_through_blend_and_its_own_reflection():
+    """Grey glass around a floor under an even sky: what is not reflected comes through, in all 1 - absorbed.
+
+    Inside E follows from E = (1 - alpha) * pi * L + alpha * albedo * E; the glass sees itself all around.
+    """
+    alpha, albedo = 0.4, 0.5
+    builder = SceneBuilder(96)
+    box = builder.box(
+        (-1, -1, -1), (1, 1, 1), alpha_material(builder, "BLEND", alpha, albedo=albedo), 16, inward=True
+    )
+    result = builder.bake(sky=(1.0, 1.0, 1.0), samples=256)
+    found = np.mean([side.values(result).mean() for side in box.values()])
+    assert found == pytest.approx((1 - alpha) * np.pi / (1 - alpha * albedo), rel=0.01)
+
+
+@pytest.mark.parametrize("mode", ["MASK", "BLEND"])
+def test_what_is_not_there_does_not_shine(mode):
+    """Half a lamp, as a hole or as glass of alpha 0.5, lights half as much as a whole one."""
+    image = np.repeat(np.array([[0.0, 1.0]]), 2, axis=0)
+    half = masked(image=image, emission=10.0) if mode == "MASK" else blended(0.5, emission=10.0)
+
+    def mean(make):
+        builder, floor = floor_under(make, light="")
+        result = builder.bake(samples=64, bounces=0)
+        return floor.values(result)[..., 0].mean(), builder
+
+    whole, _ = mean(masked(emission=10.0))
+    found, _ = mean(half)
+    assert found == pytest.approx(whole / 2, rel=0.01)
+
+
+def test_reciprocity_of_a_leaf_with_holes():
+    """A white card with holes beside a lit wall reflects as much as the part of it that is there.
+
+    Its twin is the same card cut to that part by its shape: they must light the floor alike.
+    """
+    image = np.zeros((64, 64))
+    image[:, 32:] = 1.0
+
+    def mean(cut):
+        builder = SceneBuilder(96)
+        floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.8), (32, 32))
+        if cut:
+            card = builder.material(0.8, double_sided=True)
+            builder.quad((-1, HIGH, 0), (0, 0, 1), (2, 0, 0), card, (16, 32))
+        else:
+            card = alpha_material(builder, "MASK", image=image, albedo=0.8)
+            builder.quad((-1, HIGH, -1), (0, 0, 2), (2, 0, 0), card, (32, 32))
+        builder.light("point", 10.0, position=(0.0, 0.25, -0.5))
+        return floor.values(builder.bake(samples=256))[..., 0]
+
+    assert mean(cut=False).mean() == pytest.approx(mean(cut=True).mean(), rel=0.004)
+
+
+def test_same_bytes_on_any_number_of_threads():
+    image = np.array([[0.0, 1.0], [0.6, 0.3]])
+    builder, _ = floor_under(masked(image=image, albedo=0.5), blended(0.3, albedo=0.5))
+    maps = [builder.bake(threads=n, samples=16, sky=(1.0, 1.0, 1.0)).lightmaps for n in (1, 2)]
+    assert maps[0]["irradiance"].value.tobytes() == maps[1]["irradiance"].value.tobytes()
