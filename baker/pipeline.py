@@ -128,8 +128,11 @@ def bake(
         world = prepare(scene, atlas, settings, record)
         transport = trace_transport(scene, world, channels, settings, record)
         world.rays.close()
+        # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
+        texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
+        del world
         warm.finish(compiling, progress)
-        result = _finish(scene, atlas, world, transport, channels, settings, record)
+        result = _finish(scene, atlas, texels, good, transport, channels, settings, record)
         if folder is not None:
             from baker.io.output import write_bake
 
@@ -240,13 +243,17 @@ def _light(
     exitance = np.zeros((texels.n, 4), np.float32)
     if settings.bounces != 0:
         exitance[:, :3] = _reflected(world, direct.complete, sky, settings, record)
+    # It has done its part.
+    direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
+        seen = texels.hit_image(exitance)
+        del exitance
         gathered: Gathered = final_gather(
             texels.n_front,
             world.surface,
             world.mask,
             world.table,
-            texels.hit_image(exitance),
+            seen,
             world.emitters,
             world.shading,
             world.rays.tracer,
@@ -312,16 +319,18 @@ def _reflected(
 def _finish(
     scene: Scene,
     atlas: Atlas,
-    world: World,
+    texels: TexelBuffer,
+    good: NDArray[np.bool_],
     transport: Transport,
     channels: dict[str, Channel],
     settings: BakeSettings,
     record: Record,
 ) -> BakeResult:
-    """Turn texel values into finished pages and gather what is to be told about them."""
-    texels = world.texels
+    """Turn texel values into finished pages and gather what is to be told about them.
+
+    good : (n_front,) bool, texels that are not buried
+    """
     n_front = texels.n_front
-    good = world.mask[:n_front] != 0
     chart = texels.page_image(texels.chart[:n_front], fill=-1)
     valid = texels.page_image(good, fill=False)
     centroid = texels.page_image(texels.centroid)
@@ -335,12 +344,15 @@ def _finish(
             value = np.zeros(
                 (atlas.n_pages, atlas.resolution, atlas.resolution, channel.components), np.float32
             )
-            images = [(texels.page_image(part.value), texels.page_image(part.error)) for part in layers]
             for page in range(atlas.n_pages):
+                images = [
+                    (texels.page_image(part.value, page=page), texels.page_image(part.error, page=page))
+                    for part in layers
+                ]
                 plan = PagePlan(chart[page], valid[page], centroid[page])
                 value[page], grown = finish_page(
                     plan,
-                    [(image[page], error[page]) for image, error in images],
+                    images,
                     upper=channel.upper,
                     denoise=settings.denoise,
                     dilation=max(2 * settings.padding, 8),

@@ -6,7 +6,7 @@ double-sided surfaces: they take part in light transport but are not stored in a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -74,9 +74,30 @@ class TexelBuffer:
         image[on] = value[entry[on]]
         return image
 
-    def page_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
-        """Scatter per-front-texel values (n_front, ...) to (P, H, W, ...) images."""
-        shape = (self.n_pages * self.resolution * self.resolution, *value.shape[1:])
-        image = np.full(shape, fill, value.dtype)
-        image[self.pixel[: self.n_front]] = value[: self.n_front]
-        return image.reshape(self.n_pages, self.resolution, self.resolution, *value.shape[1:])
+    def page_image(self, value: NDArray[Any], fill: float | int = 0, page: int | None = None) -> NDArray[Any]:
+        """Scatter per-front-texel values (n_front, ...) to images (P, H, W, ...), or one page (H, W, ...)."""
+        pixels = self.resolution * self.resolution
+        pixel, value = self.pixel[: self.n_front], value[: self.n_front]
+        n_pages = self.n_pages
+        if page is not None:
+            # Texels come page by page.
+            first, last = np.searchsorted(pixel // pixels, (page, page + 1))
+            pixel, value, n_pages = pixel[first:last] - page * pixels, value[first:last], 1
+        image = np.full((n_pages * pixels, *value.shape[1:]), fill, value.dtype)
+        image[pixel] = value
+        shape = (self.resolution, self.resolution, *value.shape[1:])
+        return image.reshape(shape if page is not None else (n_pages, *shape))
+
+    def without_surface(self) -> TexelBuffer:
+        """Return the buffer without what only the ray stages need: triangles, positions, normals, albedo."""
+        none = np.zeros((0, 3), np.float32)
+        return replace(
+            self,
+            entry=np.zeros(0, np.int32),
+            entry_area=np.zeros(0, np.float32),
+            first=np.zeros(1, np.int64),
+            position=none,
+            normal=none,
+            albedo=none,
+            lookup=np.zeros(0, np.int32),
+        )

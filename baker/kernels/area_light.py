@@ -48,8 +48,8 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
     net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
     hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
-    out : (n_entries, 6) float32, lx: two differently weighted estimates of RGB
-    second : (n_entries,) float32, sum over 16 batches of the square of the first estimate's share
+    out : (m, 6) float32, lx: two differently weighted estimates of RGB
+    second : (m,) float32, sum over 16 batches of the square of the first estimate's share
     """
     n_samples = len(net)
     width, scene, occluded = caster.width, caster.scene, caster.occluded
@@ -125,9 +125,9 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
             squares = 0.0
             for k in range(N_POINTS):
                 squares += batch[lane, k] * batch[lane, k]
-            second[begin + group + lane] = squares
+            second[group + lane] = squares
             for c in range(6):
-                out[begin + group + lane, c] += total[lane, c]
+                out[group + lane, c] += total[lane, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

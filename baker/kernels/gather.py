@@ -32,10 +32,11 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    exitance : (sides * P * H * W, 4) float32, lx, light that the texel at each pixel reflects (RGB, spare)
+    exitance : (sides * P * H * W, 4) float32, lx, light that the texel at each pixel reflects (RGB,
+        spare); no rows if nothing does
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
-    out : (n_entries, 8) float32, see the column names
+    begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
     """
     n_samples = len(net)
     width, scene, intersect = caster.width, caster.scene, caster.intersect
@@ -51,6 +52,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     distance = _f(limits[0])
     # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
     inverse_pi = _f(1.0 / np.pi)
+    lit = len(exitance) > 0
     whole = n_samples / np.pi
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
@@ -100,7 +102,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             for lane in range(lanes):
                 p = pixel[lane]
-                if p >= 0:
+                if p >= 0 and lit:
                     total[lane, INDIRECT] += exitance[p, 0] * inverse_pi
                     total[lane, INDIRECT + 1] += exitance[p, 1] * inverse_pi
                     total[lane, INDIRECT + 2] += exitance[p, 2] * inverse_pi
@@ -113,7 +115,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                     before[lane] = now
         scale = np.pi / n_samples
         for lane in range(lanes):
-            i = begin + group + lane
+            i = group + lane
             for c in range(6):
                 out[i, c] = total[lane, c] * scale
             out[i, OPEN] = total[lane, OPEN] / n_samples

@@ -77,45 +77,68 @@ def direct_light(
         Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
     """
     n = len(surface.pixel)
-    out = np.zeros((n, 6), np.float32)
-    second = np.zeros(n, np.float32)
-    area = np.zeros(n, np.float32)
+    weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
+    variance = np.zeros(n, np.float32)
     net = sobol_reversed(n_light, seed, 1)
     shared = shared_bits_mask(n_light)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
     weigh = np.array([n_gather, N_HEMISPHERE], np.float64)
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
 
-    dark = np.zeros((2 * table.n_pixels, 4), np.float32)
-    black, limits = np.zeros(3, np.float32), np.array([0.0, n_light], np.float64)
-    found = np.zeros((n, N_COLUMNS), np.float32)
+    dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
+    limits = np.array([0.0, n_light], np.float64)
     few_shared = shared_bits_mask(N_HEMISPHERE)
 
     def work(begin: int, end: int) -> None:
         caster = new_caster(tracer)
         origin, normal = points_of(surface, mask, np.arange(begin, end))
         lamps = lamps_for(emitters, origin)
+        out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
         if lamps.chance.any():
             light_samples(origin, normal, lamps, shading, caster, begin, net, shared, weigh, out, second)
-            area[begin:end] = out[begin:end, :3].sum(axis=1)
+            variance[begin:end] = batch_variance(out[:, :3].sum(axis=1), second)
         if len(emitters.power):
+            found = np.zeros((end - begin, N_COLUMNS), np.float32)
             gather(
-                origin, normal, table, dark, lamps, shading, caster, begin, few, few_shared, black, limits,
+                origin,
+                normal,
+                table,
+                dark,
+                lamps,
+                shading,
+                caster,
+                begin,
+                few,
+                few_shared,
+                black,
+                limits,
                 found,
-            )  # fmt: skip
-            out[begin:end, 3:] += found[begin:end, DIRECT : DIRECT + 3]
+            )
+            out[:, 3:] += found[:, DIRECT : DIRECT + 3]
         if families:
             ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
             weight = np.zeros((end - begin, N_POINTS), np.float32)
             for light, family in families:
                 if family is not None:
                     family(light, origin, normal, ray, weight)
-                    add_visible(
-                        caster, origin, ray, weight, np.array(light.intensity, np.float32), begin, out
-                    )
+                    add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
+        weighted[begin:end], complete[begin:end] = out[:, :3], out[:, 3:]
 
     area_rays = (n_light + N_HEMISPHERE) * bool(len(emitters.power))
     rays = area_rays + N_POINTS * len(families)
     run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    spread = np.maximum(second - area * area / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
-    return DirectLight(out[:, :3].copy(), out[:, 3:].copy(), spread.astype(np.float32), rays * n)
+    return DirectLight(weighted, complete, variance, rays * n)
+
+
+def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the variance of the mean of RGB of sums over 16 batches.
+
+    Parameters
+    ----------
+    total : (m,) float32
+        Sum of R, G and B over all batches.
+    squares : (m,) float32
+        Sum of the squares of the batches' shares of it.
+    """
+    spread = np.maximum(squares - total * total / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
+    return spread.astype(np.float32)

@@ -14,8 +14,8 @@ from baker.kernels.emitters import Emitters, lamps_for
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.surface import N_POINTS, Surface
-from baker.radiosity.direct import TILE
+from baker.kernels.surface import Surface
+from baker.radiosity.direct import TILE, batch_variance
 from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
@@ -71,7 +71,8 @@ def final_gather(
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
     """
-    out = np.zeros((n_front, N_COLUMNS), np.float32)
+    indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
+    opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
     net = sobol_reversed(n_samples, seed, 6)
     shared = shared_bits_mask(n_samples)
     limits = np.array([ao_distance, n_light], np.float64)
@@ -79,22 +80,17 @@ def final_gather(
 
     def work(begin: int, end: int) -> None:
         origin, normal = points_of(surface, mask, np.arange(begin, end))
-        lamps = lamps_for(emitters, origin)
+        lamps, caster = lamps_for(emitters, origin), new_caster(tracer)
+        out = np.zeros((end - begin, N_COLUMNS), np.float32)
         gather(
-            origin, normal, table, exitance, lamps, shading, new_caster(tracer), begin, net, shared, radiance,
-            limits, out,
-        )  # fmt: skip
+            origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, radiance, limits, out
+        )
+        indirect[begin:end], direct[begin:end] = out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3]
+        opened[begin:end] = out[:, OPEN]
+        variance[begin:end] = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
 
     run_tiles(n_front, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_samples)
-    total = out[:, INDIRECT : DIRECT + 3].sum(axis=1)
-    spread = np.maximum(out[:, SQUARE] - total * total / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
-    return Gathered(
-        indirect=out[:, INDIRECT : INDIRECT + 3].copy(),
-        direct=out[:, DIRECT : DIRECT + 3].copy(),
-        open=out[:, OPEN].copy(),
-        variance=spread.astype(np.float32),
-        rays=n_front * n_samples,
-    )
+    return Gathered(indirect, direct, opened, variance, n_front * n_samples)
 
 
 def ambient_occlusion(

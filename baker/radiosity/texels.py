@@ -87,11 +87,11 @@ def build_texels(
         entry_area=entry_area,
         chart=chart[front],
         instance=main[front],
-        area=area[front],
+        area=_with_backs(area, front, back),
         centroid=centroid,
-        position=position[front],
-        normal=np.where(back[:, None], -normal[front], normal[front]),
-        albedo=albedo[front],
+        position=_with_backs(position, front, back),
+        normal=_with_backs(normal, front, back, -1.0),
+        albedo=_with_backs(albedo, front, back),
         lookup=_lookup(pixel, size, atlas.n_pages),
         back_entry=back_entry,
     )
@@ -133,6 +133,15 @@ def _plain_albedo(
     colour = shading.base[shading.material[entry]]
     summed = [np.bincount(owner, weight * colour[:, c], len(first) - 1) for c in range(3)]
     return (np.stack(summed, axis=1) / total[:, None]).astype(np.float32)
+
+
+def _with_backs(
+    value: NDArray[np.float32], front: NDArray[np.int32], back: NDArray[np.bool_], factor: float = 1.0
+) -> NDArray[np.float32]:
+    """Return per-front values with those of the backs, times `factor`, behind them; no copy without backs."""
+    if not back.any():
+        return value
+    return np.concatenate([value, np.float32(factor) * value[front[back]]])
 
 
 def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
