@@ -39,7 +39,7 @@ def _one_of_sixteen(k, seed):  # type: ignore[no-untyped-def]
         # Each step maps 0 to 15 onto itself, by seven bits of the seed a turn.
         part = np.uint32(seed >> np.uint32(7 * turn))
         x = np.uint32(
-            ((x ^ (part & np.uint32(15))) * (((part >> np.uint32(3)) & np.uint32(14)) | np.uint32(1)))
+            (x ^ (part & np.uint32(15))) * (((part >> np.uint32(3)) & np.uint32(14)) | np.uint32(1))
         )
         x = np.uint32(x & np.uint32(15))
         x = np.uint32(x ^ (x >> np.uint32(2)))

@@ -133,12 +133,14 @@ def test_blend_lets_the_rest_of_alpha_through(layers):
     builder, floor = floor_under(*[blended(0.25)] * layers, light="point", position=light)
     found = floor.values(builder.bake(bounces=0))[..., 0]
     truth = floor.texel_mean(lambda p: point_irradiance(light, p, (0, 1, 0)))
-    # 40 x 40 texels of 16 rays each: the mean's standard error is 0.27 %.
+    # 40 x 40 texels of 16 rays each: the mean's standard error would be 0.27 % without strata.
     share = 0.75**layers
     error = np.sqrt(share * (1 - share) / found.size / 16)
     assert (found / truth).mean() == pytest.approx(share, abs=4 * error)
-    # Single texels scatter as 16 independent tries do: neither all alike nor in clumps.
-    assert (found / truth).std() == pytest.approx(np.sqrt(share * (1 - share) / 16), rel=0.1)
+    # A texel's 16 rays decide together: through one pane a quarter of them is exactly 4, but for texels
+    # that see both triangles of the pane, and for the light's own change within a texel.
+    scatter = (found / truth).std() / np.sqrt(share * (1 - share) / 16)
+    assert scatter < (0.2 if layers == 1 else 0.6)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.25, 1.0])

@@ -13,6 +13,7 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.scene import Texture
 from baker.kernels.alpha import CUTOFF, presence_at
+from baker.kernels.alpha_filter import _one_of_sixteen
 from baker.kernels.textures import pack_textures, sample_alpha, sample_texture
 from baker.radiosity.alpha import see_through
 from baker.radiosity.materials import resolve_materials
@@ -151,3 +152,17 @@ def test_the_answer_does_not_depend_on_the_packet():
         assert (prim == first[1][order])[hit].all()
         dark = cast(rays, origin[order], direction[order], width=width, occluded=True)[4] < 0
         assert (dark == hit).all()
+
+
+def test_sixteen_rays_share_sixteen_strata():
+    seeds = np.random.default_rng(4).integers(0, 2**32, 4000, dtype=np.uint32)
+    number = np.array([[_one_of_sixteen(np.uint32(k), seed) for k in range(16)] for seed in seeds])
+    stratum = number >> 28
+    assert (np.sort(stratum, axis=1) == np.arange(16)).all()
+    # Each ray meets each stratum, and two layers of alpha 1/4 stop one ray of 16 together on average.
+    for k in range(16):
+        count = np.bincount(stratum[:, k], minlength=16)
+        assert np.abs(count / 250 - 1).max() < 0.3
+    both = ((stratum[::2] < 4) & (stratum[1::2] < 4)).sum(axis=1)
+    assert both.mean() == pytest.approx(1.0, abs=0.07)
+    assert (number / 2**32).mean() == pytest.approx(0.5, abs=0.004)
