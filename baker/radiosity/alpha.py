@@ -80,11 +80,12 @@ def see_through(shading: Any) -> SeeThrough | None:
 def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return (n, 3) float32: the vertex colours' alpha at the corners of triangles, 1 without colours."""
     alpha = np.ones((len(triangle), 3), np.float32)
-    owner = geometry.instance[triangle]
-    for index in np.unique(owner):
-        colour = scene.meshes[scene.instances[index].mesh].colour
+    # Triangles lie in the order of instances.
+    bound = np.searchsorted(geometry.instance[triangle], np.arange(len(scene.instances) + 1))
+    for index, instance in enumerate(scene.instances):
+        colour = scene.meshes[instance.mesh].colour
+        own = slice(bound[index], bound[index + 1])
         if colour is not None:
-            own = owner == index
             alpha[own] = colour[geometry.vertex_source[geometry.triangle[triangle[own]]], 3]
     return alpha
 
