@@ -84,7 +84,9 @@ def _made(function, caster, origin, normal, begin, net, shared, far):  # type: i
         for lane in range(width):
             valid[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
-            _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
+            _aim_hemisphere(
+                floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far
+            )
             trace(function, scene, valid, floats)
             mixed ^= words[GEOM_ROW * width]
     return mixed

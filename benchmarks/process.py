@@ -78,7 +78,9 @@ def bake(scene: Path, out: Path, *, flags: list[str], cache: Path) -> Run:
     return Run(
         seconds=seconds,
         cpu=usage.ru_utime + usage.ru_stime,
-        peak=max(usage.ru_maxrss / (1024 if sys.platform == "linux" else 2**20), memory.peak),
+        # Linux counts the memory of the process that started a program as that program's, so its own
+        # high-water mark is read instead where there is one.
+        peak=memory.peak or usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 1024),
         timings=manifest["timings"],
         rays=manifest["rays"],
         solve=manifest["solve"],
@@ -97,19 +99,27 @@ class _Memory(threading.Thread):
 
     def run(self) -> None:
         while Path("/proc/self/statm").exists() and not self._over.wait(_LOOK):
-            pages, waiting = 0, [self._pid]
+            total, waiting = 0.0, [self._pid]
             while waiting:
                 folder = Path(f"/proc/{waiting.pop()}")
                 try:
+                    status = (folder / "status").read_text(encoding="utf-8")
+                    fact = dict(line.split(":", 1) for line in status.splitlines())
                     # Shared pages (libraries, memory from before a fork) count once, in the first process.
-                    size = (folder / "statm").read_text().split()
-                    pages += int(size[1]) - (int(size[2]) if pages else 0)
+                    total += _mib(fact["RssAnon"]) + (0.0 if total else _mib(fact["RssFile"]))
+                    # What was larger between two looks, in one process.
+                    self.peak = max(self.peak, _mib(fact["VmHWM"]))
                     for thread in (folder / "task").iterdir():
                         waiting += [int(word) for word in (thread / "children").read_text().split()]
-                except (OSError, IndexError):
+                except (OSError, KeyError):
                     continue
-            self.peak = max(self.peak, pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
+            self.peak = max(self.peak, total)
 
     def stop(self) -> None:
         self._over.set()
         self.join()
+
+
+def _mib(text: str) -> float:
+    """Return MiB of a line of /proc/PID/status, like " 1024 kB"."""
+    return int(text.split()[0]) / 1024

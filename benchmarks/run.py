@@ -138,15 +138,15 @@ def _bake(
 
 def _rates(options: argparse.Namespace, scenes: list[Path]) -> list[dict[str, Any]]:
     # Imported here: the tables of an earlier file need no Embree.
-    from rates import measure
+    from rates import measure_apart
 
     size = options.sizes[len(options.sizes) // 2]
     found = []
     for path in scenes:
         _say(f"bare Embree: {path.stem} at {size}")
         found.append(
-            measure(
-                path,
+            measure_apart(
+                scene_path=path,
                 resolution=size,
                 samples=options.samples,
                 repeat=options.repeat + 2,
@@ -172,10 +172,14 @@ def _series(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict
     for entry in entries:
         entry["runs"] = [run.plain() for run in runs[entry["asked"]]]
         if not options.no_rates:
-            from rates import measure
+            from rates import measure_apart
 
-            rate = measure(
-                entry["path"], resolution=size, samples=options.samples, repeat=options.repeat, sky=None
+            rate = measure_apart(
+                scene_path=entry["path"],
+                resolution=size,
+                samples=options.samples,
+                repeat=options.repeat,
+                sky=None,
             )
             entry["bare"] = rate["bare"]["closest hit"]["made"]
         else:
