@@ -91,6 +91,22 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
+    """Return the largest radius / distance of any cluster seen from points (m, w, 3); inf where one is met."""
+    x, y, z, radius = bounding_sphere(origin)
+    widest = 0.0
+    for c in range(len(emitters.power)):
+        dx = x - emitters.centre[c, 0]
+        dy = y - emitters.centre[c, 1]
+        dz = z - emitters.centre[c, 2]
+        clear = math.sqrt(dx * dx + dy * dy + dz * dz) - radius
+        if clear <= emitters.radius[c]:
+            return np.inf
+        widest = max(widest, emitters.radius[c] / clear)
+    return widest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
     """Fill `chance` and `cumulative` (C,) float32 for points (m, w, 3), taken as their bounding sphere.
 

@@ -25,6 +25,8 @@ N_POINTS = 16
 OFFSET = 1.0e-5
 # They also move so many of these steps towards the middle of their triangle (at most half the way).
 INWARD = 2.0
+# Only points with a barycentric below this lie near the border.
+BORDER = 0.01
 # Vertices whose normal leans further from the face (cosine) lift nothing: that is no smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
@@ -107,17 +109,22 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
                 lz -= weight * below * vz
     step = OFFSET * max(abs(px), abs(py), abs(pz), least)
     away = sign * step
-    # Also along the face: rounding must not put a point of its border behind the wall that meets it there.
-    mx = (p[i0, 0] + p[i1, 0] + p[i2, 0]) / 3.0 - px
-    my = (p[i0, 1] + p[i1, 1] + p[i2, 1]) / 3.0 - py
-    mz = (p[i0, 2] + p[i1, 2] + p[i2, 2]) / 3.0 - pz
-    inward = min(INWARD * step / max(math.sqrt(mx * mx + my * my + mz * mz), 1.0e-30), 0.5)
-    origin[n, k, 0] = px + lx + away * fx + inward * mx
-    origin[n, k, 1] = py + ly + away * fy + inward * my
-    origin[n, k, 2] = pz + lz + away * fz + inward * mz
-    normal[n, k, 0] = sign * nx / length
-    normal[n, k, 1] = sign * ny / length
-    normal[n, k, 2] = sign * nz / length
+    if min(b0, b1, b2) < BORDER:
+        # Also along the face: rounding must not put a point of its border behind the wall that meets it.
+        mx = (p[i0, 0] + p[i1, 0] + p[i2, 0]) / 3.0 - px
+        my = (p[i0, 1] + p[i1, 1] + p[i2, 1]) / 3.0 - py
+        mz = (p[i0, 2] + p[i1, 2] + p[i2, 2]) / 3.0 - pz
+        inward = min(INWARD * step / max(math.sqrt(mx * mx + my * my + mz * mz), 1.0e-30), 0.5)
+        lx += inward * mx
+        ly += inward * my
+        lz += inward * mz
+    origin[n, k, 0] = px + lx + away * fx
+    origin[n, k, 1] = py + ly + away * fy
+    origin[n, k, 2] = pz + lz + away * fz
+    scale = sign / length
+    normal[n, k, 0] = scale * nx
+    normal[n, k, 1] = scale * ny
+    normal[n, k, 2] = scale * nz
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

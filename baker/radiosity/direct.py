@@ -16,7 +16,7 @@ from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
 from baker.kernels.area_light import light_samples
-from baker.kernels.emitters import Emitters, lamps_for
+from baker.kernels.emitters import Emitters, lamps_for, widest_view
 from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
@@ -28,10 +28,12 @@ from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
 # Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
-TILE = 256
+TILE = 512
 STAGE = "direct light"
-# Hemisphere rays that complete the second estimate close to emitters.
+# Hemisphere rays that complete the second estimate close to emitters: where a cluster's radius is more than
+# this share of its distance. Further away shadow rays alone are as good.
 N_HEMISPHERE = 4
+CLOSE = 0.5
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def direct_light(
     net = sobol_reversed(n_light, seed, 1)
     shared = shared_bits_mask(n_light)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
-    weigh = np.array([n_gather, N_HEMISPHERE], np.float64)
+    weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
 
     dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
@@ -94,10 +96,13 @@ def direct_light(
         origin, normal = points_of(surface, mask, np.arange(begin, end))
         lamps = lamps_for(emitters, origin)
         out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
+        near = widest_view(emitters, origin) > CLOSE
         if lamps.chance.any():
-            light_samples(origin, normal, lamps, shading, caster, begin, net, shared, weigh, out, second)
+            light_samples(
+                origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], out, second
+            )
             variance[begin:end] = batch_variance(out[:, :3].sum(axis=1), second)
-        if len(emitters.power):
+        if near:
             found = np.zeros((end - begin, N_COLUMNS), np.float32)
             gather(
                 origin,

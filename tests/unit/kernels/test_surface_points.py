@@ -11,7 +11,7 @@ from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.progress import silent
 from baker.kernels.sampling import sobol_reversed
-from baker.kernels.surface import INWARD, N_POINTS, OFFSET, free_point, place, place_points
+from baker.kernels.surface import BORDER, INWARD, N_POINTS, OFFSET, free_point, place, place_points
 from baker.radiosity.texels import build_texels
 
 EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
@@ -70,9 +70,13 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     flat = corner[..., 0, :] * (1 - b1 - b2) + corner[..., 1, :] * b1 + corner[..., 2, :] * b2
     side = np.where(texels.back, -1.0, 1.0)[:, None, None] * geometry.face_normal[hit]
     away = OFFSET * np.maximum(np.abs(flat).max(axis=2), surface.least)[..., None]
-    # Along the face, towards its middle: no rounding puts a point of its border behind the wall beside it.
+    # Near the border also along the face: no rounding puts a point of it behind the wall beside it.
+    clipped = np.clip(np.concatenate([1 - b1 - b2, b1, b2], axis=2), 0, 1)
+    near = clipped.min(axis=2, keepdims=True) < BORDER
+    assert near.any()
+    assert not near.all()
     middle = corner.mean(axis=2) - flat
-    inward = np.minimum(INWARD * away / np.linalg.norm(middle, axis=2, keepdims=True), 0.5)
+    inward = near * np.minimum(INWARD * away / np.linalg.norm(middle, axis=2, keepdims=True), 0.5)
     np.testing.assert_allclose(origin, flat + away * side + inward * middle, atol=1e-6)
     np.testing.assert_allclose(normal, side, atol=1e-6)
     assert (((origin - flat) * side).sum(axis=2) > 0.5 * away[..., 0]).all()
