@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker import warm
 from baker.channels.channel import CHANNELS, Channel, Transport
 from baker.core.atlas import Atlas
 from baker.core.errors import ResourceError, SettingsError
@@ -26,7 +27,6 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
-from baker.finish import warm
 from baker.finish.finish import PagePlan, finish_page
 from baker.io.load import load_scene
 from baker.kernels.emitters import Emitters

@@ -92,7 +92,7 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
-    """Return the largest radius / distance of any cluster seen from points (m, w, 3); inf where one is met."""
+    """Return the largest radius / distance of a cluster seen from points (m, w, 3); inf where one is met."""
     x, y, z, radius = bounding_sphere(origin)
     widest = 0.0
     for c in range(len(emitters.power)):

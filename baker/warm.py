@@ -1,0 +1,120 @@
+"""Compiles kernels in a second process while the first bake after an install begins its work.
+
+Numba compiles one function at a time in a process, and keeps what it compiled on disk: what this process
+compiles, the bake finds. It is run as `python -m baker.warm`, runs the ray kernels on a single lamp and
+finishes a small page, and writes nothing but that cache. The bake itself compiles uv, texels and the rest.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from baker.core.progress import Progress, report, silent
+
+STAGE = "compile"
+_LOOK = 0.1
+_PAGE = 48
+_TEXELS = 16
+
+
+def start() -> subprocess.Popen[bytes] | None:
+    """Start compiling in the background, if the kernels are not on disk yet."""
+    from baker.kernels.page_guard import hold_to_samples
+
+    folder = Path(hold_to_samples._cache.cache_path)  # type: ignore[attr-defined]
+    if any(folder.glob("page_guard.hold_to_samples-*.nbi")):
+        return None
+    command = [sys.executable, "-m", "baker.warm"]
+    silence = subprocess.DEVNULL
+    return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
+
+
+def finish(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
+    """Wait for the background compilation; if it failed, the kernels are compiled where they are used."""
+    while process is not None:
+        try:
+            process.wait(_LOOK)
+        except subprocess.TimeoutExpired:
+            report(progress, STAGE, 0.5, "first run only")
+        else:
+            process = None
+
+
+def stop(process: subprocess.Popen[bytes] | None) -> None:
+    """End the background compilation."""
+    if process is not None and process.poll() is None:
+        process.kill()
+        process.wait()
+
+
+def cast_rays() -> None:
+    """Run the ray kernels on texels of one lamp that shines into the open."""
+    from baker.core.atlas import Atlas, InstanceLayout
+    from baker.core.geometry import world_geometry
+    from baker.core.scene import Instance, Material, Mesh, Scene
+    from baker.kernels.area_light import light_samples
+    from baker.kernels.emitters import lamps_for, widest_view
+    from baker.kernels.form_factor import cast_form_factors, count_targets
+    from baker.kernels.gather import N_COLUMNS, gather
+    from baker.kernels.hits import HitTable
+    from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+    from baker.lights.emissive import build_emitters
+    from baker.radiosity.materials import resolve_materials
+    from baker.trace.embree import RayScene
+    from baker.trace.packets import new_caster
+
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
+    up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
+    mesh = Mesh("lamp", corner, up, face, zero, zero, np.zeros(3, np.int32), np.arange(3, dtype=np.int32))
+    material = Material(emission=(1.0, 1.0, 1.0))
+    scene = Scene("lamp", None, (mesh,), (material,), (Instance(0, "lamp", 0, np.eye(4)),))
+    layout = InstanceLayout(0, 0, np.arange(3, dtype=np.int32), corner[:, :2], face, zero, False, 1.0)
+    geometry = world_geometry(scene, Atlas(16, 1, (layout,), 1, 2))
+    shading = resolve_materials(scene, geometry)
+    emitters = build_emitters(geometry, shading)
+    rays = RayScene(geometry.position, geometry.triangle, threads=1)
+    table = HitTable(np.zeros((1, 16), np.float32), 16, 256)
+
+    origin, normal = np.zeros((_TEXELS, 16, 3), np.float32), np.zeros((_TEXELS, 16, 3), np.float32)
+    origin[..., 2], normal[..., 2] = 1.0, -1.0
+    caster, net, shared = new_caster(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
+    lamps = lamps_for(emitters, origin)
+    # In the order in which a bake needs them; what comes before direct light it compiles itself meanwhile.
+    weigh, two = np.array([16.0, 4.0]), np.array([1.0, 16.0])
+    widest_view(emitters, origin)
+    sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
+    light_samples(origin, normal, lamps, shading, caster, 0, net, shared, weigh, sums, squares)
+    dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
+    out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
+    gather(origin, normal, table, dark, lamps, shading, caster, 0, net, shared, black, two, out)
+    target, tally = np.zeros((_TEXELS, 16), np.int32), np.zeros((_TEXELS, 2), np.int32)
+    patch = np.zeros(256, np.int32)
+    cast_form_factors(origin, normal, table, patch, caster, 0, net, shared, target, tally)
+    count_targets(target, np.zeros_like(target), np.zeros_like(target), np.zeros(_TEXELS, np.int32))
+    rays.close()
+
+
+def finish_pages() -> None:
+    """Finish a page of two charts, one of them with a buried texel."""
+    from baker.finish.finish import PagePlan, finish_page
+
+    chart = np.full((_PAGE, _PAGE), -1, np.int32)
+    chart[4:20, 4:40] = 0
+    chart[24:40, 4:40] = 1
+    valid = chart >= 0
+    valid[30, 20] = False
+    plan = PagePlan(chart, valid, np.full((_PAGE, _PAGE, 2), 0.1, np.float32))
+    noise = np.random.Generator(np.random.PCG64(0))
+    value = noise.random((_PAGE, _PAGE, 3), np.float32)
+    error = np.full((_PAGE, _PAGE), 0.3, np.float32)
+    finish_page(plan, [(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent)
+
+
+if __name__ == "__main__":
+    cast_rays()
+    finish_pages()
