@@ -66,10 +66,3 @@ def _to_rgba(image: object) -> NDArray[np.uint8]:
         grey = np.clip((np.asarray(image).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
         return np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
     return np.array(image.convert("RGBA"), np.uint8)
-
-
-def linear_from_srgb(value: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return linear Rec.709 values of sRGB-encoded ones, any shape, both 0 to 1 (IEC 61966-2-1)."""
-    low = value / np.float32(12.92)
-    high = ((np.maximum(value, 0) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(value <= np.float32(0.04045), low, high).astype(np.float32)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
 from baker.core.scene import Material, Scene
-from baker.io.images import linear_from_srgb
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_build import PrimitiveArrays
 from baker.io.mesh_scene import scene_of_meshes, to_world

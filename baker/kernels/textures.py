@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from baker.core.colour import linear_from_srgb
+
 MAX_LEVELS = 16
 _WRAP = {"repeat": 0, "mirror": 1, "clamp": 2}
 
@@ -29,12 +31,6 @@ class TexturePack(NamedTuple):
     level: NDArray[np.int64]
     n_levels: NDArray[np.int64]
     wrap: NDArray[np.int64]
-
-
-def linear_from_srgb(value: NDArray[Any]) -> NDArray[np.float32]:
-    """Return linear values of sRGB-encoded ones, both 0 to 1."""
-    value = np.asarray(value, np.float64)
-    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 _LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255.0)

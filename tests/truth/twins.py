@@ -29,18 +29,3 @@ def closest_hits(tracer: Tracer, origin: Any, direction: Any) -> tuple[np.ndarra
         primitive[span][hit] = words[PRIM_ID * width : PRIM_ID * width + lanes][hit]
         distance[span][hit] = floats[TFAR * width : TFAR * width + lanes][hit]
     return primitive, distance
-
-
-def radiosity_sweeps(form_factor: np.ndarray, source: np.ndarray, albedo: np.ndarray, n: int) -> np.ndarray:
-    """Return the irradiance after n Jacobi sweeps of E = F (s + rho E), by plain loops over patches."""
-    irradiance = np.zeros_like(source)
-    for _ in range(n):
-        after = np.zeros_like(source)
-        for i in range(len(source)):
-            for c in range(source.shape[1]):
-                after[i, c] = sum(
-                    form_factor[i, j] * (source[j, c] + albedo[j, c] * irradiance[j, c])
-                    for j in range(len(source))
-                )
-        irradiance = after
-    return irradiance

@@ -11,8 +11,9 @@ import pytest
 from gltf_builder import quad_builder, write
 from PIL import Image
 
+from baker.core.colour import linear_from_srgb
 from baker.io.gltf_material import texture_transform
-from baker.io.images import decode_image, linear_from_srgb
+from baker.io.images import decode_image
 from baker.io.load import load_scene
 
 

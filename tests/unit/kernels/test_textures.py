@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, quad_world
 
+from baker.core.colour import linear_from_srgb
 from baker.core.scene import Material, Texture
 from baker.kernels.surface import N_POINTS, place_points
 from baker.kernels.texel_info import texel_footprint, uv_at
-from baker.kernels.textures import linear_from_srgb, pack_textures, sample_texture
+from baker.kernels.textures import pack_textures, sample_texture
 
 MODES = ("repeat", "mirror", "clamp")
 

@@ -1,0 +1,18 @@
+"""Colour encodings: everything inside baker is linear Rec.709.
+
+Based on: IEC 61966-2-1 (the sRGB curve).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def linear_from_srgb(value: NDArray[Any]) -> NDArray[np.float32]:
+    """Return linear Rec.709 values of sRGB-encoded ones, any shape, both 0 to 1."""
+    value = np.asarray(value, np.float64)
+    high = ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4
+    return np.where(value <= 0.04045, value / 12.92, high).astype(np.float32)
