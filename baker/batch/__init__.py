@@ -1,0 +1,1 @@
+"""Many bakes: what is to be done, and doing it."""

@@ -1,0 +1,1 @@
+"""Figures of error, limits on them, and reports."""

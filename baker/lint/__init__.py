@@ -1,0 +1,1 @@
+"""Findings about a scene before any light is computed."""

@@ -1,0 +1,1 @@
+"""Mends scenes where that cannot change their look."""

@@ -1,0 +1,1 @@
+"""Path-traced truth: shares rays with the bake and nothing else."""
