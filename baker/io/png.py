@@ -61,3 +61,22 @@ def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     clipped = np.clip(linear.astype(np.float64), 0.0, 1.0)
     encoded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
     return np.rint(encoded * 255.0).astype(np.uint8)
+
+
+def decode_palette_png(data: bytes) -> NDArray[np.uint8]:
+    """Return (H, W) uint8: the palette numbers of a PNG with a palette, row 0 on top.
+
+    Raises
+    ------
+    ValueError
+        If the data is no such picture.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            if image.mode != "P":
+                raise ValueError("the picture has no palette")
+            return np.array(image, np.uint8)
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise ValueError(str(error)) from None
