@@ -146,8 +146,8 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
-    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2.
+def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untyped-def]
+    """Return an emitter's number, its density per m2, and what is left of the uniform number u.
 
     `row` and `first` are those of `Emitters`; `chance` and `cumulative` those of `cluster_chances`.
     """
@@ -174,11 +174,18 @@ def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore
             m = middle + 1
     share = row[m, SHARE]
     u = min(max((u - (row[m, CUMULATIVE] - share)) / share, np.float32(0.0)), np.float32(0.9999999))
+    return m, picked / total * share / row[m, AREA], u
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
+    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2."""
+    m, density, u = choose_emitter(row, first, chance, cumulative, u)
     b1, b2 = triangle_barycentric(u, v)
     b0 = np.float32(1.0) - b1 - b2
     for a in range(3):
         point[a] = b0 * row[m, a] + b1 * row[m, 3 + a] + b2 * row[m, 6 + a]
-    return m, picked / total * share / row[m, AREA], b1, b2
+    return m, density, b1, b2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
