@@ -128,17 +128,58 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def is_flat(m, face, triangle, t):  # type: ignore[no-untyped-def]
+    """Tell if all of triangle t is shaded with its face normal."""
+    flat = True
+    for corner in range(3):
+        vertex = triangle[t, corner]
+        along = m[vertex, 0] * face[t, 0] + m[vertex, 1] * face[t, 1] + m[vertex, 2] * face[t, 2]
+        flat = flat and along > np.float32(0.999999)
+    return flat
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def load_flat(row, p, face, triangle, t, flip):  # type: ignore[no-untyped-def]
+    """Write what `place_flat` needs to `row` (4, 3) float64: corner 0, the edges from it, the normal."""
+    sign = -1.0 if flip else 1.0
+    for axis in range(3):
+        corner = float(p[triangle[t, 0], axis])
+        row[0, axis] = corner
+        row[1, axis] = p[triangle[t, 1], axis] - corner
+        row[2, axis] = p[triangle[t, 2], axis] - corner
+        row[3, axis] = sign * face[t, axis]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-untyped-def]
+    """Do the work of `place` for a point inside a flat triangle, away from its border."""
+    px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
+    py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
+    pz = row[0, 2] + b1 * row[1, 2] + b2 * row[2, 2]
+    step = OFFSET * max(abs(px), abs(py), abs(pz), least)
+    origin[n, k, 0] = px + step * row[3, 0]
+    origin[n, k, 1] = py + step * row[3, 1]
+    origin[n, k, 2] = pz + step * row[3, 2]
+    normal[n, k, 0] = row[3, 0]
+    normal[n, k, 1] = row[3, 1]
+    normal[n, k, 2] = row[3, 2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
     """Write points of texel entries: origin and normal (m, w, 3) float32, world.
 
     mask : (n,) uint16, bit k is set where point k of a texel is not buried; a buried point is replaced
     by one that is not, if the texel has any
     chosen : (m,) int64, entries; wanted : (m or 1, w) uint8, which of their 16 points
-    hit_triangle (m, w) int32 and bary (m, w, 2) float32 say where on which triangle each lies
+    hit_triangle (m, w) int32 and bary (m, w, 2) float32 say where on which triangle each lies; with no rows
+    they are left alone
     """
     corner = np.zeros((3, 2))
     cut = np.zeros((MAX_CORNERS, 2))
     spare = np.zeros((MAX_CORNERS, 2))
+    flat_row = np.zeros((4, 3))
+    located = len(hit_triangle) > 0
     # Out of the tuple once: every access to a tuple's array costs an atomic reference count.
     position, shading, face = surface.position, surface.normal, surface.face_normal
     uv, triangle, net = surface.uv, surface.triangle, surface.net
@@ -163,6 +204,9 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
         whole = last - first == 1 and total > 0.999999
         t = entry[first]
         a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
+        flat = whole and is_flat(shading, face, triangle, t)
+        if flat:
+            load_flat(flat_row, position, face, triangle, t, back[i])
         for w in range(wanted.shape[1]):
             k = free_point(mask[i], wanted[0 if same else n, w])
             u = texel_scramble(net[k, 0], seed_x, full)
@@ -192,10 +236,14 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
             y += y0
             b1 = a * x + b * y + c
             b2 = d * x + g * y + h
-            place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, w)
-            hit_triangle[n, w] = t
-            bary[n, w, 0] = b1
-            bary[n, w, 1] = b2
+            if flat and min(b1, b2, 1.0 - b1 - b2) >= BORDER:
+                place_flat(flat_row, least, b1, b2, origin, normal, n, w)
+            else:
+                place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, w)
+            if located:
+                hit_triangle[n, w] = t
+                bary[n, w, 0] = b1
+                bary[n, w, 1] = b2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
+_NOWHERE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
 
@@ -26,6 +27,5 @@ def points_of(
     """
     shape = (len(chosen), wanted.shape[1])
     origin, normal = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
-    triangle, bary = np.zeros(shape, np.int32), np.zeros((*shape, 2), np.float32)
-    place_points(surface, mask, chosen, wanted, origin, normal, triangle, bary)
+    place_points(surface, mask, chosen, wanted, origin, normal, _NOWHERE, _NO_BARY)
     return origin, normal
