@@ -128,26 +128,22 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def is_flat(m, face, triangle, t):  # type: ignore[no-untyped-def]
-    """Tell if all of triangle t is shaded with its face normal."""
-    flat = True
-    for corner in range(3):
-        vertex = triangle[t, corner]
-        along = m[vertex, 0] * face[t, 0] + m[vertex, 1] * face[t, 1] + m[vertex, 2] * face[t, 2]
-        flat = flat and along > np.float32(0.999999)
-    return flat
+def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-def]
+    """Tell if all of triangle t is shaded with its face normal.
 
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def load_flat(row, p, face, triangle, t, flip):  # type: ignore[no-untyped-def]
-    """Write what `place_flat` needs to `row` (4, 3) float64: corner 0, the edges from it, the normal."""
-    sign = -1.0 if flip else 1.0
-    for axis in range(3):
-        corner = float(p[triangle[t, 0], axis])
-        row[0, axis] = corner
-        row[1, axis] = p[triangle[t, 1], axis] - corner
-        row[2, axis] = p[triangle[t, 2], axis] - corner
-        row[3, axis] = sign * face[t, axis]
+    row : (4, 3) float64, becomes what `place_flat` needs: corner 0, the edges from it, the normal times sign
+    """
+    i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+    along0 = along1 = along2 = 0.0
+    for a in range(3):
+        along0 += m[i0, a] * face[t, a]
+        along1 += m[i1, a] * face[t, a]
+        along2 += m[i2, a] * face[t, a]
+        row[0, a] = p[i0, a]
+        row[1, a] = float(p[i1, a]) - p[i0, a]
+        row[2, a] = float(p[i2, a]) - p[i0, a]
+        row[3, a] = sign * face[t, a]
+    return min(along0, along1, along2) > 0.999999
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -204,9 +200,8 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
         whole = last - first == 1 and total > 0.999999
         t = entry[first]
         a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
-        flat = whole and is_flat(shading, face, triangle, t)
-        if flat:
-            load_flat(flat_row, position, face, triangle, t, back[i])
+        sign = -1.0 if back[i] else 1.0
+        flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
         for w in range(wanted.shape[1]):
             k = free_point(mask[i], wanted[0 if same else n, w])
             u = texel_scramble(net[k, 0], seed_x, full)
