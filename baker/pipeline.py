@@ -33,16 +33,16 @@ from baker.kernels.emitters import Emitters
 from baker.kernels.hits import HitTable
 from baker.kernels.surface import Surface
 from baker.lights.emissive import build_emitters
-from baker.radiosity.alpha import see_through
 from baker.radiosity.buried import find_buried
 from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.hit_table import build_hit_table
-from baker.radiosity.materials import Shading, resolve_materials
 from baker.radiosity.patches import build_patches
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.texels import build_texels
+from baker.shading.alpha import see_through
+from baker.shading.materials import Shading, resolve_materials
 from baker.trace.embree import RayScene
 from baker.unwrap.unwrap import unwrap_scene
 

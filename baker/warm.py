@@ -63,7 +63,7 @@ def cast_rays() -> None:
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
     from baker.lights.emissive import build_emitters
-    from baker.radiosity.materials import resolve_materials
+    from baker.shading.materials import resolve_materials
     from baker.trace.embree import RayScene
     from baker.trace.packets import new_caster
 

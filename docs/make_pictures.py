@@ -20,8 +20,8 @@ import baker
 from baker.core.geometry import world_geometry
 from baker.core.lightmap import BakeResult
 from baker.core.progress import silent
-from baker.radiosity.materials import resolve_materials
 from baker.radiosity.texels import build_texels
+from baker.shading.materials import resolve_materials
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "assets"

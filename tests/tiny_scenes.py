@@ -13,8 +13,8 @@ from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.lights.emissive import build_emitters
 from baker.radiosity.hit_table import build_hit_table
-from baker.radiosity.materials import resolve_materials
 from baker.radiosity.texels import build_texels
+from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
 
 

@@ -48,6 +48,8 @@ class Material:
         Radiance in cd/m2, factor times strength, before texture.
     double_sided : bool
         Reflects and emits on both sides; otherwise the back is black.
+    metallic_roughness_texture : Texture or None
+        Linear: green times `roughness`, blue times `metallic`. Bakes do not look at it.
     alpha_mode : str
         "OPAQUE", "MASK" or "BLEND".
     """
@@ -62,6 +64,7 @@ class Material:
     alpha_cutoff: float = 0.5
     metallic: float = 1.0
     roughness: float = 1.0
+    metallic_roughness_texture: Texture | None = None
 
 
 @dataclass(frozen=True)

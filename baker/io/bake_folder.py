@@ -109,7 +109,7 @@ def _differs(folder: Path, entry: dict[str, Any]) -> bool:
     if not path.is_file():
         return True
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest() != entry["sha256"]
+        return hashlib.file_digest(file, "sha256").hexdigest() != str(entry["sha256"])
 
 
 def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:

@@ -1,4 +1,4 @@
-"""Reads glTF materials: base colour, emission, sidedness, alpha, and the textures of the first two.
+"""Reads glTF materials: base colour, emission, metallic and roughness, sidedness, alpha, and textures.
 
 uv_image = T R S uv, KHR_texture_transform; L = emissiveFactor x texture x emissiveStrength.
 
@@ -24,8 +24,14 @@ _WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 _ALPHA = ("OPAQUE", "MASK", "BLEND")
 
 
-def read_materials(document: GltfDocument) -> list[Material]:
+def read_materials(document: GltfDocument, *, reflections: bool = False) -> list[Material]:
     """Return the file's materials in its order.
+
+    Parameters
+    ----------
+    document : GltfDocument
+    reflections : bool
+        Also decode textures that only say how mirror-like a surface is.
 
     Raises
     ------
@@ -33,11 +39,16 @@ def read_materials(document: GltfDocument) -> list[Material]:
         For values of a wrong type or out of range, and images that cannot be decoded.
     """
     images: dict[int, NDArray[np.uint8]] = {}
-    return [_material(document, m, i, images) for i, m in enumerate(document.root.children("materials"))]
+    materials = document.root.children("materials")
+    return [_material(document, m, i, images, reflections) for i, m in enumerate(materials)]
 
 
 def _material(
-    document: GltfDocument, material: JsonObject, number: int, images: dict[int, NDArray[np.uint8]]
+    document: GltfDocument,
+    material: JsonObject,
+    number: int,
+    images: dict[int, NDArray[np.uint8]],
+    reflections: bool,
 ) -> Material:
     surface = material.child_or_empty("pbrMetallicRoughness")
     red, green, blue, alpha = surface.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0))
@@ -64,6 +75,9 @@ def _material(
         alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0),
         metallic=surface.number("metallicFactor", 1.0, low=0.0, high=1.0),
         roughness=surface.number("roughnessFactor", 1.0, low=0.0, high=1.0),
+        metallic_roughness_texture=(
+            _texture(document, surface, "metallicRoughnessTexture", images) if reflections else None
+        ),
     )
 
 

@@ -49,7 +49,7 @@ def import_gltf(source: SceneFile) -> Scene:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
     number, placed = _choose_scene(document, source.scene_index, warnings)
-    materials = read_materials(document)
+    materials = read_materials(document, reflections=source.reflections)
     meshes, instances = _instances(document, placed, materials, warnings)
     lights = _lights(placed, document, warnings)
     if not instances:

@@ -31,6 +31,8 @@ class SceneFile:
         Metres per unit of formats that do not fix one themselves.
     scene_index : int or None
         Which glTF scene to take; None takes the file's default.
+    reflections : bool
+        Also read textures that only say how mirror-like a surface is.
     """
 
     path: Path
@@ -38,6 +40,7 @@ class SceneFile:
     up: str = "y"
     scale: float = 1.0
     scene_index: int | None = None
+    reflections: bool = False
 
 
 Importer = Callable[[SceneFile], Scene]
@@ -45,7 +48,12 @@ importers: Registry[Importer] = Registry("baker.io")
 
 
 def load_scene(
-    path: Path | str, *, up: str = "y", scale: float = 1.0, scene_index: int | None = None
+    path: Path | str,
+    *,
+    up: str = "y",
+    scale: float = 1.0,
+    scene_index: int | None = None,
+    reflections: bool = False,
 ) -> Scene:
     """Read a scene file into metres, +Y up, linear Rec.709.
 
@@ -59,6 +67,8 @@ def load_scene(
         Metres per unit of OBJ, PLY, STL and OFF files. glTF is always in metres.
     scene_index : int or None
         glTF scene to load; None loads the default one.
+    reflections : bool
+        Also read textures that only say how mirror-like a surface is: bakes do not look at them.
 
     Returns
     -------
@@ -91,7 +101,7 @@ def load_scene(
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
     try:
-        return importer(SceneFile(path, data, up, scale, scene_index))
+        return importer(SceneFile(path, data, up, scale, scene_index, reflections))
     except MemoryError:
         raise ResourceError("the scene does not fit into memory", file=str(path)) from None
 

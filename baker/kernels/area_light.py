@@ -19,8 +19,8 @@ from baker.kernels.emitters import (
     RADIANCE,
     TEXTURED,
     TWO_SIDED,
-    emitted_radiance,
     choose_emitter,
+    emitted_radiance,
     emitter_density,
 )  # fmt: skip
 from baker.kernels.hits import front_facing
@@ -55,8 +55,8 @@ def choose_lanes(lamps, first, second, seeds, shared, width, uv, chosen, lamp): 
     """Choose an emitter for every lane of a packet and copy what `aim_at_lamps` needs of it.
 
     first, second : uint32, the sample's bit-reversed Sobol numbers
-    uv : (2, 16) float32, place on the emitter; chosen : (16,) int64; lamp : (14, 16) float32: corner 0, edges,
-    normal, density per m2, 1 if two-sided
+    uv : (2, 16) float32, place on the emitter; chosen : (16,) int64
+    lamp : (14, 16) float32: corner 0, edges, normal, density per m2, 1 if two-sided
     """
     row, starts, chance, cumulative = lamps.row, lamps.first, lamps.chance, lamps.cumulative
     for lane in range(width):

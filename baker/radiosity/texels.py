@@ -14,7 +14,7 @@ from baker.kernels.sampling import sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.texel_info import texel_albedo, texel_geometry
 from baker.kernels.texel_raster import count_overlaps, fill_overlaps, keep_main_chart, morton_keys
-from baker.radiosity.materials import Shading
+from baker.shading.materials import Shading
 
 _TILE = 4096
 STAGE = "texels"

@@ -15,8 +15,8 @@ from baker.core.scene import Texture
 from baker.kernels.alpha import CUTOFF, presence_at
 from baker.kernels.alpha_filter import _one_of_sixteen
 from baker.kernels.textures import pack_textures, sample_alpha, sample_texture
-from baker.radiosity.alpha import see_through
-from baker.radiosity.materials import resolve_materials
+from baker.shading.alpha import see_through
+from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
 
 

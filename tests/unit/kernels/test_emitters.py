@@ -20,7 +20,7 @@ from baker.kernels.emitters import (
 )
 from baker.kernels.textures import pack_textures
 from baker.lights.emissive import MAX_CLUSTERS, build_emitters
-from baker.radiosity.materials import Shading
+from baker.shading.materials import Shading
 
 
 def lamps(n, seed, two_sided=0.2):

@@ -11,7 +11,7 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene, Texture
 from baker.kernels.alpha import AlphaTable, no_alpha
 from baker.kernels.textures import TexturePack, pack_textures
-from baker.radiosity.alpha import build_alpha
+from baker.shading.alpha import build_alpha
 
 
 class Shading(NamedTuple):
@@ -26,6 +26,8 @@ class Shading(NamedTuple):
     colour : (V, 3) float32, linear vertex colour
     triangle : (T, 3) int32, lightmap vertices; material : (T,) int32
     alpha : AlphaTable
+    metallic, roughness : (M,) float32; reflection_texture (M,) int32 and reflection_uv (V, 2) float32 of the
+        texture that scales them (blue, green), only if asked for
     """
 
     pack: TexturePack
@@ -39,9 +41,13 @@ class Shading(NamedTuple):
     triangle: NDArray[np.int32]
     material: NDArray[np.int32]
     alpha: AlphaTable = no_alpha()
+    metallic: NDArray[np.float32] = np.zeros(0, np.float32)
+    roughness: NDArray[np.float32] = np.zeros(0, np.float32)
+    reflection_texture: NDArray[np.int32] = np.zeros(0, np.int32)
+    reflection_uv: NDArray[np.float32] = np.zeros((1, 2), np.float32)
 
 
-def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
+def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = False) -> Shading:
     """Pack the textures that materials use and find every triangle corner's uv.
 
     Parameters
@@ -49,21 +55,26 @@ def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
     scene : Scene
     geometry : Geometry
         Made from the same scene.
+    reflections : bool
+        Also resolve metallic and roughness textures, which bakes do not look at.
     """
     images: list[tuple[NDArray[np.generic], tuple[str, str]]] = []
-    numbers: dict[tuple[int, tuple[str, str]], int] = {}
+    numbers: dict[tuple[int, tuple[str, str], bool], int] = {}
 
-    def number(texture: Texture | None) -> int:
+    def number(texture: Texture | None, linear: bool = False) -> int:
         if texture is None:
             return -1
-        key = (id(texture.image), texture.wrap)
+        key = (id(texture.image), texture.wrap, linear)
         if key not in numbers:
             numbers[key] = len(images)
-            images.append((texture.image, texture.wrap))
+            plain = texture.image.dtype == np.uint8 and linear
+            images.append((texture.image / np.float32(255) if plain else texture.image, texture.wrap))
         return numbers[key]
 
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
     emission_texture = np.array([number(m.emission_texture) for m in scene.materials], np.int32)
+    glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]
+    reflection_texture = np.array([number(texture, linear=True) for texture in glossy], np.int32)
     pack = pack_textures(images)
     base_uv = _corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
@@ -78,6 +89,10 @@ def resolve_materials(scene: Scene, geometry: Geometry) -> Shading:
         triangle=geometry.triangle,
         material=geometry.material,
         alpha=build_alpha(scene, geometry, pack, base_texture, base_uv),
+        metallic=np.array([m.metallic for m in scene.materials], np.float32),
+        roughness=np.array([m.roughness for m in scene.materials], np.float32),
+        reflection_texture=reflection_texture,
+        reflection_uv=_corner_uv(scene, geometry, glossy),
     )
 
 

@@ -1,0 +1,181 @@
+"""How surfaces scatter light: Lambert, and glTF's metallic-roughness model with its mirror limit.
+
+    f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
+    D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)      a = roughness^2
+    V = 0.5 / (n.l sqrt((n.v)^2 (1 - a^2) + a^2) + n.v sqrt((n.l)^2 (1 - a^2) + a^2))
+    F = F0 + (1 - F0)(1 - v.h)^5
+
+Directions are in the frame of the shading normal (+z). The lobe D V is sampled by its visible normals, the
+diffuse one by the cosine. Below `SMOOTH` the specular lobe is a mirror: it is sampled, never evaluated.
+
+Based on: Khronos Group, glTF 2.0 Specification, appendix B; Heitz, Sampling the GGX distribution of
+visible normals, 2018; Heitz, Understanding the masking-shadowing function, 2014; Schlick, 1994.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+INV_PI = 1.0 / math.pi
+# GGX widths below this are mirrors.
+SMOOTH = 1.0e-3
+DIELECTRIC = 0.04
+# Numbers of a surface's parameter row: base colour (3), metallic, width a; a negative width means Lambert.
+BASE, METALLIC, WIDTH = 0, 3, 4
+N_PARAMETERS = 5
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fresnel(f0, cosine):  # type: ignore[no-untyped-def]
+    """Return Schlick's reflectance for the cosine between direction and half vector."""
+    m = min(max(1.0 - cosine, 0.0), 1.0)
+    return f0 + (1.0 - f0) * m * m * m * m * m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def ggx_density(nh, a):  # type: ignore[no-untyped-def]
+    """Return D of a half vector with cosine nh."""
+    t = nh * nh * (a * a - 1.0) + 1.0
+    return a * a / max(math.pi * t * t, 1.0e-300)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def ggx_masking(nv, a):  # type: ignore[no-untyped-def]
+    """Return Smith's G1 for a direction with cosine nv."""
+    return 2.0 * nv / max(nv + math.sqrt(a * a + (1.0 - a * a) * nv * nv), 1.0e-300)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def ggx_visibility(nl, nv, a):  # type: ignore[no-untyped-def]
+    """Return V = G2 / (4 nl nv), height-correlated."""
+    s = nl * math.sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * math.sqrt(nl * nl * (1.0 - a * a) + a * a)
+    return 0.5 / max(s, 1.0e-300)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
+    """Return the chance to sample the specular lobe of parameters row[:, lane], seen at cosine nv."""
+    if row[WIDTH, lane] < 0.0:
+        return 0.0
+    metallic = row[METALLIC, lane]
+    base = (row[0, lane] + row[1, lane] + row[2, lane]) / 3.0
+    specular = fresnel(DIELECTRIC + (base - DIELECTRIC) * metallic, nv)
+    diffuse = base * (1.0 - metallic) * (1.0 - specular)
+    if diffuse <= 0.0:
+        return 1.0
+    return min(max(specular / (specular + diffuse), 0.1), 0.9)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untyped-def]
+    """Write f(v, l) n.l (RGB) to `out` (3,) and return the density with which `bsdf_sample` finds l.
+
+    row : (5, 16) parameters by lane; v, l : unit, pointing away from the surface, in its frame
+    """
+    out[0] = out[1] = out[2] = 0.0
+    if vz <= 0.0 or lz <= 0.0:
+        return 0.0
+    a = row[WIDTH, lane]
+    if a < 0.0:
+        for c in range(3):
+            out[c] = row[c, lane] * INV_PI * lz
+        return lz * INV_PI
+    metallic = row[METALLIC, lane]
+    hx, hy, hz = vx + lx, vy + ly, vz + lz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / length, hy / length, hz / length
+    vh = vx * hx + vy * hy + vz * hz
+    lobe = 0.0
+    if a >= SMOOTH:
+        lobe = ggx_density(hz, a) * ggx_visibility(lz, vz, a)
+    for c in range(3):
+        base = row[c, lane]
+        f = fresnel(DIELECTRIC + (base - DIELECTRIC) * metallic, vh)
+        out[c] = (base * (1.0 - metallic) * (1.0 - f) * INV_PI + f * lobe) * lz
+    return bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):  # type: ignore[no-untyped-def]
+    """Return the density per steradian with which `bsdf_sample` finds l from v, mirrors left out."""
+    if vz <= 0.0 or lz <= 0.0:
+        return 0.0
+    a = row[WIDTH, lane]
+    if a < 0.0:
+        return lz * INV_PI
+    chance = specular_chance(row, lane, vz)
+    density = (1.0 - chance) * lz * INV_PI
+    if a >= SMOOTH:
+        hx, hy, hz = vx + lx, vy + ly, vz + lz
+        length = math.sqrt(hx * hx + hy * hy + hz * hz)
+        density += chance * ggx_masking(vz, a) * ggx_density(hz / length, a) / (4.0 * vz)
+    return density
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def visible_normal(vx, vy, vz, a, u, w):  # type: ignore[no-untyped-def]
+    """Return a half vector, distributed as the GGX normals that v sees (Heitz 2018, listing 1)."""
+    sx, sy, sz = a * vx, a * vy, vz
+    length = math.sqrt(sx * sx + sy * sy + sz * sz)
+    sx, sy, sz = sx / length, sy / length, sz / length
+    flat = sx * sx + sy * sy
+    tx, ty = 1.0, 0.0
+    if flat > 0.0:
+        tx, ty = -sy / math.sqrt(flat), sx / math.sqrt(flat)
+    bx, by, bz = -sz * ty, sz * tx, sx * ty - sy * tx
+    r = math.sqrt(u)
+    phi = 2.0 * math.pi * w
+    p = r * math.cos(phi)
+    q = r * math.sin(phi)
+    s = 0.5 * (1.0 + sz)
+    q = (1.0 - s) * math.sqrt(max(1.0 - p * p, 0.0)) + s * q
+    z = math.sqrt(max(1.0 - p * p - q * q, 0.0))
+    hx = a * (p * tx + q * bx + z * sx)
+    hy = a * (p * ty + q * by + z * sy)
+    hz = max(q * bz + z * sz, 1.0e-12)
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    return hx / length, hy / length, hz / length
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cosine_sample(u, w):  # type: ignore[no-untyped-def]
+    """Map the unit square to the cosine-weighted hemisphere about +z."""
+    r = math.sqrt(u)
+    phi = 2.0 * math.pi * w
+    return r * math.cos(phi), r * math.sin(phi), math.sqrt(max(1.0 - u, 0.0))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):  # type: ignore[no-untyped-def]
+    """Sample a direction; write f n.l / density (RGB) to `weight` (3,).
+
+    choice, u, w : uniform numbers
+
+    Returns
+    -------
+    tuple
+        l (three floats), density per steradian, and whether it is a mirror direction (density 0 then).
+    """
+    weight[0] = weight[1] = weight[2] = 0.0
+    a = row[WIDTH, lane]
+    chance = specular_chance(row, lane, vz)
+    if choice >= chance:
+        lx, ly, lz = cosine_sample(u, w)
+    else:
+        hx, hy, hz = 0.0, 0.0, 1.0
+        if a >= SMOOTH:
+            hx, hy, hz = visible_normal(vx, vy, vz, a, u, w)
+        vh = vx * hx + vy * hy + vz * hz
+        lx, ly, lz = 2.0 * vh * hx - vx, 2.0 * vh * hy - vy, 2.0 * vh * hz - vz
+        if a < SMOOTH:
+            for c in range(3):
+                f0 = DIELECTRIC + (row[c, lane] - DIELECTRIC) * row[METALLIC, lane]
+                weight[c] = fresnel(f0, vz) / chance
+            return lx, ly, lz, 0.0, True
+    density = bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, weight)
+    if density > 0.0:
+        for c in range(3):
+            weight[c] /= density
+    return lx, ly, lz, density, False

@@ -1,0 +1,62 @@
+"""The ways to sample the rendering equation, by name, and what each switches on in a path.
+
+`uniform`, `cosine`, `stratified` and `bsdf` find lamps by chance; `light` aims at them from every vertex;
+`mis` does both and weighs them. Lights without area can only be aimed at, whatever the name.
+
+Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
+simulation, 1997, ch. 8 and 9.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import NamedTuple
+
+from baker.core.errors import SettingsError
+
+
+class Estimator(NamedTuple):
+    """What a path does at a vertex.
+
+    Attributes
+    ----------
+    hemisphere : int
+        0: directions follow the BSDF; 1: uniform over the hemisphere; 2: cosine over it.
+    aim : int
+        Aim at lamps with area and the sky: 0 never, 1 and count nothing found by chance, 2 weighed (MIS).
+    strata : int
+        1: the first two random pairs of a pass's samples are a scrambled (0,2)-net.
+    power : int
+        MIS by the power heuristic (exponent 2) instead of the balance heuristic.
+    """
+
+    hemisphere: int
+    aim: int
+    strata: int = 0
+    power: int = 0
+
+
+ESTIMATORS = {
+    "uniform": Estimator(1, 0),
+    "cosine": Estimator(2, 0),
+    "stratified": Estimator(2, 0, strata=1),
+    "light": Estimator(0, 1),
+    "bsdf": Estimator(0, 0),
+    "mis": Estimator(0, 2),
+    "mis-power": Estimator(0, 2, power=1),
+}
+
+
+def estimator_named(name: str) -> Estimator:
+    """Return an estimator.
+
+    Raises
+    ------
+    SettingsError
+        If there is none of that name.
+    """
+    if name in ESTIMATORS:
+        return ESTIMATORS[name]
+    near = difflib.get_close_matches(name, ESTIMATORS, 1)
+    hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(ESTIMATORS)}"
+    raise SettingsError(f"there is no estimator '{name}'{hint}", object="estimator")

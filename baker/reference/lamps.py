@@ -1,0 +1,175 @@
+"""Everything that emits, as one table that paths aim at: triangles, lights without area, the sky.
+
+A lamp is chosen by a fixed chance, half of it by power and half equally among kinds, so that neither a sun nor
+a candle is starved. Whatever the chances, estimates stay unbiased: each is divided by its own.
+
+Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
+KHR_lights_punctual.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from baker.core.geometry import Geometry
+from baker.core.scene import Scene
+from baker.kernels.sampling import triangle_barycentric
+from baker.lights.emissive import build_emitters
+from baker.shading.materials import Shading
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Columns of an emissive triangle: three corners, face normal, area, two-sided, chance, radiance, textured.
+CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 18
+# Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer cosine,
+# one over the cone's width, chance.
+KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE = 0, 1, 4, 7, 10, 11, 12
+_KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
+# A directional light and the sky end nowhere.
+FAR = 1.0e30
+_SHORT = 0.9999
+
+
+class LampTable(NamedTuple):
+    """Lamps in the order triangles, lights without area, sky.
+
+    triangle (E, 20), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
+    emitter (T,) int32, row of a scene triangle in `triangle` or -1; cumulative (E + P + 1,) float64, last 1 (0
+    if nothing emits); sky (4,) float64: radiance, chance.
+    """
+
+    triangle: NDArray[np.float64]
+    point: NDArray[np.float64]
+    number: NDArray[np.int32]
+    emitter: NDArray[np.int32]
+    cumulative: NDArray[np.float64]
+    sky: NDArray[np.float64]
+
+
+def build_lamps(
+    scene: Scene, geometry: Geometry, shading: Shading, sky: tuple[float, float, float]
+) -> LampTable:
+    """Collect what emits.
+
+    Parameters
+    ----------
+    sky : radiance of the constant sky, cd/m2, linear Rec.709
+    """
+    found = build_emitters(geometry, shading)
+    n = len(found.triangle)
+    # `build_emitters` shares a cluster's power out among its triangles.
+    power = (
+        found.row[:, 14].astype(np.float64) * found.power[found.row[:, 16].astype(np.int64)]
+        if n
+        else np.zeros(0)
+    )
+    triangle = np.zeros((n, 20))
+    triangle[:, CORNER : CORNER + 9] = found.row[:, :9]
+    triangle[:, NORMAL : NORMAL + 3] = found.row[:, 9:12]
+    triangle[:, AREA], triangle[:, TWO_SIDED] = found.row[:, 12], found.row[:, 13]
+    triangle[:, RADIANCE : RADIANCE + 3] = found.row[:, 17:20]
+    triangle[:, TEXTURED] = found.row[:, 20]
+    lights = [light for light in scene.lights if max(light.intensity) > 0 and light.kind in _KINDS]
+    disc = math.pi * (0.5 * geometry.diagonal) ** 2
+    point = np.zeros((len(lights), 16))
+    point_power = np.zeros(len(lights))
+    for row, light in enumerate(lights):
+        outer = math.cos(light.outer_cone)
+        point[row, KIND] = _KINDS[light.kind]
+        point[row, POSITION : POSITION + 3] = light.position
+        point[row, DIRECTION : DIRECTION + 3] = light.direction
+        point[row, INTENSITY : INTENSITY + 3] = light.intensity
+        point[row, OUTER] = outer
+        point[row, SCALE] = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
+        solid = {"point": 4 * math.pi, "spot": 2 * math.pi * (1 - outer), "directional": disc}[light.kind]
+        point_power[row] = float(np.array(light.intensity) @ _LUMINANCE) * solid
+    sky_power = float(np.array(sky) @ _LUMINANCE) * math.pi * 4.0 * disc
+    every = np.concatenate([power, point_power, [sky_power]])
+    chance = _chances(every, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(lights) + 1))])
+    triangle[:, CHANCE] = chance[:n]
+    point[:, POINT_CHANCE] = chance[n:-1]
+    emitter = np.full(len(geometry.triangle), -1, np.int32)
+    emitter[found.triangle] = np.arange(n, dtype=np.int32)
+    cumulative = np.cumsum(chance)
+    if cumulative[-1] > 0:
+        cumulative /= cumulative[-1]
+    return LampTable(triangle, point, found.triangle, emitter, cumulative, np.array([*sky, chance[-1]]))
+
+
+def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.float64]:
+    """Return chances: half by power over all, half equally among groups (inside a group by power)."""
+    total = power.sum()
+    if not total > 0:
+        return np.zeros(len(power))
+    lit = [group for group in groups if power[group].sum() > 0]
+    chance: NDArray[np.float64] = 0.5 * power / total
+    for group in lit:
+        chance[group] += 0.5 / len(lit) * power[group] / power[group].sum()
+    return chance
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pick_lamp(cumulative, u):  # type: ignore[no-untyped-def]
+    """Return the number of the lamp that the uniform number u falls on."""
+    low = 0
+    high = len(cumulative) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if cumulative[middle] > u:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def aim_at_triangle(triangle, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the way from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
+
+    The density is per steradian and contains the emitter's chance; 0 if its dark side faces the point.
+    """
+    b1, b2 = triangle_barycentric(np.float32(u), np.float32(w))
+    dx = (1.0 - b1 - b2) * triangle[e, 0] + b1 * triangle[e, 3] + b2 * triangle[e, 6] - x
+    dy = (1.0 - b1 - b2) * triangle[e, 1] + b1 * triangle[e, 4] + b2 * triangle[e, 7] - y
+    dz = (1.0 - b1 - b2) * triangle[e, 2] + b1 * triangle[e, 5] + b2 * triangle[e, 8] - z
+    density = triangle_density(triangle, e, dx, dy, dz)
+    return dx, dy, dz, density, b1, b2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangle_density(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Return the density per steradian with which a point at the end of d on emitter e is aimed at."""
+    square = dx * dx + dy * dy + dz * dz
+    if square <= 0.0:
+        return 0.0
+    cosine = -(dx * triangle[e, NORMAL] + dy * triangle[e, NORMAL + 1] + dz * triangle[e, NORMAL + 2])
+    cosine /= math.sqrt(square)
+    if triangle[e, TWO_SIDED] > 0.0:
+        cosine = abs(cosine)
+    if cosine <= 1.0e-9:
+        return 0.0
+    return triangle[e, CHANCE] / triangle[e, AREA] * square / cosine
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the way from (x, y, z) to a light without area: dx, dy, dz, reach, irradiance per intensity.
+
+    The direction is unit, the reach in metres; the irradiance is that of a surface facing the light.
+    """
+    if point[e, KIND] == 2.0:
+        return -point[e, DIRECTION], -point[e, DIRECTION + 1], -point[e, DIRECTION + 2], FAR, 1.0
+    dx, dy, dz = point[e, POSITION] - x, point[e, POSITION + 1] - y, point[e, POSITION + 2] - z
+    square = max(dx * dx + dy * dy + dz * dz, 1.0e-20)
+    length = math.sqrt(square)
+    dx, dy, dz = dx / length, dy / length, dz / length
+    share = 1.0
+    if point[e, KIND] == 1.0:
+        cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
+        share = min(max((cosine - point[e, OUTER]) * point[e, SCALE], 0.0), 1.0)
+        share *= share
+    return dx, dy, dz, length * _SHORT, share / square

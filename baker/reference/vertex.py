@@ -1,0 +1,283 @@
+"""One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
+
+A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
+(`bsdf`). All directions in `path` are world space; `TO` is the way back along the path in the frame of the normal.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.alpha import presence_at
+from baker.kernels.emitters import emitted_radiance
+from baker.kernels.sampling import tangent_frame
+from baker.kernels.texel_info import uv_at
+from baker.kernels.textures import sample_texture
+from baker.reference.bsdf import (
+    METALLIC,
+    WIDTH,
+    bsdf_eval,
+    bsdf_sample,
+    cosine_sample,
+    specular_chance,
+)
+from baker.reference.lamps import (
+    FAR,
+    INTENSITY,
+    POINT_CHANCE,
+    RADIANCE,
+    aim_at_point_light,
+    aim_at_triangle,
+    pick_lamp,
+)
+from baker.reference.lamps import (
+    TEXTURED as GLOWS,
+)
+from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED
+
+# Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
+# emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces.
+PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES = 0, 3, 6, 9, 12, 13, 16, 25, 28
+N_ROWS = 29
+# Origins leave the surface by this share of the largest coordinate.
+_OFFSET = 1.0e-5
+_SHORT = 0.9999
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Write the frame around a unit shading normal."""
+    tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
+    path[FRAME, lane], path[FRAME + 1, lane], path[FRAME + 2, lane] = tx, ty, tz
+    path[FRAME + 3, lane], path[FRAME + 4, lane], path[FRAME + 5, lane] = bx, by, bz
+    path[FRAME + 6, lane], path[FRAME + 7, lane], path[FRAME + 8, lane] = nx, ny, nz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Return a world direction in the frame of the vertex."""
+    return (
+        dx * path[FRAME, lane] + dy * path[FRAME + 1, lane] + dz * path[FRAME + 2, lane],
+        dx * path[FRAME + 3, lane] + dy * path[FRAME + 4, lane] + dz * path[FRAME + 5, lane],
+        dx * path[FRAME + 6, lane] + dy * path[FRAME + 7, lane] + dz * path[FRAME + 8, lane],
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
+    """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`."""
+    step = _OFFSET * max(abs(x), abs(y), abs(z), least)
+    path[PLACE, lane] = x + step * path[NORMAL, lane]
+    path[PLACE + 1, lane] = y + step * path[NORMAL + 1, lane]
+    path[PLACE + 2, lane] = z + step * path[NORMAL + 2, lane]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def arrive(path, row, lane, surface, material, shading, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
+    """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
+    b0 = 1.0 - u - v
+    dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
+    fx, fy, fz = surface[prim, FACE], surface[prim, FACE + 1], surface[prim, FACE + 2]
+    sign = 1.0
+    if dx * fx + dy * fy + dz * fz >= 0.0:
+        if surface[prim, TWO_SIDED] == 0.0:
+            return False
+        sign = -1.0
+    path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane] = sign * fx, sign * fy, sign * fz
+    x = b0 * surface[prim, CORNER] + u * surface[prim, CORNER + 3] + v * surface[prim, CORNER + 6]
+    y = b0 * surface[prim, CORNER + 1] + u * surface[prim, CORNER + 4] + v * surface[prim, CORNER + 7]
+    z = b0 * surface[prim, CORNER + 2] + u * surface[prim, CORNER + 5] + v * surface[prim, CORNER + 8]
+    place_off(path, lane, x, y, z, least)
+    nx = b0 * surface[prim, SHADING] + u * surface[prim, SHADING + 3] + v * surface[prim, SHADING + 6]
+    ny = b0 * surface[prim, SHADING + 1] + u * surface[prim, SHADING + 4] + v * surface[prim, SHADING + 7]
+    nz = b0 * surface[prim, SHADING + 2] + u * surface[prim, SHADING + 5] + v * surface[prim, SHADING + 8]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length < 1.0e-6 or nx * fx + ny * fy + nz * fz <= 0.0:
+        nx, ny, nz, length = fx, fy, fz, 1.0
+    nx, ny, nz = sign * nx / length, sign * ny / length, sign * nz / length
+    glossy = lambertian == 0
+    if glossy and nx * dx + ny * dy + nz * dz >= -1.0e-3:
+        # The interpolated normal looks away: a glossy lobe would have no side to reflect from.
+        nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
+    set_frame(path, lane, nx, ny, nz)
+    tx, ty, tz = local(path, lane, -dx, -dy, -dz)
+    # Lambert reflects alike in all directions: what the interpolated normal hides still shines.
+    path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
+    surface_row(row, lane, surface, material, shading, prim, u, v, lambertian)
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def surface_row(row, lane, surface, material, shading, prim, u, v, lambertian):  # type: ignore[no-untyped-def]
+    """Write the BSDF parameters at barycentrics (u, v) of a triangle to column `lane` of `row`."""
+    m = np.int64(surface[prim, MATERIAL])
+    for c in range(3):
+        row[c, lane] = material[m, c]
+    if surface[prim, TEXTURED] > 0.0:
+        colour = np.zeros(4)
+        base_colour(shading, prim, m, u, v, colour)
+        for c in range(3):
+            row[c, lane] *= colour[c]
+    if lambertian:
+        row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
+        return
+    metallic, roughness = np.float64(material[m, 3]), np.float64(material[m, 4])
+    if material[m, 5] > 0.0:
+        both = np.zeros(4)
+        s, t = uv_at(shading.reflection_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.reflection_texture[m], s, t, 0.0, both)
+        metallic, roughness = metallic * both[2], roughness * both[1]
+    row[METALLIC, lane] = metallic
+    row[WIDTH, lane] = roughness * roughness
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
+    """Write what texture and vertex colours multiply a base colour by to `out` (4,)."""
+    out[0] = out[1] = out[2] = 1.0
+    if shading.base_texture[m] >= 0:
+        s, t = uv_at(shading.base_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.base_texture[m], s, t, 0.0, out)
+    if len(shading.colour) > 1:
+        i, j, k = shading.triangle[prim, 0], shading.triangle[prim, 1], shading.triangle[prim, 2]
+        for c in range(3):
+            out[c] *= (
+                (1.0 - u - v) * shading.colour[i, c] + u * shading.colour[j, c] + v * shading.colour[k, c]
+            )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def heuristic(own, other, power):  # type: ignore[no-untyped-def]
+    """Return the MIS weight of a technique of density `own` against one of density `other`."""
+    if power:
+        own, other = own * own, other * other
+    return own / (own + other) if own > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def aim(
+    path,
+    row,
+    lane,
+    triangle,
+    point,
+    number,
+    cumulative,
+    sky,
+    shading,
+    alpha,
+    mode,
+    power,
+    choice,
+    u,
+    w,
+    value,
+    way,
+):  # type: ignore[no-untyped-def]
+    """Aim at one lamp; return whether it may light the vertex.
+
+    mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
+    value : (3,) output, what the path collects if nothing is in the way; way : (4,) output, ray and its reach
+    """
+    n, p = len(triangle), len(point)
+    x, y, z = path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane]
+    lamp = pick_lamp(cumulative, choice)
+    light = np.zeros(4)
+    reach = FAR
+    density = 0.0
+    if lamp < n:
+        if mode == 0:
+            return False
+        dx, dy, dz, density, b1, b2 = aim_at_triangle(triangle, lamp, u, w, x, y, z)
+        if density <= 0.0:
+            return False
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = dx / length, dy / length, dz / length
+        reach = length * _SHORT
+        for c in range(3):
+            light[c] = triangle[lamp, RADIANCE + c]
+        if triangle[lamp, GLOWS] > 0.0:
+            emitted_radiance(shading, number[lamp], b1, b2, light)
+        scale = 1.0 / density
+        if alpha:
+            scale *= presence_at(shading, number[lamp], b1, b2)
+    elif lamp < n + p:
+        dx, dy, dz, reach, share = aim_at_point_light(point, lamp - n, x, y, z)
+        for c in range(3):
+            light[c] = point[lamp - n, INTENSITY + c]
+        scale = share / point[lamp - n, POINT_CHANCE]
+    else:
+        if mode == 0:
+            return False
+        a, b, c2 = cosine_sample(u, w)
+        dx = a * path[FRAME, lane] + b * path[FRAME + 3, lane] + c2 * path[FRAME + 6, lane]
+        dy = a * path[FRAME + 1, lane] + b * path[FRAME + 4, lane] + c2 * path[FRAME + 7, lane]
+        dz = a * path[FRAME + 2, lane] + b * path[FRAME + 5, lane] + c2 * path[FRAME + 8, lane]
+        density = sky[3] * c2 / math.pi
+        for c in range(3):
+            light[c] = sky[c]
+        scale = 1.0 / density if density > 0.0 else 0.0
+    if (
+        scale <= 0.0
+        or dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane] <= 0.0
+    ):
+        return False
+    lx, ly, lz = local(path, lane, dx, dy, dz)
+    other = bsdf_eval(row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], lx, ly, lz, value)
+    if density > 0.0 and mode == 2:
+        scale *= heuristic(density, other, power)
+    total = 0.0
+    for c in range(3):
+        value[c] *= path[BETA + c, lane] * light[c] * scale
+        total += value[c]
+    way[0], way[1], way[2], way[3] = dx, dy, dz, reach
+    return total > 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def scatter(path, row, lane, hemisphere, choice, u, w):  # type: ignore[no-untyped-def]
+    """Choose the direction in which the path goes on; return False where it ends.
+
+    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers
+    """
+    vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
+    weight = np.zeros(3)
+    mirror = 0.0
+    if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
+        # A mirror's direction cannot be found by chance.
+        mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < 1.0e-3 else 0.0
+    if hemisphere == 0 or choice < mirror:
+        lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)
+        if smooth:
+            density = 0.0
+        elif density <= 0.0:
+            return False
+    else:
+        if hemisphere == 1:
+            lz = u
+            r = math.sqrt(max(1.0 - u * u, 0.0))
+            lx, ly = r * math.cos(2.0 * math.pi * w), r * math.sin(2.0 * math.pi * w)
+            density = 0.5 / math.pi
+        else:
+            lx, ly, lz = cosine_sample(u, w)
+            density = lz / math.pi
+        bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, weight)
+        if density <= 0.0:
+            return False
+        for c in range(3):
+            weight[c] /= density * (1.0 - mirror)
+    dx = lx * path[FRAME, lane] + ly * path[FRAME + 3, lane] + lz * path[FRAME + 6, lane]
+    dy = lx * path[FRAME + 1, lane] + ly * path[FRAME + 4, lane] + lz * path[FRAME + 7, lane]
+    dz = lx * path[FRAME + 2, lane] + ly * path[FRAME + 5, lane] + lz * path[FRAME + 8, lane]
+    if dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane] <= 0.0:
+        return False
+    path[GO, lane], path[GO + 1, lane], path[GO + 2, lane] = dx, dy, dz
+    path[DENSITY, lane] = density
+    most = 0.0
+    for c in range(3):
+        path[BETA + c, lane] *= weight[c]
+        most = max(most, path[BETA + c, lane])
+    return most > 0.0

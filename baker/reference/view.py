@@ -1,0 +1,144 @@
+"""A scene as the reference sees it: triangles, materials, lamps, a ray tree; no atlas, no map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.parallel import thread_count
+from baker.core.scene import Scene
+from baker.reference.lamps import LampTable, build_lamps
+from baker.shading.alpha import see_through
+from baker.shading.materials import Shading, resolve_materials
+from baker.trace.embree import RayScene
+
+# Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
+# emitter (or -1), 1 if the base colour needs a texture or a vertex colour.
+CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED = 0, 9, 18, 21, 22, 23, 24
+ROW_LENGTH = 28
+
+
+class Surfaces(NamedTuple):
+    """What a path needs at a hit.
+
+    row (T, 28) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if a
+    texture scales the last two; least float, metres: offsets are never computed from smaller coordinates;
+    lambertian int: 1 if everything reflects as Lambert.
+    """
+
+    row: NDArray[np.float32]
+    material: NDArray[np.float32]
+    least: float
+    lambertian: int
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A scene ready to be path-traced. Close it, or use it as a context manager.
+
+    Attributes
+    ----------
+    geometry : Geometry
+    shading : Shading
+    surfaces : Surfaces
+    lamps : LampTable
+    rays : RayScene
+    threads : int
+    """
+
+    geometry: Geometry
+    shading: Shading
+    surfaces: Surfaces
+    lamps: LampTable
+    rays: RayScene
+    threads: int
+
+    def __enter__(self) -> Reference:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Release the ray tree."""
+        self.close()
+
+    def close(self) -> None:
+        """Release the ray tree; nothing can be traced any more."""
+        self.rays.close()
+
+
+def build_reference(
+    scene: Scene,
+    *,
+    sky: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    lambertian: bool = False,
+    threads: int | None = None,
+) -> Reference:
+    """Prepare a scene for path tracing.
+
+    Parameters
+    ----------
+    scene : Scene
+    sky : (3,) tuple
+        Radiance of the constant sky, cd/m2, linear Rec.709.
+    lambertian : bool
+        Every surface reflects as Lambert with its base colour, as bakes see it.
+    threads : int, optional
+
+    Raises
+    ------
+    ResourceError
+        If Embree cannot be used or memory runs out.
+    """
+    count = thread_count(threads)
+    geometry = world_geometry(scene, _no_atlas(scene))
+    shading = resolve_materials(scene, geometry, reflections=not lambertian)
+    rays = RayScene(geometry.position, geometry.triangle, threads=count, see_through=see_through(shading))
+    lamps = build_lamps(scene, geometry, shading, sky)
+    surfaces = _surfaces(geometry, shading, lamps, lambertian)
+    return Reference(geometry, shading, surfaces, lamps, rays, count)
+
+
+def _no_atlas(scene: Scene) -> Atlas:
+    """Return an atlas in which nothing lies anywhere, so that meshes keep their own vertices."""
+    layouts = []
+    for index, instance in enumerate(scene.instances):
+        mesh = scene.meshes[instance.mesh]
+        n = len(mesh.position)
+        layouts.append(
+            InstanceLayout(
+                instance=index,
+                page=0,
+                vertex=np.arange(n, dtype=np.int32),
+                uv=np.zeros((n, 2), np.float32),
+                triangle=mesh.triangle,
+                chart=np.zeros(len(mesh.triangle), np.int32),
+                kept=False,
+                texels_per_metre=0.0,
+            )
+        )
+    return Atlas(1, 1, tuple(layouts), 0, 0)
+
+
+def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian: bool) -> Surfaces:
+    n, material = len(geometry.triangle), geometry.material
+    row = np.zeros((n, ROW_LENGTH), np.float32)
+    row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
+    row[:, SHADING : SHADING + 9] = geometry.normal[geometry.triangle].reshape(n, 9)
+    row[:, FACE : FACE + 3] = geometry.face_normal
+    row[:, MATERIAL] = material
+    row[:, TWO_SIDED] = geometry.double_sided
+    row[:, EMITTER] = lamps.emitter
+    row[:, TEXTURED] = (shading.base_texture >= 0)[material] | (len(shading.colour) > 1)
+    kinds = np.zeros((len(shading.base), 8), np.float32)
+    kinds[:, :3] = shading.base
+    kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
+    kinds[:, 5] = shading.reflection_texture >= 0
+    return Surfaces(row, kinds, max(1e-3 * geometry.diagonal, 1e-12), int(lambertian))

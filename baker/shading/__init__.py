@@ -1,0 +1,1 @@
+"""Materials and what lets light through, resolved for triangles."""
