@@ -1,8 +1,8 @@
 """Irradiance and openness at points of surfaces, pass by pass, with standard errors.
 
-    E = pi mean(L of a white Lambertian point)        AO = share of cosine-weighted rays that meet nothing in reach
+    E = pi mean(L of a white Lambertian point)    AO = share of cosine-weighted rays that meet nothing
 
-A pass is a fixed number of samples of every point. Passes are independent of each other, so their spread is the
+A pass is a fixed number of samples of every point. Passes are independent, so their spread is the
 error of their mean, however a pass spreads its own samples.
 """
 
@@ -136,9 +136,7 @@ def irradiance_pass(
         counted[begin // _TILE] = sum(cast)
         _add(estimate, rows, out * (math.pi / samples))
 
-    run_tiles(
-        len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress
-    )
+    run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
     estimate.passes += 1
     estimate.rays += int(counted.sum())
 

@@ -16,11 +16,11 @@ import math
 import numpy as np
 from numba import njit
 
-from baker.kernels.emitters import emitted_radiance
 from baker.kernels.sampling import texel_scramble
 from baker.reference.bsdf import METALLIC, N_PARAMETERS, WIDTH
+from baker.reference.lamps import RADIANCE, triangle_density
+from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.lamps import TWO_SIDED as LAMP_TWO_SIDED
-from baker.reference.lamps import triangle_density
 from baker.reference.randomness import draw, path_state
 from baker.reference.vertex import (
     BETA,
@@ -35,12 +35,14 @@ from baker.reference.vertex import (
     TO,
     aim,
     arrive,
+    glow,
     heuristic,
+    paint,
     place_off,
     scatter,
     set_frame,
 )
-from baker.reference.view import EMITTER, FACE
+from baker.reference.view import EMITTER, FACE, TEXTURED
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
@@ -76,8 +78,12 @@ def start_path(path, row, lane, where, toward, normal, at_surface, least):  # ty
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def see_emitter(path, lane, surface, triangle, shading, prim, u, v, distance, mode, power):  # type: ignore[no-untyped-def]
-    """Collect what the hit triangle emits towards the path, weighed against aiming at it."""
+def see_emitter(path, lane, surface, triangle, prim, distance, mode, power, value):  # type: ignore[no-untyped-def]
+    """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
+
+    Its texture is not looked up yet.
+    """
+    value[:] = 0.0
     e = np.int64(surface[prim, EMITTER])
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
@@ -89,10 +95,8 @@ def see_emitter(path, lane, surface, triangle, shading, prim, u, v, distance, mo
             return
         other = triangle_density(triangle, e, dx * distance, dy * distance, dz * distance)
         weight = heuristic(path[DENSITY, lane], other, power)
-    light = np.zeros(4)
-    emitted_radiance(shading, prim, u, v, light)
     for c in range(3):
-        path[LIGHT + c, lane] += path[BETA + c, lane] * light[c] * weight
+        value[c] = path[BETA + c, lane] * triangle[e, RADIANCE + c] * weight
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -145,7 +149,8 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     row = np.zeros((N_PARAMETERS, MAX_WIDTH))
     value = np.zeros(3)
     values = np.zeros((3, MAX_WIDTH))
-    way = np.zeros(4)
+    way = np.zeros(6)
+    rgba = np.zeros(4)
     stage = np.zeros(MAX_WIDTH, np.int64)
     job = np.zeros(MAX_WIDTH, np.int64)
     state = np.zeros(MAX_WIDTH, np.uint64)
@@ -193,13 +198,17 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                     v = np.float64(floats[HIT_V * width + lane])
                     if surface[prim, EMITTER] >= 0.0:
                         distance = np.float64(floats[TFAR * width + lane])
-                        see_emitter(path, lane, surface, triangle, shading, prim, u, v, distance, mode, power)
+                        see_emitter(path, lane, surface, triangle, prim, distance, mode, power, value)
+                        if triangle[np.int64(surface[prim, EMITTER]), GLOWS] > 0.0:
+                            glow(shading, prim, u, v, value, rgba, False)
+                        for c in range(3):
+                            path[LIGHT + c, lane] += value[c]
                     path[BOUNCES, lane] += 1.0
                     deep = most_bounces >= 0 and path[BOUNCES, lane] > most_bounces
-                    if deep or not arrive(
-                        path, row, lane, surface, material, shading, prim, u, v, least, lambertian
-                    ):
+                    if deep or not arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
                         stage[lane] = _IDLE
+                    elif surface[prim, TEXTURED] > 0.0:
+                        paint(row, lane, shading, prim, u, v, material, rgba)
                 if stage[lane] == _IDLE:
                     for c in range(3):
                         out[job[lane] % m, c] += path[LIGHT + c, lane]
@@ -211,10 +220,25 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                     choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
                     if strata and path[BOUNCES, lane] == 0.0:
                         u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 0)
-                    if aim(
-                        path, row, lane, triangle, point, number, cumulative, sky, shading, alpha, mode, power,
-                        choice, u, w, value, way,
-                    ):  # fmt: skip
+                    lamp = aim(
+                        path,
+                        row,
+                        lane,
+                        triangle,
+                        point,
+                        cumulative,
+                        sky,
+                        mode,
+                        power,
+                        choice,
+                        u,
+                        w,
+                        value,
+                        way,
+                    )
+                    if 0 <= lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
+                        glow(shading, number[lamp], way[4], way[5], value, rgba, True)
+                    if lamp >= 0:
                         set_ray(
                             floats, words, width, lane,
                             path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
@@ -237,7 +261,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
             choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
             if strata and path[BOUNCES, lane] == 0.0:
                 u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1)
-            alive = scatter(path, row, lane, hemisphere, choice, u, w)
+            alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
             if alive and path[BOUNCES, lane] >= _SURE:
                 survive = min(max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane]), _MOST)
                 alive = draw(state, lane) < survive

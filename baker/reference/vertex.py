@@ -1,7 +1,7 @@
 """One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
 
 A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
-(`bsdf`). All directions in `path` are world space; `TO` is the way back along the path in the frame of the normal.
+(`bsdf`). Directions in `path` are world space; only `TO`, the way back, is in the frame of the normal.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 from baker.kernels.alpha import presence_at
-from baker.kernels.emitters import emitted_radiance
 from baker.kernels.sampling import tangent_frame
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
@@ -33,10 +32,7 @@ from baker.reference.lamps import (
     aim_at_triangle,
     pick_lamp,
 )
-from baker.reference.lamps import (
-    TEXTURED as GLOWS,
-)
-from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED
+from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
 
 # Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
 # emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces.
@@ -76,7 +72,7 @@ def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arrive(path, row, lane, surface, material, shading, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
+def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
@@ -106,32 +102,28 @@ def arrive(path, row, lane, surface, material, shading, prim, u, v, least, lambe
     tx, ty, tz = local(path, lane, -dx, -dy, -dz)
     # Lambert reflects alike in all directions: what the interpolated normal hides still shines.
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
-    surface_row(row, lane, surface, material, shading, prim, u, v, lambertian)
+    m = np.int64(surface[prim, MATERIAL])
+    row[0, lane], row[1, lane], row[2, lane] = material[m, 0], material[m, 1], material[m, 2]
+    row[METALLIC, lane] = material[m, 3] if glossy else 0.0
+    row[WIDTH, lane] = material[m, 4] * material[m, 4] if glossy else -1.0
     return True
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def surface_row(row, lane, surface, material, shading, prim, u, v, lambertian):  # type: ignore[no-untyped-def]
-    """Write the BSDF parameters at barycentrics (u, v) of a triangle to column `lane` of `row`."""
-    m = np.int64(surface[prim, MATERIAL])
+def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-untyped-def]
+    """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory.
+
+    Called for surfaces that have some only: a tuple of arrays is dear to hand over.
+    """
+    m = shading.material[prim]
+    base_colour(shading, prim, m, u, v, rgba)
     for c in range(3):
-        row[c, lane] = material[m, c]
-    if surface[prim, TEXTURED] > 0.0:
-        colour = np.zeros(4)
-        base_colour(shading, prim, m, u, v, colour)
-        for c in range(3):
-            row[c, lane] *= colour[c]
-    if lambertian:
-        row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
-        return
-    metallic, roughness = np.float64(material[m, 3]), np.float64(material[m, 4])
-    if material[m, 5] > 0.0:
-        both = np.zeros(4)
+        row[c, lane] *= rgba[c]
+    if row[WIDTH, lane] >= 0.0 and material[m, 5] > 0.0:
         s, t = uv_at(shading.reflection_uv, shading.triangle, prim, u, v)
-        sample_texture(shading.pack, shading.reflection_texture[m], s, t, 0.0, both)
-        metallic, roughness = metallic * both[2], roughness * both[1]
-    row[METALLIC, lane] = metallic
-    row[WIDTH, lane] = roughness * roughness
+        sample_texture(shading.pack, shading.reflection_texture[m], s, t, 0.0, rgba)
+        row[METALLIC, lane] *= rgba[2]
+        row[WIDTH, lane] *= rgba[1] * rgba[1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -158,93 +150,87 @@ def heuristic(own, other, power):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def aim(
-    path,
-    row,
-    lane,
-    triangle,
-    point,
-    number,
-    cumulative,
-    sky,
-    shading,
-    alpha,
-    mode,
-    power,
-    choice,
-    u,
-    w,
-    value,
-    way,
-):  # type: ignore[no-untyped-def]
-    """Aim at one lamp; return whether it may light the vertex.
+def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):  # type: ignore[no-untyped-def]
+    """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
 
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) output, what the path collects if nothing is in the way; way : (4,) output, ray and its reach
+    value : (3,) output, what the path collects if nothing is in the way; way : (6,) output, the ray, its reach
+    and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
     """
     n, p = len(triangle), len(point)
     x, y, z = path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane]
     lamp = pick_lamp(cumulative, choice)
-    light = np.zeros(4)
     reach = FAR
     density = 0.0
+    b1 = b2 = 0.0
     if lamp < n:
         if mode == 0:
-            return False
+            return -1
         dx, dy, dz, density, b1, b2 = aim_at_triangle(triangle, lamp, u, w, x, y, z)
         if density <= 0.0:
-            return False
+            return -1
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         dx, dy, dz = dx / length, dy / length, dz / length
         reach = length * _SHORT
-        for c in range(3):
-            light[c] = triangle[lamp, RADIANCE + c]
-        if triangle[lamp, GLOWS] > 0.0:
-            emitted_radiance(shading, number[lamp], b1, b2, light)
         scale = 1.0 / density
-        if alpha:
-            scale *= presence_at(shading, number[lamp], b1, b2)
+        red, green, blue = (
+            triangle[lamp, RADIANCE],
+            triangle[lamp, RADIANCE + 1],
+            triangle[lamp, RADIANCE + 2],
+        )
     elif lamp < n + p:
-        dx, dy, dz, reach, share = aim_at_point_light(point, lamp - n, x, y, z)
-        for c in range(3):
-            light[c] = point[lamp - n, INTENSITY + c]
-        scale = share / point[lamp - n, POINT_CHANCE]
+        e = lamp - n
+        dx, dy, dz, reach, share = aim_at_point_light(point, e, x, y, z)
+        scale = share / point[e, POINT_CHANCE]
+        red, green, blue = point[e, INTENSITY], point[e, INTENSITY + 1], point[e, INTENSITY + 2]
     else:
         if mode == 0:
-            return False
-        a, b, c2 = cosine_sample(u, w)
-        dx = a * path[FRAME, lane] + b * path[FRAME + 3, lane] + c2 * path[FRAME + 6, lane]
-        dy = a * path[FRAME + 1, lane] + b * path[FRAME + 4, lane] + c2 * path[FRAME + 7, lane]
-        dz = a * path[FRAME + 2, lane] + b * path[FRAME + 5, lane] + c2 * path[FRAME + 8, lane]
-        density = sky[3] * c2 / math.pi
-        for c in range(3):
-            light[c] = sky[c]
+            return -1
+        a, b, c = cosine_sample(u, w)
+        dx = a * path[FRAME, lane] + b * path[FRAME + 3, lane] + c * path[FRAME + 6, lane]
+        dy = a * path[FRAME + 1, lane] + b * path[FRAME + 4, lane] + c * path[FRAME + 7, lane]
+        dz = a * path[FRAME + 2, lane] + b * path[FRAME + 5, lane] + c * path[FRAME + 8, lane]
+        density = sky[3] * c / math.pi
         scale = 1.0 / density if density > 0.0 else 0.0
-    if (
-        scale <= 0.0
-        or dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane] <= 0.0
-    ):
-        return False
+        red, green, blue = sky[0], sky[1], sky[2]
+    above = dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane]
+    if scale <= 0.0 or above <= 0.0:
+        return -1
     lx, ly, lz = local(path, lane, dx, dy, dz)
     other = bsdf_eval(row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], lx, ly, lz, value)
     if density > 0.0 and mode == 2:
         scale *= heuristic(density, other, power)
-    total = 0.0
-    for c in range(3):
-        value[c] *= path[BETA + c, lane] * light[c] * scale
-        total += value[c]
-    way[0], way[1], way[2], way[3] = dx, dy, dz, reach
-    return total > 0.0
+    value[0] *= path[BETA, lane] * red * scale
+    value[1] *= path[BETA + 1, lane] * green * scale
+    value[2] *= path[BETA + 2, lane] * blue * scale
+    way[0], way[1], way[2], way[3], way[4], way[5] = dx, dy, dz, reach, b1, b2
+    return lamp if value[0] + value[1] + value[2] > 0.0 else -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def scatter(path, row, lane, hemisphere, choice, u, w):  # type: ignore[no-untyped-def]
+def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-def]
+    """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
+
+    aimed : also by its alpha: rays that hit it know that already
+    """
+    m = shading.material[prim]
+    there = presence_at(shading, prim, u, v) if aimed else 1.0
+    for c in range(3):
+        value[c] *= there
+    if shading.emission_texture[m] >= 0:
+        s, t = uv_at(shading.emission_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.emission_texture[m], s, t, 0.0, rgba)
+        for c in range(3):
+            value[c] *= rgba[c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[no-untyped-def]
     """Choose the direction in which the path goes on; return False where it ends.
 
-    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers
+    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers; weight : (3,) working memory
     """
     vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
-    weight = np.zeros(3)
     mirror = 0.0
     if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
         # A mirror's direction cannot be found by chance.

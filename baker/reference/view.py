@@ -19,7 +19,7 @@ from baker.shading.materials import Shading, resolve_materials
 from baker.trace.embree import RayScene
 
 # Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
-# emitter (or -1), 1 if the base colour needs a texture or a vertex colour.
+# emitter (or -1), 1 if a texture or a vertex colour changes what the material says.
 CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED = 0, 9, 18, 21, 22, 23, 24
 ROW_LENGTH = 28
 
@@ -136,7 +136,10 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     row[:, MATERIAL] = material
     row[:, TWO_SIDED] = geometry.double_sided
     row[:, EMITTER] = lamps.emitter
-    row[:, TEXTURED] = (shading.base_texture >= 0)[material] | (len(shading.colour) > 1)
+    painted = shading.base_texture >= 0
+    if not lambertian:
+        painted = painted | (shading.reflection_texture >= 0)
+    row[:, TEXTURED] = painted[material] | (len(shading.colour) > 1)
     kinds = np.zeros((len(shading.base), 8), np.float32)
     kinds[:, :3] = shading.base
     kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
