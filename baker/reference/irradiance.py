@@ -29,52 +29,52 @@ _TILE = 128
 
 @dataclass
 class PointEstimate:
-    """Means over passes, which can be continued.
+    """Means over passes, which can be continued, for some points longer than for others.
 
     Attributes
     ----------
-    total, squares : (n, C) float64
-        Sums of the passes' means and of their squares.
-    halves : (2, n, C) float64
-        The same sums apart for even and odd passes: two independent references.
-    passes : int
+    total, squares : (2, n, C) float64
+        Sums of the passes' means and of their squares, even and odd passes apart.
+    count : (2, n) int64
+        Even and odd passes of each point.
     samples : int
         Samples of a point in each pass.
+    rounds : int
+        Number of the next pass.
     rays : int
     """
 
     total: NDArray[np.float64]
     squares: NDArray[np.float64]
-    halves: NDArray[np.float64]
-    passes: int
+    count: NDArray[np.int64]
     samples: int
+    rounds: int = 0
     rays: int = 0
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """Return the estimate (n, C)."""
-        return self.total / max(self.passes, 1)
+        """Return the estimate (n, C); 0 before the first pass."""
+        mean: NDArray[np.float64] = self.total.sum(axis=0) / np.maximum(self.count.sum(axis=0), 1)[:, None]
+        return mean
 
     @property
     def standard_error(self) -> NDArray[np.float64]:
         """Return the standard error (n, C) of the estimate; inf after less than two passes."""
-        if self.passes < 2:
-            return np.full(self.total.shape, np.inf)
-        variance = (self.squares / self.passes - self.mean**2) / (self.passes - 1)
-        error: NDArray[np.float64] = np.sqrt(np.maximum(variance, 0.0))
+        n = self.count.sum(axis=0)[:, None].astype(np.float64)
+        variance = (self.squares.sum(axis=0) / np.maximum(n, 1) - self.mean**2) / np.maximum(n - 1, 1)
+        error: NDArray[np.float64] = np.where(n > 1, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return error
 
     def half(self, which: int) -> NDArray[np.float64]:
-        """Return the mean (n, C) of the even (0) or odd (1) passes."""
-        count = (self.passes + 1 - which) // 2
-        mean: NDArray[np.float64] = self.halves[which] / max(count, 1)
+        """Return the mean (n, C) of the even (0) or odd (1) passes: two independent references."""
+        mean: NDArray[np.float64] = self.total[which] / np.maximum(self.count[which], 1)[:, None]
         return mean
 
 
 def new_estimate(n: int, channels: int, samples: int = SAMPLES_PER_PASS) -> PointEstimate:
     """Return an estimate of n points before its first pass."""
-    zero = np.zeros((n, channels))
-    return PointEstimate(zero, zero.copy(), np.zeros((2, n, channels)), 0, samples)
+    zero = np.zeros((2, n, channels))
+    return PointEstimate(zero, zero.copy(), np.zeros((2, n), np.int64), samples)
 
 
 def irradiance_pass(
@@ -105,10 +105,10 @@ def irradiance_pass(
     max_bounces : int, optional
         Reflections before light arrives; None is unlimited.
     chosen : (m,) int64, optional
-        Only these points. Their passes must be counted by the caller: the estimate's own count goes up by one.
+        Only these points, all by default.
     """
     how = estimator_named(estimator)
-    number, samples = estimate.passes, estimate.samples
+    number, samples = estimate.rounds, estimate.samples
     picked = np.arange(len(position)) if chosen is None else chosen
     net = sobol_reversed(samples, seed, 1 + number)
     setting = np.array(
@@ -137,7 +137,7 @@ def irradiance_pass(
         _add(estimate, rows, out * (math.pi / samples))
 
     run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
-    estimate.passes += 1
+    estimate.rounds += 1
     estimate.rays += int(counted.sum())
 
 
@@ -159,7 +159,7 @@ def openness_pass(
     distance : float
         Metres, may be inf.
     """
-    number, samples = estimate.passes, estimate.samples
+    number, samples = estimate.rounds, estimate.samples
     net = sobol_reversed(samples, seed, 1 + number)
     shared = shared_bits_mask(samples)
     reach = np.float32(min(distance, 1.0e30))
@@ -175,11 +175,12 @@ def openness_pass(
         _add(estimate, rows, out / samples)
 
     run_tiles(len(position), 4 * _TILE, work, threads=reference.threads, stage="openness", progress=progress)
-    estimate.passes += 1
+    estimate.rounds += 1
     estimate.rays += len(position) * samples
 
 
 def _add(estimate: PointEstimate, rows: NDArray[np.int64], mean: NDArray[np.float64]) -> None:
-    estimate.total[rows] += mean
-    estimate.squares[rows] += mean**2
-    estimate.halves[estimate.passes % 2, rows] += mean
+    half = estimate.rounds % 2
+    estimate.total[half, rows] += mean
+    estimate.squares[half, rows] += mean**2
+    estimate.count[half, rows] += 1

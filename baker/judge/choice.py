@@ -1,0 +1,41 @@
+"""Which texels are judged: all objects, all brightnesses, evenly by area."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Every object gets this many texels, as long as that leaves half of them to be shared out by area.
+_LEAST = 8
+
+
+def choose_texels(
+    owner: NDArray[np.int32], judged: NDArray[np.bool_], brightness: NDArray[np.float64], n: int, seed: int
+) -> NDArray[np.int64]:
+    """Return texel numbers, rising: about n of those that may be judged.
+
+    Parameters
+    ----------
+    owner : (N,) int32
+        Object of each texel, -1 for none.
+    judged : (N,) bool
+        Texels that may be chosen.
+    brightness : (N,) float64
+        Each object's texels are taken evenly over their order by this.
+    """
+    candidate = np.flatnonzero(judged & (owner >= 0))
+    if len(candidate) <= n:
+        return candidate
+    objects, count = np.unique(owner[candidate], return_counts=True)
+    floor = np.minimum(count, min(_LEAST, max(n // (2 * len(objects)), 1)))
+    share = np.maximum(floor, np.floor(n * count / count.sum())).astype(np.int64)
+    random = np.random.Generator(np.random.PCG64([seed, 6]))
+    order = candidate[np.lexsort((candidate, brightness[candidate], owner[candidate]))]
+    begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+    chosen = []
+    for first, size, wanted in zip(begin, count, np.minimum(share, count), strict=True):
+        edge = np.linspace(0, size, wanted + 1)
+        # One texel from each of `wanted` equal parts of the object's order.
+        at = np.floor(edge[:-1] + random.random(wanted) * np.diff(edge)).astype(np.int64)
+        chosen.append(order[first + np.unique(np.minimum(at, size - 1))])
+    return np.sort(np.concatenate(chosen))

@@ -1,0 +1,85 @@
+"""JUnit XML, which build servers show: named cases that passed or failed, with a sentence.
+
+Based on: the junit-10.xsd of the Jenkins xUnit plugin.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from baker.core.errors import ResourceError
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing that was checked.
+
+    Attributes
+    ----------
+    name : str
+    group : str
+        Shown as the class: a scene or an object.
+    problem : str
+        Why it failed; empty if it passed.
+    seconds : float
+    error : bool
+        It could not be checked at all.
+    """
+
+    name: str
+    group: str
+    problem: str = ""
+    seconds: float = 0.0
+    error: bool = False
+
+
+def junit_text(suite: str, cases: Sequence[Case]) -> str:
+    """Return a JUnit document of one suite."""
+    failed = sum(1 for case in cases if case.problem and not case.error)
+    errors = sum(1 for case in cases if case.problem and case.error)
+    seconds = sum(case.seconds for case in cases)
+    counts = {
+        "tests": str(len(cases)),
+        "failures": str(failed),
+        "errors": str(errors),
+        "time": f"{seconds:.3f}",
+    }
+    root = ElementTree.Element("testsuites", counts)
+    node = ElementTree.SubElement(root, "testsuite", {"name": suite, **counts})
+    for case in cases:
+        entry = ElementTree.SubElement(
+            node, "testcase", {"name": case.name, "classname": case.group, "time": f"{case.seconds:.3f}"}
+        )
+        if case.problem:
+            kind = "error" if case.error else "failure"
+            ElementTree.SubElement(entry, kind, {"message": case.problem}).text = case.problem
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a report so that it is either whole or not there.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            Path(name).chmod(0o644)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise ResourceError(f"the report cannot be written ({error.strerror})", file=str(path)) from None

@@ -1,0 +1,63 @@
+"""Tells if a map is shifted or turned against its surface, or bent by a curve.
+
+A map that fits better one texel further is shifted, however small its error is in smooth places. A map whose
+values follow a power of the truth other than 1 went through a gamma curve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
+# A shifted map must fit this much better before it is believed, and so many texels must tell.
+_BETTER = 0.9
+_ENOUGH = 32
+
+
+def best_shift(
+    page: NDArray[np.float64],
+    covered: NDArray[np.bool_],
+    pixel: NDArray[np.int64],
+    truth: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Return the shift (rows, columns) by which the map would fit the truth better, (0, 0) if none does.
+
+    Parameters
+    ----------
+    page : (P, H, W) float64, colour means of the map
+    covered : (P, H, W) bool
+        Only texels whose four neighbours are covered, too, take part.
+    pixel : (n,) int64, texels judged
+    truth : (n,) float64, their path-traced values
+    """
+    height, width = page.shape[1:]
+    number, rest = np.divmod(pixel, height * width)
+    row, column = np.divmod(rest, width)
+    inside = (row > 0) & (row < height - 1) & (column > 0) & (column < width - 1)
+    for down, right in _STEPS:
+        at = (number, np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1))
+        inside &= covered[at]
+    if inside.sum() < _ENOUGH:
+        return 0, 0
+    number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
+    scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
+    # Robust: a few texels of large error must not decide.
+    error = [
+        np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, 0.25).mean()
+        for down, right in _STEPS
+    ]
+    best = int(np.argmin(error))
+    return _STEPS[best] if error[best] < _BETTER * error[0] else (0, 0)
+
+
+def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:
+    """Return the power of the truth that values follow, 1 if they are true; None if too few texels tell."""
+    lit = (value > 0) & (truth > 0)
+    if lit.sum() < _ENOUGH:
+        return None
+    x, y = np.log(truth[lit]), np.log(value[lit])
+    if np.ptp(x) < 0.5:
+        return None
+    x, y = x - np.median(x), y - np.median(y)
+    return float((x * y).sum() / max(float((x * x).sum()), 1e-12))

@@ -1,0 +1,458 @@
+"""Path-traces chosen texels of a finished bake and says how far the stored maps are from that.
+
+The reference knows scene and lights only (`baker.reference`); the maps are taken as the files hold them, after
+half float, denoiser and repairs. Every figure stands beside what the reference's own noise adds to it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError, SettingsError
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.lightmap import TexelStatus
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import SceneWarning
+from baker.io.bake_folder import StoredBake, read_bake
+from baker.judge.choice import choose_texels
+from baker.judge.figures import FIGURES, figures, relative_error, usual_value, z_scores
+from baker.judge.limits import Limit, Verdict, judge, parse_limits
+from baker.judge.registration import best_shift, exponent
+from baker.judge.texel_area import TexelPlaces, instance_map, texel_places
+from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
+from baker.reference.view import Reference, build_reference
+
+CHANNELS = ("irradiance", "ao")
+PLACES = 64
+# Passes of all texels before some are called good enough; passes beyond which AO is not followed.
+_FIRST, _MOST_OPENNESS = 8, 256
+_OPENNESS_ERROR = 0.002
+_WORST = 10
+DEFAULT_LIMITS = (
+    "irradiance.median > 0.03, irradiance.bias > 0.03, irradiance.nrmse > 0.5, "
+    "ao.median > 0.03, ao.bias > 0.03, ao.rmse > 0.05"
+)
+# An object whose median relative error is above this fails on its own, if so many of its texels were judged.
+_OBJECT_MEDIAN, _OBJECT_TEXELS = 0.15, 8
+_EXPONENT = 0.1
+
+
+@dataclass(frozen=True)
+class VerifySettings:
+    """How much is path-traced.
+
+    Attributes
+    ----------
+    texels : int
+    spp : int or None
+        Paths for each texel; None goes on until `target_se` or the time limit.
+    target_se : float
+        Relative standard error at which a texel is good enough.
+    time_limit : float or None
+        Seconds of path tracing.
+    fail_if : str or None
+        Limits; None takes `DEFAULT_LIMITS`, the objects' own limit, and the checks for shift and curve.
+    seed, threads
+    """
+
+    texels: int = 2000
+    spp: int | None = None
+    target_se: float = 0.005
+    time_limit: float | None = 40.0
+    fail_if: str | None = None
+    seed: int = 0
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense."""
+        if self.texels < 1:
+            raise SettingsError("--texels must be at least 1", object="texels")
+        if self.spp is not None and self.spp < 1:
+            raise SettingsError("--spp must be at least 1", object="spp")
+        if not self.target_se > 0:
+            raise SettingsError("--target-se must be above 0", object="target_se")
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise SettingsError("--time-limit must be above 0", object="time_limit")
+
+
+@dataclass(frozen=True)
+class ChannelCheck:
+    """A channel's texels, stored and path-traced.
+
+    Attributes
+    ----------
+    value, reference, standard_error : (n, C) float64
+    halves : two (n, C) float64
+    figures : dict, see `judge.figures`
+    shift : (int, int), rows and columns by which the map would fit better
+    exponent : float or None, power of the truth that the values follow
+    unresolved : int, texels whose standard error stayed above the target
+    """
+
+    value: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    standard_error: NDArray[np.float64]
+    halves: tuple[NDArray[np.float64], NDArray[np.float64]]
+    figures: dict[str, Any]
+    shift: tuple[int, int]
+    exponent: float | None
+    unresolved: int
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What `verify` found.
+
+    Attributes
+    ----------
+    bake : StoredBake
+    pixel : (n,) int64, texels judged, (page * H + row) * W + column
+    owner : (n,) int32, their objects
+    position : (n, 3) float64, world
+    channels : dict of name to ChannelCheck
+    objects, worst : list of dict, as in the JSON
+    verdicts : list of Verdict
+    problems : list of str, what failed beside limits
+    invalid : int, covered texels that the bake filled from neighbours (not judged)
+    rays : int; seconds : float
+    warnings : list of SceneWarning
+    """
+
+    bake: StoredBake
+    pixel: NDArray[np.int64]
+    owner: NDArray[np.int32]
+    position: NDArray[np.float64]
+    channels: dict[str, ChannelCheck]
+    objects: list[dict[str, Any]]
+    worst: list[dict[str, Any]]
+    verdicts: list[Verdict]
+    problems: list[str]
+    invalid: int
+    rays: int
+    seconds: float
+    warnings: list[SceneWarning] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether no limit was passed."""
+        return not self.problems and not any(verdict.failed for verdict in self.verdicts)
+
+
+def verify(
+    out: Path | str, settings: VerifySettings | None = None, progress: Progress = silent
+) -> Verification:
+    """Judge the bake in a folder against path tracing.
+
+    Parameters
+    ----------
+    out : Path or str
+        Output folder of a bake.
+    settings : VerifySettings, optional
+    progress : Progress
+
+    Raises
+    ------
+    InputError, SettingsError, ResourceError, Cancelled
+    """
+    settings = settings or VerifySettings()
+    start = time.monotonic()
+    report(progress, "load", 0.0)
+    bake = read_bake(out)
+    names = [name for name in CHANNELS if name in bake.maps]
+    if not names:
+        raise InputError("the bake holds no channel that can be verified (irradiance, ao)", file=str(out))
+    limits = parse_limits(settings.fail_if or _defaults(names), names, FIGURES)
+    geometry = world_geometry(bake.scene, bake.atlas)
+    pixel, owner, places = _choose(bake, geometry, names[0], settings)
+    baked = bake.manifest.get("settings", {})
+    sky = _sky(baked)
+    deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
+    with build_reference(bake.scene, sky=sky, lambertian=True, threads=settings.threads) as reference:
+        estimates: dict[str, PointEstimate] = {}
+        if "ao" in names:
+            reach = baked.get("ao_distance_metres")
+            distance = np.inf if reach is None else float(reach)
+            estimates["ao"] = _openness(reference, places, distance, settings, deadline, progress)
+        if "irradiance" in names:
+            bounces = baked.get("bounces")
+            estimates["irradiance"] = _irradiance(reference, places, bounces, settings, deadline, progress)
+    covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
+    channels = {
+        name: _channel(bake.maps[name], covered, pixel, estimates[name], settings, absolute=name == "ao")
+        for name in names
+    }
+    objects = _objects(bake, owner, channels)
+    verdicts = judge(limits, {name: check.figures for name, check in channels.items()})
+    return Verification(
+        bake=bake,
+        pixel=pixel,
+        owner=owner,
+        position=places.position.mean(axis=1),
+        channels=channels,
+        objects=objects,
+        worst=_worst(bake, pixel, owner, places.position.mean(axis=1), channels),
+        verdicts=verdicts,
+        problems=[] if settings.fail_if else _problems(channels, objects),
+        invalid=int((bake.status == TexelStatus.INVALID).sum()),
+        rays=sum(estimate.rays for estimate in estimates.values()),
+        seconds=time.monotonic() - start,
+        warnings=list(bake.warnings),
+    )
+
+
+def verification_json(found: Verification) -> dict[str, Any]:
+    """Return what `--json` prints."""
+    return {
+        "passed": found.passed,
+        "channels": {
+            name: {
+                **check.figures,
+                "shift": list(check.shift),
+                "exponent": check.exponent,
+                "unresolved": check.unresolved,
+                "z_histogram": _histogram(check),
+            }
+            for name, check in found.channels.items()
+        },
+        "objects": found.objects,
+        "worst": found.worst,
+        "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in found.verdicts],
+        "problems": found.problems,
+        "invalid": found.invalid,
+        "rays": found.rays,
+        "seconds": found.seconds,
+        "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in found.warnings],
+    }
+
+
+def _defaults(names: list[str]) -> str:
+    return ", ".join(part for part in DEFAULT_LIMITS.split(", ") if part.split(".")[0] in names)
+
+
+def _sky(baked: dict[str, Any]) -> tuple[float, float, float]:
+    """Return the radiance of the sky that the manifest's settings tell of."""
+    from baker.core.settings import make_settings
+
+    known = {key: baked[key] for key in ("sky",) if baked.get(key) is not None}
+    return make_settings(known).sky_radiance
+
+
+def _choose(
+    bake: StoredBake, geometry: Geometry, name: str, settings: VerifySettings
+) -> tuple[NDArray[np.int64], NDArray[np.int32], TexelPlaces]:
+    """Pick texels and spread places over them."""
+    resolution = bake.atlas.resolution
+    owner = instance_map(geometry, bake.atlas.n_pages, resolution).reshape(-1)
+    judged = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED)).reshape(-1)
+    brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
+    if len(brightness) != len(owner):
+        raise InputError("the bake lacks pages of a channel; bake the scene again", file=str(bake.folder))
+    pixel = choose_texels(owner, judged, brightness, settings.texels, settings.seed)
+    if not len(pixel):
+        raise InputError(
+            "no texel of the bake lies on a surface; bake the scene again", file=str(bake.folder)
+        )
+    return pixel, owner[pixel], texel_places(geometry, pixel, resolution, PLACES, settings.seed)
+
+
+def _openness(
+    reference: Reference,
+    places: TexelPlaces,
+    distance: float,
+    settings: VerifySettings,
+    deadline: float | None,
+    progress: Progress,
+) -> PointEstimate:
+    """Path-trace AO: as many passes as asked for, or until its error is far below what a bake can have."""
+    estimate = new_estimate(len(places.position), 1)
+    passes = _MOST_OPENNESS if settings.spp is None else max(-(-settings.spp // estimate.samples), 2)
+    started = time.monotonic()
+    for number in range(passes):
+        openness_pass(
+            reference, estimate, places.position, places.normal, places.face_normal,
+            distance=distance, seed=settings.seed,
+        )  # fmt: skip
+        report(progress, "ambient occlusion", (number + 1) / passes)
+        if settings.spp is not None or number + 1 < _FIRST:
+            continue
+        # AO may take a quarter of the time; it seldom needs it.
+        late = deadline is not None and time.monotonic() > started + 0.25 * (deadline - started)
+        if late or np.median(estimate.standard_error) < _OPENNESS_ERROR:
+            break
+    return estimate
+
+
+def _irradiance(
+    reference: Reference,
+    places: TexelPlaces,
+    bounces: int | None,
+    settings: VerifySettings,
+    deadline: float | None,
+    progress: Progress,
+) -> PointEstimate:
+    """Path-trace irradiance until each texel is good enough, the paths asked for are cast, or time is up."""
+    estimate = new_estimate(len(places.position), 3)
+    chosen = np.arange(len(places.position))
+    goal = None if settings.spp is None else max(-(-settings.spp // estimate.samples), 2)
+    started = time.monotonic()
+    while True:
+        irradiance_pass(
+            reference, estimate, places.position, places.normal, places.face_normal,
+            max_bounces=bounces, seed=settings.seed, chosen=chosen,
+        )  # fmt: skip
+        if goal is not None:
+            report(progress, "path tracing", estimate.rounds / goal)
+            if estimate.rounds >= goal:
+                break
+        elif estimate.rounds >= _FIRST:
+            error = _relative_standard_error(estimate)
+            chosen = np.flatnonzero(error > settings.target_se)
+            share = 1.0 - len(chosen) / len(error)
+            if deadline is not None:
+                share = max(share, (time.monotonic() - started) / max(deadline - started, 1e-9))
+            report(progress, "path tracing", min(share, 1.0), f"{len(error) - len(chosen)} texels done")
+            if not len(chosen):
+                break
+        if deadline is not None and estimate.rounds >= 2 and time.monotonic() > deadline:
+            break
+    return estimate
+
+
+def _relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
+    """Return the standard error (n,) of the colour mean, relative as errors are (colours taken as one)."""
+    mean = estimate.mean
+    usual = usual_value(mean)
+    error = estimate.standard_error.mean(axis=1)
+    return np.asarray(error / np.maximum(np.maximum(mean.mean(axis=1), 0.1 * usual), 1e-12), np.float64)
+
+
+def _channel(
+    stored: NDArray[np.float32],
+    covered: NDArray[np.bool_],
+    pixel: NDArray[np.int64],
+    estimate: PointEstimate,
+    settings: VerifySettings,
+    *,
+    absolute: bool,
+) -> ChannelCheck:
+    """Compare a stored channel (P, H, W, C) with its estimate."""
+    flat = stored.reshape(-1, stored.shape[3])
+    value = flat[pixel].astype(np.float64)[:, : estimate.mean.shape[1]]
+    truth, error = estimate.mean, estimate.standard_error
+    halves = (estimate.half(0), estimate.half(1))
+    page = stored.mean(axis=3, dtype=np.float64)
+    if absolute:
+        unresolved = int((error > 2 * _OPENNESS_ERROR).any(axis=1).sum())
+    else:
+        unresolved = int((_relative_standard_error(estimate) > settings.target_se).sum())
+    return ChannelCheck(
+        value=value,
+        reference=truth,
+        standard_error=error,
+        halves=halves,
+        figures=figures(value, truth, standard_error=error, halves=halves),
+        shift=best_shift(page, covered, pixel, truth.mean(axis=1)),
+        exponent=exponent(value.mean(axis=1), truth.mean(axis=1)),
+        unresolved=unresolved,
+    )
+
+
+def _objects(
+    bake: StoredBake, owner: NDArray[np.int32], channels: dict[str, ChannelCheck]
+) -> list[dict[str, Any]]:
+    """Return the figures of each object that was judged."""
+    found = []
+    usual = {name: usual_value(check.reference) for name, check in channels.items()}
+    for number in np.unique(owner):
+        mine = owner == number
+        instance = bake.scene.instances[int(number)]
+        entry: dict[str, Any] = {"object": instance.name, "node": instance.node, "channels": {}}
+        for name, check in channels.items():
+            entry["channels"][name] = figures(
+                check.value[mine],
+                check.reference[mine],
+                standard_error=check.standard_error[mine],
+                halves=(check.halves[0][mine], check.halves[1][mine]),
+                usual=usual[name],
+            )
+        found.append(entry)
+    return found
+
+
+def _worst(
+    bake: StoredBake,
+    pixel: NDArray[np.int64],
+    owner: NDArray[np.int32],
+    position: NDArray[np.float64],
+    channels: dict[str, ChannelCheck],
+) -> list[dict[str, Any]]:
+    """Return the texels of the largest error, beyond three standard errors of the reference, worst first."""
+    size = bake.atlas.resolution
+    found = []
+    for name, check in channels.items():
+        usual = usual_value(check.reference)
+        error = relative_error(check.value, check.reference, usual)
+        noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
+        sure = error - 3.0 * noise / np.maximum(np.maximum(check.reference.mean(axis=1), 0.1 * usual), 1e-12)
+        for i in np.argsort(-sure, kind="stable")[:_WORST]:
+            page, rest = divmod(int(pixel[i]), size * size)
+            instance = bake.scene.instances[int(owner[i])]
+            found.append(
+                {
+                    "object": instance.name,
+                    "node": instance.node,
+                    "channel": name,
+                    "page": page,
+                    "row": rest // size,
+                    "column": rest % size,
+                    "position": position[i].tolist(),
+                    "value": check.value[i].tolist(),
+                    "reference": check.reference[i].tolist(),
+                    "standard_error": noise[i],
+                    "error": error[i],
+                    "sure": float(sure[i]),
+                }
+            )
+    found.sort(key=lambda entry: -entry["sure"])
+    for entry in found:
+        entry["standard_error"], entry["error"] = float(entry["standard_error"]), float(entry["error"])
+        del entry["sure"]
+    return found[:_WORST]
+
+
+def _problems(channels: dict[str, ChannelCheck], objects: list[dict[str, Any]]) -> list[str]:
+    """Return what is wrong beyond single figures: shifted pages, curves, single objects."""
+    found = []
+    for name, check in channels.items():
+        if check.shift != (0, 0):
+            down, right = check.shift
+            found.append(f"{name} fits better {down} rows and {right} columns further: the page is shifted")
+        if name == "irradiance" and check.exponent is not None and abs(check.exponent - 1.0) > _EXPONENT:
+            found.append(f"{name} follows the {check.exponent:.2f}th power of the truth: a curve was applied")
+    for entry in objects:
+        for name, values in entry["channels"].items():
+            if values["texels"] < _OBJECT_TEXELS or values["median"] is None:
+                continue
+            noise = values["noise_floor"] or 0.0
+            if values["median"] > _OBJECT_MEDIAN + 3.0 * noise:
+                found.append(
+                    f"{name} of '{entry['object']}' (node {entry['node']}) is off by"
+                    f" {100 * values['median']:.0f} % (median)"
+                )
+    return found
+
+
+def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
+    """Return counts of z-scores between -6 and 6; what lies beyond is in the outer bins."""
+    z = np.clip(z_scores(check.value, check.reference, check.standard_error), -5.99, 5.99)
+    count, edge = np.histogram(z, bins=24, range=(-6.0, 6.0))
+    return {"edges": edge.tolist(), "counts": count.tolist()}
+
+
+__all__ = ["Limit", "Verification", "VerifySettings", "verification_json", "verify"]
