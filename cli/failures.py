@@ -10,6 +10,8 @@ from typing import Any, TextIO
 
 from baker.core.errors import BakerError, Cancelled, ResourceError, SettingsError
 
+# Exit code of a check that the user asked for and that failed.
+FAILED_CHECK = 1
 # What the operating system says when something ran out or is not ours to use.
 _RESOURCE_ERRNO = {
     errno.ENOSPC: "the disk is full; free some space, or write elsewhere with -o",

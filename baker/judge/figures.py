@@ -11,8 +11,8 @@ For each place the mean over colours v of the value and r of the reference:
 
 `median`, `p95`, `p99`, `max` are of the relative error, whose floor keeps places in the dark from deciding:
 an error there counts against a tenth of what is usual. `noise_floor` is the median relative error that the
-reference alone would show: two independent halves of it are compared, and their difference is halved, since the
-mean of both halves is nearer to the truth than either by that much.
+reference alone would show: two independent halves of it are compared, and their difference is halved, since
+the mean of both halves is nearer to the truth than either by that much.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
 2011 (relMSE).

@@ -1,7 +1,7 @@
 """Limits on figures, as `--fail-if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
-A limit names what must not be: it fails where its comparison is true. `bias` is compared by its size, so that a
-bake too dark fails like one too bright.
+A limit names what must not be: it fails where its comparison is true. `bias` is compared by its size, so
+that a bake too dark fails like one too bright.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 _STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
 # A shifted map must fit this much better before it is believed, and so many texels must tell.
 _BETTER = 0.9
+# By so many standard errors, too.
+_SURE = 4.0
 _ENOUGH = 32
 
 
@@ -43,17 +45,24 @@ def best_shift(
     number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
     scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
     # Robust: a few texels of large error must not decide.
-    error = [
-        np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, 0.25).mean()
-        for down, right in _STEPS
-    ]
-    best = int(np.argmin(error))
-    return _STEPS[best] if error[best] < _BETTER * error[0] else (0, 0)
+    error = np.array(
+        [
+            np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, 0.25)
+            for down, right in _STEPS
+        ]
+    )
+    mean = error.mean(axis=1)
+    best = int(np.argmin(mean))
+    gain = error[0] - error[best]
+    # Where a map is even every shift fits alike but for noise.
+    sure = gain.mean() > _SURE * gain.std() / np.sqrt(len(gain))
+    return _STEPS[best] if mean[best] < _BETTER * mean[0] and sure else (0, 0)
 
 
 def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:
     """Return the power of the truth that values follow, 1 if they are true; None if too few texels tell."""
-    lit = (value > 0) & (truth > 0)
+    # In the dark small errors are large ratios.
+    lit = (value > 0) & (truth > 0.1 * np.median(truth))
     if lit.sum() < _ENOUGH:
         return None
     x, y = np.log(truth[lit]), np.log(value[lit])

@@ -1,7 +1,7 @@
 """Which object lies under each texel, and places spread over a texel's own area.
 
-The bake finds the same things on its way; this is written apart from it, from `scene.glb`'s uv alone, so that a
-mistake there is not made twice.
+The bake finds the same things on its way; this is written apart from it, from `scene.glb`'s uv alone, so
+that a mistake there is not made twice.
 """
 
 from __future__ import annotations
@@ -79,8 +79,10 @@ def texel_places(
     found = np.zeros((len(pixel), n_places), np.int64)
     weight = np.zeros((len(pixel), n_places, 3))
     covered = np.zeros(len(pixel))
-    _spread(geometry.uv, geometry.triangle, resolution, pixel, start, triangle, corners, polygon, area, random,
-            found, weight, covered)  # fmt: skip
+    _spread(
+        geometry.uv, geometry.triangle, resolution, pixel, start, triangle, corners, polygon, area,
+        random, found, weight, covered,
+    )  # fmt: skip
     corner = geometry.triangle[found]
     position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
     normal = (geometry.normal[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
@@ -97,8 +99,8 @@ def _box(corner, size):  # type: ignore[no-untyped-def]
     low_x, high_x = min(corner[:, 0]), max(corner[:, 0])
     low_y, high_y = min(corner[:, 1]), max(corner[:, 1])
     return (
-        max(int(math.floor(low_x)), 0), min(int(math.floor(high_x)), size - 1),
-        max(int(math.floor(low_y)), 0), min(int(math.floor(high_y)), size - 1),
+        max(math.floor(low_x), 0), min(math.floor(high_x), size - 1),
+        max(math.floor(low_y), 0), min(math.floor(high_y), size - 1),
     )  # fmt: skip
 
 

@@ -169,8 +169,8 @@ def openness_pass(
         rows = np.arange(begin, end)
         out = np.zeros((end - begin, 1))
         open_rays(
-            position[rows], normal[rows], face_normal[rows], begin, new_caster(reference.rays.tracer), net, shared,
-            reach, least, seed, number, out,
+            position[rows], normal[rows], face_normal[rows], begin, new_caster(reference.rays.tracer), net,
+            shared, reach, least, seed, number, out,
         )  # fmt: skip
         _add(estimate, rows, out / samples)
 

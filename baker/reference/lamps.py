@@ -1,7 +1,7 @@
 """Everything that emits, as one table that paths aim at: triangles, lights without area, the sky.
 
-A lamp is chosen by a fixed chance, half of it by power and half equally among kinds, so that neither a sun nor
-a candle is starved. Whatever the chances, estimates stay unbiased: each is divided by its own.
+A lamp is chosen by a fixed chance, half of it by power and half equally among kinds, so that neither a sun
+nor a candle is starved. Whatever the chances, estimates stay unbiased: each is divided by its own.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.
@@ -25,8 +25,8 @@ from baker.shading.materials import Shading
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Columns of an emissive triangle: three corners, face normal, area, two-sided, chance, radiance, textured.
 CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 18
-# Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer cosine,
-# one over the cone's width, chance.
+# Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer
+# cosine, one over the cone's width, chance.
 KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE = 0, 1, 4, 7, 10, 11, 12
 _KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
 # A directional light and the sky end nowhere.
@@ -38,8 +38,8 @@ class LampTable(NamedTuple):
     """Lamps in the order triangles, lights without area, sky.
 
     triangle (E, 20), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
-    emitter (T,) int32, row of a scene triangle in `triangle` or -1; cumulative (E + P + 1,) float64, last 1 (0
-    if nothing emits); sky (4,) float64: radiance, chance.
+    emitter (T,) int32, row of a scene triangle in `triangle` or -1; cumulative (E + P + 1,) float64, last 1
+    (0 if nothing emits); sky (4,) float64: radiance, chance.
     """
 
     triangle: NDArray[np.float64]

@@ -120,8 +120,8 @@ def see_sky(path, lane, sky, mode, power):  # type: ignore[no-untyped-def]
 def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, caster, net, how, out):  # type: ignore[no-untyped-def]
     """Add the light that paths bring to each of m points, and count path segments and shadow rays.
 
-    where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its point:
-        point, shading normal and geometric normal, or ray origin and unit direction if not `at_surface`
+    where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its
+        point: place, shading normal and geometric normal, or ray origin and direction if not `at_surface`
     begin : number of the first point; net : (n, 2) uint32, n samples of a pass as bit-reversed Sobol numbers
     how : (7,) int64: `Estimator` (hemisphere, aim, strata, power), most bounces (-1: unlimited), seed, pass
     out : (m, 3) float64 sums; at a surface of light leaving a white one, E / pi
@@ -175,7 +175,8 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
             valid[lane] = 0
             if stage[lane] == _RAY:
                 set_ray(
-                    floats, words, width, lane, path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
+                    floats, words, width, lane,
+                    path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
                     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
                 )  # fmt: skip
                 valid[lane] = -1

@@ -154,8 +154,8 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
     """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
 
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) output, what the path collects if nothing is in the way; way : (6,) output, the ray, its reach
-    and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
+    value : (3,) output, what the path collects if nothing is in the way; way : (6,) output, the ray, its
+    reach and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
     """
     n, p = len(triangle), len(point)
     x, y, z = path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane]

@@ -27,8 +27,8 @@ ROW_LENGTH = 28
 class Surfaces(NamedTuple):
     """What a path needs at a hit.
 
-    row (T, 28) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if a
-    texture scales the last two; least float, metres: offsets are never computed from smaller coordinates;
+    row (T, 28) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
+    a texture scales the last two; least float, metres: offsets are never computed from smaller coordinates;
     lambertian int: 1 if everything reflects as Lambert.
     """
 

@@ -1,7 +1,7 @@
 """Path-traces chosen texels of a finished bake and says how far the stored maps are from that.
 
-The reference knows scene and lights only (`baker.reference`); the maps are taken as the files hold them, after
-half float, denoiser and repairs. Every figure stands beside what the reference's own noise adds to it.
+The reference knows scene and lights only (`baker.reference`); the maps are taken as the files hold them,
+after half float, denoiser and repairs. Every figure stands beside what the reference's own noise adds to it.
 """
 
 from __future__ import annotations
@@ -21,25 +21,27 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.io.bake_folder import StoredBake, read_bake
 from baker.judge.choice import choose_texels
-from baker.judge.figures import FIGURES, figures, relative_error, usual_value, z_scores
-from baker.judge.limits import Limit, Verdict, judge, parse_limits
+from baker.judge.figures import FIGURES, figures, usual_value
+from baker.judge.limits import Verdict, judge, parse_limits
 from baker.judge.registration import best_shift, exponent
 from baker.judge.texel_area import TexelPlaces, instance_map, texel_places
 from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
 from baker.reference.view import Reference, build_reference
+from baker.verification.crops import Crop, trace_crops
+from baker.verification.worst import worst_texels
 
 CHANNELS = ("irradiance", "ao")
 PLACES = 64
 # Passes of all texels before some are called good enough; passes beyond which AO is not followed.
 _FIRST, _MOST_OPENNESS = 8, 256
 _OPENNESS_ERROR = 0.002
-_WORST = 10
 DEFAULT_LIMITS = (
     "irradiance.median > 0.03, irradiance.bias > 0.03, irradiance.nrmse > 0.5, "
     "ao.median > 0.03, ao.bias > 0.03, ao.rmse > 0.05"
 )
-# An object whose median relative error is above this fails on its own, if so many of its texels were judged.
-_OBJECT_MEDIAN, _OBJECT_TEXELS = 0.15, 8
+# An object whose mean is off by more fails on its own, if so many of its texels were judged and it is not in the
+# dark (this share of what is usual).
+_OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_LIGHT = 0.25, 8, 0.1
 _EXPONENT = 0.1
 
 
@@ -120,6 +122,7 @@ class Verification:
     verdicts : list of Verdict
     problems : list of str, what failed beside limits
     invalid : int, covered texels that the bake filled from neighbours (not judged)
+    crops : list of Crop, the surroundings of the worst texels
     rays : int; seconds : float
     warnings : list of SceneWarning
     """
@@ -136,6 +139,7 @@ class Verification:
     invalid: int
     rays: int
     seconds: float
+    crops: list[Crop]
     warnings: list[SceneWarning] = field(default_factory=list)
 
     @property
@@ -172,6 +176,7 @@ def verify(
     pixel, owner, places = _choose(bake, geometry, names[0], settings)
     baked = bake.manifest.get("settings", {})
     sky = _sky(baked)
+    bounces = baked.get("bounces")
     deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
     with build_reference(bake.scene, sky=sky, lambertian=True, threads=settings.threads) as reference:
         estimates: dict[str, PointEstimate] = {}
@@ -180,55 +185,33 @@ def verify(
             distance = np.inf if reach is None else float(reach)
             estimates["ao"] = _openness(reference, places, distance, settings, deadline, progress)
         if "irradiance" in names:
-            bounces = baked.get("bounces")
             estimates["irradiance"] = _irradiance(reference, places, bounces, settings, deadline, progress)
-    covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
-    channels = {
-        name: _channel(bake.maps[name], covered, pixel, estimates[name], settings, absolute=name == "ao")
-        for name in names
-    }
+        covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
+        channels = {
+            name: _channel(bake.maps[name], covered, pixel, estimates[name], settings, absolute=name == "ao")
+            for name in names
+        }
+        middle = places.position.mean(axis=1)
+        worst = worst_texels(bake, pixel, owner, middle, channels)
+        crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, progress)
     objects = _objects(bake, owner, channels)
     verdicts = judge(limits, {name: check.figures for name, check in channels.items()})
     return Verification(
         bake=bake,
         pixel=pixel,
         owner=owner,
-        position=places.position.mean(axis=1),
+        position=middle,
         channels=channels,
         objects=objects,
-        worst=_worst(bake, pixel, owner, places.position.mean(axis=1), channels),
+        worst=worst,
         verdicts=verdicts,
         problems=[] if settings.fail_if else _problems(channels, objects),
         invalid=int((bake.status == TexelStatus.INVALID).sum()),
+        crops=crops,
         rays=sum(estimate.rays for estimate in estimates.values()),
         seconds=time.monotonic() - start,
         warnings=list(bake.warnings),
     )
-
-
-def verification_json(found: Verification) -> dict[str, Any]:
-    """Return what `--json` prints."""
-    return {
-        "passed": found.passed,
-        "channels": {
-            name: {
-                **check.figures,
-                "shift": list(check.shift),
-                "exponent": check.exponent,
-                "unresolved": check.unresolved,
-                "z_histogram": _histogram(check),
-            }
-            for name, check in found.channels.items()
-        },
-        "objects": found.objects,
-        "worst": found.worst,
-        "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in found.verdicts],
-        "problems": found.problems,
-        "invalid": found.invalid,
-        "rays": found.rays,
-        "seconds": found.seconds,
-        "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in found.warnings],
-    }
 
 
 def _defaults(names: list[str]) -> str:
@@ -385,47 +368,6 @@ def _objects(
     return found
 
 
-def _worst(
-    bake: StoredBake,
-    pixel: NDArray[np.int64],
-    owner: NDArray[np.int32],
-    position: NDArray[np.float64],
-    channels: dict[str, ChannelCheck],
-) -> list[dict[str, Any]]:
-    """Return the texels of the largest error, beyond three standard errors of the reference, worst first."""
-    size = bake.atlas.resolution
-    found = []
-    for name, check in channels.items():
-        usual = usual_value(check.reference)
-        error = relative_error(check.value, check.reference, usual)
-        noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
-        sure = error - 3.0 * noise / np.maximum(np.maximum(check.reference.mean(axis=1), 0.1 * usual), 1e-12)
-        for i in np.argsort(-sure, kind="stable")[:_WORST]:
-            page, rest = divmod(int(pixel[i]), size * size)
-            instance = bake.scene.instances[int(owner[i])]
-            found.append(
-                {
-                    "object": instance.name,
-                    "node": instance.node,
-                    "channel": name,
-                    "page": page,
-                    "row": rest // size,
-                    "column": rest % size,
-                    "position": position[i].tolist(),
-                    "value": check.value[i].tolist(),
-                    "reference": check.reference[i].tolist(),
-                    "standard_error": noise[i],
-                    "error": error[i],
-                    "sure": float(sure[i]),
-                }
-            )
-    found.sort(key=lambda entry: -entry["sure"])
-    for entry in found:
-        entry["standard_error"], entry["error"] = float(entry["standard_error"]), float(entry["error"])
-        del entry["sure"]
-    return found[:_WORST]
-
-
 def _problems(channels: dict[str, ChannelCheck], objects: list[dict[str, Any]]) -> list[str]:
     """Return what is wrong beyond single figures: shifted pages, curves, single objects."""
     found = []
@@ -435,24 +377,15 @@ def _problems(channels: dict[str, ChannelCheck], objects: list[dict[str, Any]]) 
             found.append(f"{name} fits better {down} rows and {right} columns further: the page is shifted")
         if name == "irradiance" and check.exponent is not None and abs(check.exponent - 1.0) > _EXPONENT:
             found.append(f"{name} follows the {check.exponent:.2f}th power of the truth: a curve was applied")
+    usual = {name: usual_value(check.reference) for name, check in channels.items()}
     for entry in objects:
         for name, values in entry["channels"].items():
-            if values["texels"] < _OBJECT_TEXELS or values["median"] is None:
+            if values["texels"] < _OBJECT_TEXELS or values["nrmse"] is None:
                 continue
-            noise = values["noise_floor"] or 0.0
-            if values["median"] > _OBJECT_MEDIAN + 3.0 * noise:
+            mean = values["rmse"] / max(values["nrmse"], 1e-12)
+            if mean > _OBJECT_LIGHT * usual[name] and abs(values["bias"]) > _OBJECT_BIAS:
                 found.append(
                     f"{name} of '{entry['object']}' (node {entry['node']}) is off by"
-                    f" {100 * values['median']:.0f} % (median)"
+                    f" {100 * values['bias']:+.0f} % on the whole"
                 )
     return found
-
-
-def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
-    """Return counts of z-scores between -6 and 6; what lies beyond is in the outer bins."""
-    z = np.clip(z_scores(check.value, check.reference, check.standard_error), -5.99, 5.99)
-    count, edge = np.histogram(z, bins=24, range=(-6.0, 6.0))
-    return {"edges": edge.tolist(), "counts": count.tolist()}
-
-
-__all__ = ["Limit", "Verification", "VerifySettings", "verification_json", "verify"]

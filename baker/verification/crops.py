@@ -1,0 +1,120 @@
+"""Small pictures of the map around its worst texels, beside the same texels path-traced, and their FLIP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.geometry import Geometry
+from baker.core.lightmap import TexelStatus
+from baker.core.progress import Progress, report
+from baker.io.bake_folder import StoredBake
+from baker.judge.flip import flip_error
+from baker.judge.texel_area import texel_places
+from baker.reference.irradiance import irradiance_pass, new_estimate, openness_pass
+from baker.reference.view import Reference
+
+SIZE = 24
+_MOST = 3
+_PASSES, _PLACES = 16, 16
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A window of a page.
+
+    Attributes
+    ----------
+    channel : str
+    page, row, column : int
+        Its first texel.
+    stored, reference : (h, w, C) float32
+        0 where no surface is.
+    error : (h, w) float32
+        FLIP.
+    flip : float
+        Mean of `error`.
+    """
+
+    channel: str
+    page: int
+    row: int
+    column: int
+    stored: NDArray[np.float32]
+    reference: NDArray[np.float32]
+    error: NDArray[np.float32]
+    flip: float
+
+
+def trace_crops(
+    bake: StoredBake,
+    geometry: Geometry,
+    reference: Reference,
+    worst: list[dict[str, Any]],
+    bounces: int | None,
+    seed: int,
+    progress: Progress,
+) -> list[Crop]:
+    """Path-trace all texels around the worst ones.
+
+    Parameters
+    ----------
+    worst : list of dict
+        Worst first; windows that overlap an earlier one of the same channel are left out.
+    bounces : int or None
+        As of `irradiance_pass`.
+    """
+    crops: list[Crop] = []
+    for entry in worst:
+        if len(crops) == _MOST:
+            break
+        corner = _corner(entry["row"], bake.atlas.resolution), _corner(entry["column"], bake.atlas.resolution)
+        if any(_overlap(crop, entry, corner) for crop in crops):
+            continue
+        report(progress, "crops", len(crops) / _MOST)
+        crops.append(_trace(bake, geometry, reference, entry, corner, bounces, seed))
+    return crops
+
+
+def _corner(at: int, size: int) -> int:
+    return max(min(at - SIZE // 2, size - SIZE), 0)
+
+
+def _overlap(crop: Crop, entry: dict[str, Any], corner: tuple[int, int]) -> bool:
+    same = crop.channel == entry["channel"] and crop.page == entry["page"]
+    return same and abs(crop.row - corner[0]) < SIZE and abs(crop.column - corner[1]) < SIZE
+
+
+def _trace(
+    bake: StoredBake,
+    geometry: Geometry,
+    reference: Reference,
+    entry: dict[str, Any],
+    corner: tuple[int, int],
+    bounces: int | None,
+    seed: int,
+) -> Crop:
+    page, size = entry["page"], bake.atlas.resolution
+    window = (slice(corner[0], corner[0] + SIZE), slice(corner[1], corner[1] + SIZE))
+    on = np.isin(bake.status[page][window], (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
+    row, column = np.nonzero(on)
+    pixel = (page * size + corner[0] + row) * size + corner[1] + column
+    places = texel_places(geometry, pixel.astype(np.int64), size, _PLACES, seed)
+    where = (places.position, places.normal, places.face_normal)
+    stored = bake.maps[entry["channel"]][page][window] * on[..., None]
+    truth = np.zeros_like(stored)
+    if entry["channel"] == "ao":
+        estimate = new_estimate(len(pixel), 1)
+        reach = bake.manifest.get("settings", {}).get("ao_distance_metres")
+        for _ in range(_PASSES):
+            openness_pass(reference, estimate, *where, distance=np.inf if reach is None else reach, seed=seed)
+    else:
+        estimate = new_estimate(len(pixel), 3)
+        for _ in range(_PASSES):
+            irradiance_pass(reference, estimate, *where, max_bounces=bounces, seed=seed)
+    truth[row, column] = estimate.mean
+    error, mean = flip_error(truth, stored)
+    return Crop(entry["channel"], page, corner[0], corner[1], stored, truth, error, mean)

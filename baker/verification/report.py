@@ -1,0 +1,197 @@
+"""A verification as one HTML page with its pictures inside: nothing is loaded from anywhere.
+
+Maps are shown as the sRGB curve of value / (value + middle), middle being the median of what is lit.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.io.png import encode_png, srgb_levels
+from baker.judge.figures import FIGURES, relative_error, usual_value
+from baker.judge.junit import write_text
+from baker.verification.summary import mean_flip, verification_json
+from baker.verification.verify import ChannelCheck, Verification
+
+_SHOWN = 512
+# Relative errors of these colours' ends: dark blue is none, yellow is this and more.
+_HOT = 0.10
+_STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem}
+table{border-collapse:collapse;margin:1rem 0}
+td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
+td:first-child,th:first-child{text-align:left}
+img{image-rendering:pixelated;background:#000;margin-right:.6rem}
+figure{display:inline-block;margin:.5rem 1rem .5rem 0}figcaption{font-size:13px;color:#555}
+.bad{color:#b00020;font-weight:600}.good{color:#187a2f;font-weight:600}"""
+
+
+def write_report(path: Path, found: Verification) -> None:
+    """Write the page.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written.
+    """
+    write_text(path, report_html(found))
+
+
+def report_html(found: Verification) -> str:
+    """Return the page as text."""
+    summary = verification_json(found)
+    verdict = '<span class="good">passed</span>' if found.passed else '<span class="bad">failed</span>'
+    scene = html.escape(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
+    parts = [
+        f"<h1>{scene}: {verdict}</h1>",
+        f"<p>{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s. "
+        f"{found.invalid} buried texels are not judged.</p>",
+        _failures(found),
+        _figures_table(found),
+    ]
+    for name, check in found.channels.items():
+        parts.append(f"<h2>{html.escape(name)}</h2>")
+        parts.append(_pages(found, name, check))
+        parts.append(_histogram(summary["channels"][name]["z_histogram"]))
+    parts += [_crops(found), _worst_table(found), _objects_table(found)]
+    body = "\n".join(parts)
+    title = f"<title>baker verify: {scene}</title>"
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8">{title}<style>{_STYLE}</style>{body}</html>\n'
+    )
+
+
+def _failures(found: Verification) -> str:
+    lines = [
+        f"{verdict.limit}: it is {'missing' if verdict.value is None else f'{verdict.value:.4g}'}"
+        for verdict in found.verdicts
+        if verdict.failed
+    ]
+    lines += found.problems + [warning.message for warning in found.warnings]
+    items = "".join(f'<li class="bad">{html.escape(line)}</li>' for line in lines)
+    return f"<ul>{items}</ul>" if lines else ""
+
+
+def _figures_table(found: Verification) -> str:
+    head = "".join(f"<th>{name}</th>" for name in (*FIGURES, "flip"))
+    rows = ""
+    for name, check in found.channels.items():
+        cells = "".join(f"<td>{_number(check.figures[key])}</td>" for key in FIGURES)
+        rows += f"<tr><td>{name}</td>{cells}<td>{_number(mean_flip(found, name))}</td></tr>"
+    note = (
+        "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's own "
+        "noise adds to the median. flip is the mean over the pictures of the worst places below.</p>"
+    )
+    return f"<table><tr><th>channel</th>{head}</tr>{rows}</table>{note}"
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return "-"
+    return str(value) if isinstance(value, int) else f"{value:.4g}"
+
+
+def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
+    """Return each page, and where on it the judged texels are how wrong."""
+    size = found.bake.atlas.resolution
+    step = max(size // _SHOWN, 1)
+    usual = usual_value(check.reference)
+    error = relative_error(check.value, check.reference, usual)
+    text = ""
+    for page in range(found.bake.maps[name].shape[0]):
+        stored = found.bake.maps[name][page][::step, ::step]
+        text += _figure(_shown(stored, usual), f"{name}, page {page}", 1)
+        heat = np.full((*stored.shape[:2], 3), 24, np.uint8)
+        mine = found.pixel // (size * size) == page
+        row, column = np.divmod(found.pixel[mine] % (size * size), size)
+        # Dots of three pixels, the worst on top.
+        for i in np.argsort(error[mine], kind="stable"):
+            y, x = row[i] // step, column[i] // step
+            heat[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = _heat(float(error[mine][i]))
+        text += _figure(heat, f"error of the judged texels: blue 0, yellow {_HOT:.0%} and more", 1)
+    return text
+
+
+def _heat(error: float) -> tuple[int, int, int]:
+    t = min(error / _HOT, 1.0)
+    return int(40 + 215 * t), int(60 + 160 * t * t), int(200 * (1 - t))
+
+
+def _shown(image: NDArray[np.float32], middle: float) -> NDArray[np.uint8]:
+    value = np.maximum(image, 0.0)
+    mapped = value / (value + max(middle, 1e-9))
+    return srgb_levels(np.broadcast_to(mapped, (*image.shape[:2], 3)).astype(np.float32))
+
+
+def _figure(pixels: NDArray[np.uint8], caption: str, zoom: int) -> str:
+    data = base64.b64encode(encode_png(np.ascontiguousarray(pixels))).decode("ascii")
+    width = pixels.shape[1] * zoom
+    picture = f'<img width="{width}" alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
+    return f"<figure>{picture}<figcaption>{html.escape(caption)}</figcaption></figure>"
+
+
+def _histogram(histogram: dict[str, list[float]]) -> str:
+    """Return the z-scores as bars, with the normal distribution that an exact bake would show."""
+    counts, edges = np.array(histogram["counts"]), np.array(histogram["edges"])
+    if not counts.sum():
+        return ""
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    normal = np.exp(-0.5 * middle**2) / np.sqrt(2 * np.pi) * (edges[1] - edges[0]) * counts.sum()
+    top = max(float(counts.max()), float(normal.max()))
+    bars = "".join(
+        f'<rect x="{20 * i}" y="{160 - high:.1f}" width="18" height="{high:.1f}" fill="#4a7fb5"/>'
+        for i, high in enumerate(150 * counts / top)
+    )
+    line = " ".join(f"{20 * i + 9},{160 - 150 * n / top:.1f}" for i, n in enumerate(normal))
+    caption = "error in standard errors of the reference, -6 to 6; line: what noise alone would give"
+    return (
+        f'<figure><svg width="480" height="162">{bars}'
+        f'<polyline points="{line}" fill="none" stroke="#b00020"/></svg>'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
+
+
+def _crops(found: Verification) -> str:
+    if not found.crops:
+        return ""
+    text = "<h2>Around the worst texels</h2>"
+    for crop in found.crops:
+        middle = usual_value(crop.reference.reshape(-1, crop.reference.shape[2]).astype(np.float64))
+        where = f"{crop.channel}, page {crop.page}, rows from {crop.row}, columns from {crop.column}"
+        text += "<div>" + _figure(_shown(crop.stored, middle), f"stored: {where}", 8)
+        text += _figure(_shown(crop.reference, middle), "path-traced", 8)
+        shade = np.repeat((np.clip(crop.error, 0, 1) * 255).astype(np.uint8)[..., None], 3, axis=2)
+        text += _figure(shade, f"FLIP, mean {crop.flip:.3f}", 8) + "</div>"
+    return text
+
+
+def _worst_table(found: Verification) -> str:
+    rows = ""
+    for entry in found.worst:
+        position = ", ".join(f"{x:.3f}" for x in entry["position"])
+        value, truth = (" ".join(f"{x:.4g}" for x in entry[key]) for key in ("value", "reference"))
+        rows += (
+            f"<tr><td>{html.escape(entry['object'])}</td><td>{entry['node']}</td><td>{entry['channel']}</td>"
+            f"<td>{entry['page']}, {entry['row']}, {entry['column']}</td><td>{position}</td><td>{value}</td>"
+            f"<td>{truth}</td><td>{entry['error']:.1%}</td></tr>"
+        )
+    head = "<tr><th>object</th><th>node</th><th>channel</th><th>page, row, column</th><th>position</th>"
+    head += "<th>stored</th><th>path-traced</th><th>error</th></tr>"
+    return f"<h2>Worst texels</h2><table>{head}{rows}</table>"
+
+
+def _objects_table(found: Verification) -> str:
+    shown = ("texels", "bias", "median", "p95", "noise_floor")
+    rows = ""
+    for entry in found.objects:
+        name = f"<tr><td>{html.escape(entry['object'])}</td><td>{entry['node']}</td>"
+        for channel, values in entry["channels"].items():
+            cells = "".join(f"<td>{_number(values[key])}</td>" for key in shown)
+            rows += f"{name}<td>{channel}</td>{cells}</tr>"
+    head = "".join(f"<th>{title}</th>" for title in ("object", "node", "channel", *shown))
+    return f"<h2>Objects</h2><table><tr>{head}</tr>{rows}</table>"

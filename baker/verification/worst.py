@@ -1,0 +1,55 @@
+"""The texels at which a bake is furthest from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.io.bake_folder import StoredBake
+from baker.judge.figures import relative_error, usual_value
+
+_WORST = 10
+
+
+def worst_texels(
+    bake: StoredBake,
+    pixel: NDArray[np.int64],
+    owner: NDArray[np.int32],
+    position: NDArray[np.float64],
+    channels: Mapping[str, Any],
+) -> list[dict[str, Any]]:
+    """Return the texels of the largest error, beyond three standard errors of the reference, worst first."""
+    size = bake.atlas.resolution
+    found = []
+    for name, check in channels.items():
+        usual = usual_value(check.reference)
+        error = relative_error(check.value, check.reference, usual)
+        noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
+        sure = error - 3.0 * noise / np.maximum(np.maximum(check.reference.mean(axis=1), 0.1 * usual), 1e-12)
+        for i in np.argsort(-sure, kind="stable")[:_WORST]:
+            page, rest = divmod(int(pixel[i]), size * size)
+            instance = bake.scene.instances[int(owner[i])]
+            found.append(
+                {
+                    "object": instance.name,
+                    "node": instance.node,
+                    "channel": name,
+                    "page": page,
+                    "row": rest // size,
+                    "column": rest % size,
+                    "position": position[i].tolist(),
+                    "value": check.value[i].tolist(),
+                    "reference": check.reference[i].tolist(),
+                    "standard_error": noise[i],
+                    "error": error[i],
+                    "sure": float(sure[i]),
+                }
+            )
+    found.sort(key=lambda entry: -entry["sure"])
+    for entry in found:
+        entry["standard_error"], entry["error"] = float(entry["standard_error"]), float(entry["error"])
+        del entry["sure"]
+    return found[:_WORST]

@@ -1,0 +1,149 @@
+"""`baker verify OUT`: how wrong a bake is, against path tracing."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+from baker.cli.app import COMMANDS
+from baker.cli.failures import FAILED_CHECK
+from baker.cli.options import build, common_flags, flag, given, setting_flags
+
+if TYPE_CHECKING:
+    from baker.cli.session import Session
+
+    from baker.verification import Verification
+
+
+def command() -> Any:
+    """Return the subcommand."""
+    out = Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a bake.")]
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    flags = [
+        inspect.Parameter("ctx", keyword, annotation=typer.Context),
+        inspect.Parameter("out", keyword, annotation=out),
+        flag("texels", int, typer.Option("--texels", metavar="N", help="Texels to judge."), 2000),
+        flag(
+            "spp",
+            int | None,
+            typer.Option("--spp", metavar="N", help="Paths for each texel, whatever its error."),
+        ),
+        flag(
+            "target_se",
+            float,
+            typer.Option(
+                "--target-se", metavar="X", help="Relative standard error at which a texel is good enough."
+            ),
+            0.005,
+        ),
+        flag(
+            "time_limit",
+            float | None,
+            typer.Option(
+                "--time-limit", metavar="SECONDS", help="Time for path tracing (40 without --spp, else none)."
+            ),
+        ),
+        flag(
+            "fail_if",
+            str | None,
+            typer.Option(
+                "--fail-if", metavar="EXPR", help='Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".'
+            ),
+        ),
+        flag("report", Path | None, typer.Option("--report", metavar="FILE", help="Write an HTML page.")),
+        flag("junit", Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")),
+        *setting_flags(only={"threads", "seed"}),
+        *common_flags(),
+    ]
+    return build("verify", COMMANDS["verify"], work, flags)
+
+
+def work(
+    *,
+    ctx: typer.Context,
+    out: Path,
+    texels: int,
+    spp: int | None,
+    target_se: float,
+    time_limit: float | None,
+    fail_if: str | None,
+    report: Path | None,
+    junit: Path | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: int,
+    **settings: Any,
+) -> None:
+    """Judge the bake and tell."""
+    from baker.cli.config import resolve
+
+    session: Session = ctx.obj
+    as_json = as_json or session.as_json
+    resolved = resolve(given(settings), None)
+    if time_limit is None and spp is None:
+        time_limit = 40.0
+    with session.reporter(quiet=quiet) as progress:
+        progress("start", 0.0)
+        from baker.verification import VerifySettings, verification_json, verify
+
+        wanted = VerifySettings(
+            texels=texels,
+            spp=spp,
+            target_se=target_se,
+            time_limit=time_limit,
+            fail_if=fail_if,
+            seed=resolved.seed,
+            threads=resolved.threads,
+        )
+        found = verify(out, wanted, progress)
+        if report is not None:
+            from baker.verification.report import write_report
+
+            write_report(report, found)
+        if junit is not None:
+            from baker.verification.cases import write_junit
+
+            write_junit(junit, found)
+    if not quiet:
+        write_text(found, session.text_stream(as_json=as_json), verbose=verbose)
+    if as_json:
+        session.write_json(verification_json(found))
+    if not found.passed:
+        raise typer.Exit(FAILED_CHECK)
+
+
+def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
+    """Write a table of figures, what failed, and the worst texels."""
+    for warning in found.warnings:
+        stream.write(f"warning: {warning.message}\n")
+    columns = ("texels", "bias", "median", "p95", "p99", "nrmse", "noise_floor", "z_rms")
+    stream.write(f"{'':12}" + "".join(f"{name:>13}" for name in columns) + "\n")
+    for name, check in found.channels.items():
+        stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>13}" for c in columns) + "\n")
+        if check.unresolved:
+            share = check.unresolved / max(len(check.value), 1)
+            stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")
+    for entry in found.worst[: None if verbose else 3]:
+        place = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
+        stream.write(
+            f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
+        )
+    for verdict in found.verdicts:
+        if verdict.failed:
+            value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"
+            stream.write(f"failed: {verdict.limit} ({value})\n")
+    for problem in found.problems:
+        stream.write(f"failed: {problem}\n")
+    stream.write(f"{'passed' if found.passed else 'FAILED'} ({found.seconds:.0f} s)\n")
+
+
+def _words(value: Any, name: str) -> str:
+    if value is None:
+        return "-"
+    if name in ("texels",):
+        return str(value)
+    if name == "z_rms":
+        return f"{value:.2f}"
+    return f"{value:+.2%}" if name == "bias" else f"{value:.2%}"

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baker.judge.figures import FIGURES, figures, relative_error, usual_value
+
+
+def test_by_hand():
+    value, truth = np.array([[1.1], [2.0], [2.7]]), np.array([[1.0], [2.0], [3.0]])
+    found = figures(value, truth, standard_error=np.full((3, 1), 0.1))
+    assert list(found) == list(FIGURES)
+    assert found["texels"] == 3
+    assert found["bias"] == pytest.approx(-0.2 / 3 / 2)
+    assert found["rmse"] == pytest.approx(np.sqrt((0.01 + 0.09) / 3))
+    assert found["nrmse"] == pytest.approx(found["rmse"] / 2)
+    assert found["median"] == pytest.approx(0.1)
+    assert found["max"] == pytest.approx(0.1)
+    assert found["relmse"] == pytest.approx((0.01 / 1.04 + 0.09 / 9.04) / 3)
+    assert found["z_rms"] == pytest.approx(np.sqrt((1 + 9) / 3))
+    assert found["noise_floor"] is None
+
+
+def test_dark_places_are_held_against_a_tenth_of_what_is_usual():
+    truth = np.array([[1e-6], [1.0], [1.0]])
+    error = relative_error(truth + 0.01, truth, usual_value(truth))
+    np.testing.assert_allclose(error, [0.1, 0.01, 0.01], rtol=1e-4)
+
+
+def test_noise_floor_is_what_noise_alone_shows():
+    rng = np.random.default_rng(0)
+    truth = np.ones((4000, 1))
+    halves = tuple(truth + 0.02 * rng.standard_normal(truth.shape) for _ in range(2))
+    reference = 0.5 * (halves[0] + halves[1])
+    found = figures(truth, reference, standard_error=np.full(truth.shape, 0.02 / np.sqrt(2)), halves=halves)
+    # A map without any error shows exactly the floor.
+    assert found["median"] == pytest.approx(found["noise_floor"], rel=0.05)
+    assert found["z_rms"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_nothing_judged_has_no_figures():
+    found = figures(np.zeros((0, 3)), np.zeros((0, 3)))
+    assert found["texels"] == 0
+    assert all(found[name] is None for name in FIGURES if name != "texels")
+
+
+def test_a_black_truth_gives_finite_figures():
+    found = figures(np.full((5, 3), 0.5), np.zeros((5, 3)))
+    assert all(np.isfinite(found[name]) for name in ("bias", "rmse", "median", "relmse"))
+    assert usual_value(np.zeros((5, 3))) == 0.0
