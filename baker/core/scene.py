@@ -144,6 +144,27 @@ class PunctualLight:
 
 
 @dataclass(frozen=True)
+class Camera:
+    """A pinhole camera of the file.
+
+    Attributes
+    ----------
+    position : (3,) tuple, metres, world
+    right, up, forward : (3,) tuple, unit, world
+    fov : float
+        Vertical field of view, radians.
+    """
+
+    name: str
+    node: int
+    position: tuple[float, float, float]
+    right: tuple[float, float, float]
+    up: tuple[float, float, float]
+    forward: tuple[float, float, float]
+    fov: float
+
+
+@dataclass(frozen=True)
 class SceneWarning:
     """A finding that does not stop the work: a stable code, a sentence, the object concerned."""
 
@@ -192,6 +213,7 @@ class Scene:
     warnings: tuple[SceneWarning, ...] = ()
     source: SourceDocument | None = None
     sha256: str = ""
+    cameras: tuple[Camera, ...] = ()
 
     @property
     def n_triangles(self) -> int:

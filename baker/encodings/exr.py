@@ -67,8 +67,31 @@ def encode_exr(
         clipped = int((np.abs(pixels) > top).any(axis=2).sum())
         pixels = np.clip(pixels, -top, top)
     stored = pixels.astype(np.float16 if half else np.float32)
-    _write(path, stored, dict(header or {}))
+    names = _NAMES[stored.shape[2]]
+    planes = {name: np.ascontiguousarray(stored[:, :, index]) for index, name in enumerate(names)}
+    _write(path, planes, dict(header or {}))
     return clipped
+
+
+def encode_layers(
+    path: Path, layers: Mapping[str, NDArray[np.float32]], *, header: Mapping[str, str] | None = None
+) -> None:
+    """Write named planes as one EXR of 32 bit numbers.
+
+    Parameters
+    ----------
+    path : Path
+    layers : mapping of channel name to (H, W) float32
+        "R", "G", "B" are the picture; "albedo.R", "depth.Z" and so on lie beside it.
+    header : mapping of str to str
+
+    Raises
+    ------
+    ResourceError
+        If the file cannot be written.
+    """
+    planes = {name: np.ascontiguousarray(plane, np.float32) for name, plane in layers.items()}
+    _write(path, planes, dict(header or {}))
 
 
 def decode_exr(path: Path) -> DecodedImage:
@@ -126,16 +149,14 @@ class ExrEncoding:
 ENCODINGS.register("exr")(ExrEncoding())
 
 
-def _write(path: Path, stored: NDArray[Any], attributes: dict[str, str]) -> None:
+def _write(path: Path, planes: Mapping[str, NDArray[Any]], attributes: dict[str, str]) -> None:
     import OpenEXR
 
     header: dict[str, object] = dict(sorted(attributes.items()))
     header["compression"] = OpenEXR.ZIP_COMPRESSION
     header["type"] = OpenEXR.scanlineimage
-    if stored.shape[2] == 3:
+    if "R" in planes:
         header["chromaticities"] = REC709
-    names = _NAMES[stored.shape[2]]
-    planes = {name: np.ascontiguousarray(stored[:, :, index]) for index, name in enumerate(names)}
     try:
         # OpenEXR keeps the dictionary it is given and empties it, hence the copy.
         with OpenEXR.File(header, dict(planes)) as file:

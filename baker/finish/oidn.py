@@ -1,4 +1,4 @@
-"""Runs Open Image Denoise's lightmap filter; the only file that knows `pyoidn`.
+"""Runs Open Image Denoise's filters; the only file that knows `pyoidn`.
 
 *Measured* with OIDN 2.5.1 on the CPU: the same bytes for 1 and 2 threads, from run to run, and for any
 `memory_mb` (its tiles overlap by the network's whole field of view). The lightmap filter has one network:
@@ -40,6 +40,35 @@ def denoiser_name() -> dict[str, str]:
     }
 
 
+def filter_picture(
+    image: NDArray[np.float32],
+    *,
+    albedo: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    threads: int = 0,
+    progress: Progress = silent,
+) -> NDArray[np.float32]:
+    """Denoise one HDR picture of a camera with what its first hits are made of.
+
+    Parameters
+    ----------
+    image, albedo, normal : (H, W, 3) float32
+    threads, progress : see `filter_lightmap`
+
+    Raises
+    ------
+    ResourceError, Cancelled
+        See `filter_lightmap`.
+    """
+    library = _library()
+    inputs = {
+        library.OIDN_IMAGE_COLOR: image,
+        library.OIDN_IMAGE_ALBEDO: albedo,
+        library.OIDN_IMAGE_NORMAL: normal,
+    }
+    return _run(library, library.OIDN_FILTER_TYPE_RT, inputs, threads, MEMORY_MB, progress, hdr=True)
+
+
 def filter_lightmap(
     image: NDArray[np.float32],
     *,
@@ -72,8 +101,22 @@ def filter_lightmap(
         If `progress` asked to stop.
     """
     library = _library()
-    source = np.ascontiguousarray(image)
-    result = np.zeros_like(source)
+    inputs = {library.OIDN_IMAGE_COLOR: image}
+    return _run(library, library.OIDN_FILTER_TYPE_RT_LIGHTMAP, inputs, threads, memory_mb, progress)
+
+
+def _run(
+    library: Any,
+    kind: Any,
+    inputs: dict[Any, NDArray[np.float32]],
+    threads: int,
+    memory_mb: int,
+    progress: Progress,
+    hdr: bool = False,
+) -> NDArray[np.float32]:
+    """Run one filter over its named input pictures (H, W, 3)."""
+    sources = {name: np.ascontiguousarray(image, np.float32) for name, image in inputs.items()}
+    result = np.zeros_like(sources[library.OIDN_IMAGE_COLOR])
     device = library.Device(library.OIDN_DEVICE_TYPE_CPU)
     try:
         device.set_int("numThreads", threads)
@@ -81,10 +124,13 @@ def filter_lightmap(
         device.set_bool("setAffinity", False)
         device.commit()
         _check(library, device)
-        filter_ = library.Filter(device, library.OIDN_FILTER_TYPE_RT_LIGHTMAP)
+        filter_ = library.Filter(device, kind)
         try:
-            filter_.set_image(library.OIDN_IMAGE_COLOR, source, library.OIDN_FORMAT_FLOAT3)
+            for name, source in sources.items():
+                filter_.set_image(name, source, library.OIDN_FORMAT_FLOAT3)
             filter_.set_image(library.OIDN_IMAGE_OUTPUT, result, library.OIDN_FORMAT_FLOAT3)
+            if hdr:
+                filter_.set_bool("hdr", True)
             filter_.set_int("maxMemoryMB", memory_mb)
             monitor = _Monitor(library, filter_, progress)
             filter_.commit()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
+from baker.io.gltf_camera import read_cameras
 from baker.io.gltf_document import GltfDocument, open_document
 from baker.io.gltf_json import JsonObject
 from baker.io.gltf_light import read_light
@@ -70,6 +71,7 @@ def import_gltf(source: SceneFile) -> Scene:
         warnings=tuple(warnings),
         source=SourceDocument(document.root.value, document.buffers, Path(document.folder)),
         sha256=document.sha256,
+        cameras=tuple(read_cameras(placed, document)),
     )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.reference.estimators import estimator_named
+from baker.reference.estimators import Estimator, estimator_named
 from baker.reference.occlusion import open_rays
 from baker.reference.paths import trace_paths
 from baker.reference.view import Reference
@@ -111,18 +111,7 @@ def irradiance_pass(
     number, samples = estimate.rounds, estimate.samples
     picked = np.arange(len(position)) if chosen is None else chosen
     net = sobol_reversed(samples, seed, 1 + number)
-    setting = np.array(
-        [
-            how.hemisphere,
-            how.aim,
-            int(how.strata or stratify),
-            how.power,
-            -1 if max_bounces is None else max_bounces,
-            seed,
-            number,
-        ],
-        np.int64,
-    )
+    setting = path_setting(how, how.strata or stratify, max_bounces, seed, number)
     counted = np.zeros(-(-len(picked) // _TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
@@ -134,7 +123,7 @@ def irradiance_pass(
             new_caster(reference.rays.tracer), net, setting, out,
         )  # fmt: skip
         counted[begin // _TILE] = sum(cast)
-        _add(estimate, rows, out * (math.pi / samples))
+        add_pass(estimate, rows, out * (math.pi / samples))
 
     run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
     estimate.rounds += 1
@@ -172,14 +161,24 @@ def openness_pass(
             position[rows], normal[rows], face_normal[rows], begin, new_caster(reference.rays.tracer), net,
             shared, reach, least, seed, number, out,
         )  # fmt: skip
-        _add(estimate, rows, out / samples)
+        add_pass(estimate, rows, out / samples)
 
     run_tiles(len(position), 4 * _TILE, work, threads=reference.threads, stage="openness", progress=progress)
     estimate.rounds += 1
     estimate.rays += len(position) * samples
 
 
-def _add(estimate: PointEstimate, rows: NDArray[np.int64], mean: NDArray[np.float64]) -> None:
+def path_setting(
+    how: Estimator, strata: int | bool, max_bounces: int | None, seed: int, number: int
+) -> NDArray[np.int64]:
+    """Return what `trace_paths` calls `how`."""
+    bounces = -1 if max_bounces is None else max_bounces
+    values = [how.hemisphere, how.aim, int(strata), how.power, bounces, seed, number]
+    return np.array(values, np.int64)
+
+
+def add_pass(estimate: PointEstimate, rows: NDArray[np.int64], mean: NDArray[np.float64]) -> None:
+    """Add a pass's means (m, C) of points `rows` to an estimate; `rounds` counts up when all are in."""
     half = estimate.rounds % 2
     estimate.total[half, rows] += mean
     estimate.squares[half, rows] += mean**2

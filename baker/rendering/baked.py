@@ -1,0 +1,84 @@
+"""The light of a bake at points of its surfaces, looked up as an engine does it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.settings import make_settings
+from baker.io.bake_folder import StoredBake, read_bake
+from baker.reference.first_hit import FirstHits
+from baker.reference.vertex import glow
+from baker.reference.view import Reference
+
+
+@dataclass(frozen=True)
+class BakedLight:
+    """A finished bake, ready to light a picture.
+
+    Attributes
+    ----------
+    bake : StoredBake
+    geometry : Geometry
+        With its lightmap uv.
+    sky : (3,) tuple, cd/m2
+    """
+
+    bake: StoredBake
+    geometry: Geometry
+    sky: tuple[float, float, float]
+
+    @classmethod
+    def read(cls, folder: Path) -> BakedLight:
+        """Read an output folder.
+
+        Raises
+        ------
+        InputError
+            If it holds no bake, or one without irradiance.
+        """
+        bake = read_bake(folder)
+        if "irradiance" not in bake.maps:
+            raise InputError("the bake holds no irradiance to light the scene with", file=str(folder))
+        baked = bake.manifest.get("settings", {}).get("sky")
+        sky = make_settings({} if baked is None else {"sky": baked}).sky_radiance
+        return cls(bake, world_geometry(bake.scene, bake.atlas), sky)
+
+    def radiance(self, reference: Reference, hits: FirstHits) -> NDArray[np.float64]:
+        """Return the radiance (n, 3), cd/m2, that leaves hits; 0 where nothing was met or a back is black."""
+        light = np.zeros((len(hits.triangle), 3))
+        lit = np.flatnonzero(hits.lit)
+        triangle, bary = hits.triangle[lit], hits.bary[lit]
+        weight = np.stack([1 - bary.sum(axis=1), bary[:, 0], bary[:, 1]], axis=1)
+        uv = np.einsum("nk,nka->na", weight, self.geometry.uv[self.geometry.triangle[triangle]].astype(float))
+        irradiance = bilinear(self.bake.maps["irradiance"], self.geometry.page[triangle], uv)
+        light[lit] = hits.albedo[lit] * irradiance / math.pi
+        emitter = reference.lamps.emitter[hits.triangle]
+        value, rgba = np.zeros(3), np.zeros(4)
+        for i in np.flatnonzero(hits.lit & (emitter >= 0)):
+            value[:] = reference.lamps.triangle[emitter[i], 15:18]
+            glow(reference.shading, hits.triangle[i], hits.bary[i, 0], hits.bary[i, 1], value, rgba, False)
+            light[i] += value
+        return light
+
+
+def bilinear(
+    pages: NDArray[np.float32], page: NDArray[np.int32], uv: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Look pages (P, H, W, C) up at uv (n, 2), v = 0 being the first row; return (n, C)."""
+    height, width = pages.shape[1:3]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    total = np.zeros((len(uv), pages.shape[3]))
+    for down in range(2):
+        for right in range(2):
+            row, column = np.clip(top + down, 0, height - 1), np.clip(left + right, 0, width - 1)
+            weight = np.abs(1 - down - (y - top)) * np.abs(1 - right - (x - left))
+            total += weight[:, None] * pages[page, row, column]
+    return total

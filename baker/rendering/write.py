@@ -1,0 +1,89 @@
+"""Writes a rendered picture: EXR with its layers, or PNG for people.
+
+PNG: x = L / (L + m) for each colour, m being the median luminance of what is not black, then the sRGB curve; an
+ambient occlusion picture is stored as it is, without any curve.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import ResourceError, SettingsError
+from baker.encodings.exr import encode_layers
+from baker.io.png import encode_png, grey_levels, srgb_levels
+from baker.rendering.render import Picture
+
+SUFFIXES = (".exr", ".png")
+TONE = "L / (L + median luminance), then the sRGB curve"
+
+
+def check_image(path: Path) -> None:
+    """Make sure, before the long work, that a picture may be written to `path`.
+
+    Raises
+    ------
+    SettingsError
+        If its name has another suffix, or it is a folder.
+    ResourceError
+        If nothing can be written there.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise SettingsError(f"a picture ends in {' or '.join(SUFFIXES)}", file=str(path))
+    if path.is_dir():
+        raise SettingsError("this is a folder; name an image file", file=str(path))
+    parent = next(p for p in path.resolve().parents if p.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise ResourceError("nothing can be written there; name another place", file=str(path))
+
+
+def write_picture(path: Path, picture: Picture) -> None:
+    """Write a picture so that it is either whole or not there.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        os.close(handle)
+        try:
+            if path.suffix.lower() == ".png":
+                Path(name).write_bytes(encode_png(tone_mapped(picture)))
+            else:
+                encode_layers(Path(name), _layers(picture), header={"unit": picture.unit})
+            Path(name).chmod(0o644)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise ResourceError(f"the picture cannot be written ({error.strerror})", file=str(path)) from None
+
+
+def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
+    """Return (H, W, 3) uint8; see the head of this file."""
+    colour = picture.colour
+    if picture.unit == "1":
+        return grey_levels(colour)
+    luminance = colour @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    lit = luminance[luminance > 0]
+    middle = float(np.median(lit)) if lit.size else 1.0
+    return srgb_levels(colour / (colour + np.float32(middle)))
+
+
+def _layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
+    named = {"": picture.colour, "variance.": picture.variance}
+    named.update({f"{name}.": layer for name, layer in picture.layers.items()})
+    letters = {"normal.": "XYZ", "depth.": "Z"}
+    return {
+        prefix + letter: layer[..., index]
+        for prefix, layer in named.items()
+        for index, letter in enumerate(letters.get(prefix, "RGB")[: layer.shape[2]])
+    }
