@@ -23,7 +23,8 @@ class FirstHits:
     bary : (n, 2) float64, weights of corners 1 and 2
     depth : (n,) float64, metres along the ray, inf where nothing is met
     albedo : (n, 3) float64
-    position : (n, 3) float64; normal, face_normal : (n, 3) float64, towards the viewer, 0 where nothing is met
+    position : (n, 3) float64
+    normal, face_normal : (n, 3) float64, towards the viewer, 0 where nothing is met
     front : (n,) bool, the triangle's front is seen
     lit : (n,) bool, the side seen reflects: a front, or of a two-sided surface
     """
@@ -80,7 +81,8 @@ def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth
             valid[lane] = -1 if i < len(way) else 0
             if i < len(way):
                 set_ray(
-                    floats, words, width, lane, origin[0], origin[1], origin[2], way[i, 0], way[i, 1], way[i, 2],
+                    floats, words, width, lane, origin[0], origin[1], origin[2],
+                    way[i, 0], way[i, 1], way[i, 2],
                     np.float32(1.0e30),
                 )  # fmt: skip
         trace(intersect, scene, valid, floats)

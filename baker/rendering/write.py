@@ -1,7 +1,7 @@
 """Writes a rendered picture: EXR with its layers, or PNG for people.
 
-PNG: x = L / (L + m) for each colour, m being the median luminance of what is not black, then the sRGB curve; an
-ambient occlusion picture is stored as it is, without any curve.
+PNG: x = L / (L + m) for each colour, m being the median luminance of what is not black, then the sRGB curve;
+an ambient occlusion picture is stored as it is, without any curve.
 """
 
 from __future__ import annotations

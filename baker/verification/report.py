@@ -84,8 +84,8 @@ def _figures_table(found: Verification) -> str:
         cells = "".join(f"<td>{_number(check.figures[key])}</td>" for key in FIGURES)
         rows += f"<tr><td>{name}</td>{cells}<td>{_number(mean_flip(found, name))}</td></tr>"
     note = (
-        "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's own "
-        "noise adds to the median. flip is the mean over the pictures of the worst places below.</p>"
+        "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's "
+        "own noise adds to the median. flip is the mean over the pictures of the worst places below.</p>"
     )
     return f"<table><tr><th>channel</th>{head}</tr>{rows}</table>{note}"
 

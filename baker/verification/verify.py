@@ -39,8 +39,8 @@ DEFAULT_LIMITS = (
     "irradiance.median > 0.03, irradiance.bias > 0.03, irradiance.nrmse > 0.5, "
     "ao.median > 0.03, ao.bias > 0.03, ao.rmse > 0.05"
 )
-# An object whose mean is off by more fails on its own, if so many of its texels were judged and it is not in the
-# dark (this share of what is usual).
+# An object whose mean is off by more fails on its own, if so many of its texels were judged and it is not in
+# the dark (this share of what is usual).
 _OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_LIGHT = 0.25, 8, 0.1
 _EXPONENT = 0.1
 

@@ -44,8 +44,10 @@ def agree(mean, error, truth, *, within=0.002):
 
 @pytest.mark.parametrize(
     ("estimator", "albedo", "passes"),
-    [("uniform", 0.2, 16), ("uniform", 0.5, 24), ("cosine", 0.5, 16), ("cosine", 0.8, 48)]
-    + [("mis", 0.2, 16), ("mis", 0.5, 16), ("mis", 0.8, 48), ("mis", 0.95, 64)],
+    [
+        *(("uniform", 0.2, 16), ("uniform", 0.5, 24), ("cosine", 0.5, 16), ("cosine", 0.8, 48)),
+        *(("mis", 0.2, 16), ("mis", 0.5, 16), ("mis", 0.8, 48), ("mis", 0.95, 64)),
+    ],
 )
 def test_furnace(estimator, albedo, passes):
     # Every wall emits 1 / pi: E = 1 / (1 - albedo) everywhere.
@@ -97,9 +99,9 @@ def sphere_scene(light, albedo=0.5, level=3):
 def test_integrating_sphere_with_a_point_light():
     light = PunctualLight("point", "lamp", 0, (1.0, 1.0, 1.0), (0.3, 0.0, 0.0))
     scene, centre, face = sphere_scene(light)
-    area = 0.5 * np.linalg.norm(
-        np.cross(*(scene.meshes[0].position.reshape(-1, 3, 3)[:, i] - scene.meshes[0].position.reshape(-1, 3, 3)[:, 0]
-                   for i in (1, 2))), axis=1)  # fmt: skip
+    corner = scene.meshes[0].position.reshape(-1, 3, 3)
+    side = corner[:, 1:] - corner[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(side[:, 0], side[:, 1]), axis=1)
     position, up = centre[:, None].astype(float), face[:, None].astype(float)
     with build_reference(scene, lambertian=True, threads=2) as reference:
         estimate = new_estimate(len(position), 3)

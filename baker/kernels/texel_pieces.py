@@ -1,0 +1,106 @@
+"""Pieces of triangles inside texels, for a judge who shares no code with the baker's own raster.
+
+Triangles are cut to a texel's square one by one (Sutherland and Hodgman, 1974, by way of `clip`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, polygon_point
+
+
+@njit(cache=True, error_model="numpy")
+def _box(corner, size):  # type: ignore[no-untyped-def]
+    """Return first column, last column, first row, last row of texels that a triangle (3, 2) may touch."""
+    low_x, high_x = min(corner[:, 0]), max(corner[:, 0])
+    low_y, high_y = min(corner[:, 1]), max(corner[:, 1])
+    return (
+        max(math.floor(low_x), 0), min(math.floor(high_x), size - 1),
+        max(math.floor(low_y), 0), min(math.floor(high_y), size - 1),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def texel_owners(uv, triangle, page, instance, size, owner, most):  # type: ignore[no-untyped-def]
+    """Write to `owner` the instance that covers most of each pixel; `most` is that area, in texels."""
+    corner = np.zeros((3, 2))
+    cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
+    for t in range(len(triangle)):
+        for j in range(3):
+            corner[j, 0] = uv[triangle[t, j], 0] * size
+            corner[j, 1] = uv[triangle[t, j], 1] * size
+        left, right, top, bottom = _box(corner, size)
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                pixel = (np.int64(page[t]) * size + y) * size + x
+                inside = polygon_area(cut, clip_to_square(corner, x, y, cut, spare))
+                if inside > most[pixel]:
+                    most[pixel] = inside
+                    owner[pixel] = instance[t]
+
+
+@njit(cache=True, error_model="numpy")
+def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):  # type: ignore[no-untyped-def]
+    """Count the pieces of triangles inside wanted texels (no `write`), or store them from `at` on."""
+    corner = np.zeros((3, 2))
+    cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
+    for t in range(len(triangle)):
+        for j in range(3):
+            corner[j, 0] = uv[triangle[t, j], 0] * size
+            corner[j, 1] = uv[triangle[t, j], 1] * size
+        left, right, top, bottom = _box(corner, size)
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                i = wanted[(np.int64(page[t]) * size + y) * size + x]
+                if i < 0:
+                    continue
+                n = clip_to_square(corner, x, y, cut, spare)
+                inside = polygon_area(cut, n)
+                if inside <= 0.0:
+                    continue
+                if len(write):
+                    k = at[i]
+                    piece[k], corners[k], area[k] = t, n, inside
+                    polygon[k] = cut
+                at[i] += 1
+
+
+@njit(cache=True, error_model="numpy")
+def spread_pieces(  # type: ignore[no-untyped-def]
+    uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered
+):
+    """Choose places uniform in the area of a texel's pieces: their triangles, weights and area in all."""
+    for i in range(len(pixel)):
+        first, last = start[i], start[i + 1]
+        total = 0.0
+        for e in range(first, last):
+            total += area[e]
+        covered[i] = total
+        rest = pixel[i] % (size * size)
+        for k in range(random.shape[1]):
+            left = random[i, k, 0] * total
+            e = first
+            while e < last - 1 and left >= area[e]:
+                left -= area[e]
+                e += 1
+            if e >= last:
+                continue
+            x, y = polygon_point(polygon[e], corners[e], random[i, k, 1], random[i, k, 2])
+            x += rest % size
+            y += rest // size
+            t = piece[e]
+            a, b, c = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+            ax, ay = float(uv[a, 0]) * size, float(uv[a, 1]) * size
+            bx, by = uv[b, 0] * size - ax, uv[b, 1] * size - ay
+            cx, cy = uv[c, 0] * size - ax, uv[c, 1] * size - ay
+            det = bx * cy - by * cx
+            w1 = w2 = 1.0 / 3.0
+            if det != 0.0:
+                w1 = min(max(((x - ax) * cy - (y - ay) * cx) / det, 0.0), 1.0)
+                w2 = min(max((bx * (y - ay) - by * (x - ax)) / det, 0.0), 1.0 - w1)
+            found[i, k] = t
+            weight[i, k, 0], weight[i, k, 1], weight[i, k, 2] = 1.0 - w1 - w2, w1, w2
