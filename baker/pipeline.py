@@ -112,8 +112,9 @@ def bake(
     channels = _channels(settings)
     folder = None if out is None else Path(out)
     if folder is not None:
-        from baker.io.output import check_out
+        from baker.io.output import check_encodings, check_out
 
+        check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record = Record(progress)
     compiling = warm.start()

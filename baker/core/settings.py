@@ -15,6 +15,9 @@ from baker.core.errors import SettingsError
 # Hemisphere rays per texel for each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
+# Settings that are lists of names: with commas on the command line.
+_LISTS = {"channels", "encode"}
+
 
 class BakeSettings(BaseModel):
     """Holds all settings of a bake, checked."""
@@ -48,6 +51,13 @@ class BakeSettings(BaseModel):
     )
     denoise: bool = Field(True, description="Denoise with Open Image Denoise.")
     dtype: Literal["half", "float"] = Field("half", description="Number format of the EXR files.")
+    exr_compression: Literal["zip", "piz"] = Field("zip", description="Compression of the EXR files.")
+    encode: tuple[str, ...] = Field(
+        (), description="Further files of each page: `hdr`, `rgbm` (colours); `png8`, `png16` (AO)."
+    )
+    rgbm_range: str = Field(
+        "auto", description="Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel."
+    )
     up: Literal["y", "z"] = Field("y", description="Up axis of OBJ, PLY, STL and OFF files.")
     scale: float = Field(1.0, gt=0, description="Metres per unit of OBJ, PLY, STL and OFF files.")
     seed: int = Field(0, ge=0, le=2**31 - 1, description="Seed of all random numbers.")
@@ -78,6 +88,19 @@ class BakeSettings(BaseModel):
                 f"ao_distance '{self.ao_distance}' is not a positive number of metres, a percentage or inf"
             )
         return reach
+
+    def rgbm_top(self, brightest: float) -> float:
+        """Return the irradiance that RGBM stores as all ones, for a map with this brightest value."""
+        text = self.rgbm_range.strip()
+        if text == "auto":
+            return brightest if brightest > 0 else 1.0
+        try:
+            top = float(text)
+        except ValueError:
+            top = -1.0
+        if not 0 < top < float("inf"):
+            raise SettingsError(f"rgbm_range '{self.rgbm_range}' is neither auto nor a number of lx above 0")
+        return top
 
 
 def parse_sky(text: str) -> tuple[float, float, float]:
@@ -114,11 +137,11 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
             near = get_close_matches(name, known, n=1)
             hint = f"; did you mean '{near[0]}'?" if near else f"; known settings are {', '.join(known)}"
             raise SettingsError(f"there is no setting '{key}'{hint}", object=key)
-        if name in {"ao_distance", "sky"} and isinstance(value, int | float):
+        if name in {"ao_distance", "sky", "rgbm_range"} and isinstance(value, int | float):
             value = str(value)
         if name == "sky" and isinstance(value, list | tuple):
             value = ",".join(str(v) for v in value)
-        if name == "channels" and isinstance(value, str):
+        if name in _LISTS and isinstance(value, str):
             value = [part.strip() for part in value.split(",") if part.strip()]
         clean[name] = value
     try:
@@ -130,6 +153,7 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
     if settings.sky is not None:
         parse_sky(settings.sky)
     settings.ao_reach(1.0)
+    settings.rgbm_top(1.0)
     if not settings.channels:
         raise SettingsError("channels names nothing to bake", object="channels")
     return settings

@@ -1,14 +1,13 @@
-"""OpenEXR: half or float numbers, ZIP, scanlines, channels R G B or Y.
+"""OpenEXR: half or float numbers, ZIP or PIZ, scanlines, channels R G B or Y.
 
-Those are the choices that every engine and viewer reads. Files carry no time stamp, so the same pixels
-give the same bytes.
+Those are the choices that every engine and viewer reads; PXR24, B44 and DWA are not. Files carry no time
+stamp, so the same pixels give the same bytes.
 
 Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Standard Optional Attributes").
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage
+from baker.core.encoding import ENCODINGS, DecodedImage, EncodeOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
 
 # The largest finite half.
@@ -29,7 +28,12 @@ _NAMES = {1: ("Y",), 3: ("R", "G", "B")}
 
 
 def encode_exr(
-    path: Path, pixels: NDArray[np.float32], *, half: bool = True, header: Mapping[str, str] | None = None
+    path: Path,
+    pixels: NDArray[np.float32],
+    *,
+    half: bool = True,
+    compression: str = "zip",
+    header: Mapping[str, str] | None = None,
 ) -> int:
     """Write one image and read it back to be sure that all of it reached the disk.
 
@@ -39,6 +43,8 @@ def encode_exr(
     pixels : (H, W, C) float32, linear Rec.709 for C = 3, C is 1 or 3, row 0 on top
     half : bool
         16 bit numbers; otherwise 32 bit.
+    compression : str
+        "zip" or "piz"; neither loses anything.
     header : mapping of str to str
         Further attributes, like quantity and unit.
 
@@ -54,22 +60,16 @@ def encode_exr(
     ResourceError
         If the file cannot be written.
     """
-    if pixels.ndim != 3 or pixels.shape[2] not in _NAMES or 0 in pixels.shape:
-        raise ValueError(f"pixels of shape {pixels.shape} are neither (H, W, 1) nor (H, W, 3)")
-    # One look at the extremes (NaN shows in them) is all that most pages need.
-    low, high = float(pixels.min()), float(pixels.max())
-    if math.isnan(low) or math.isnan(high):
-        count = int(np.isnan(pixels).any(axis=2).sum())
-        raise ValueError(f"{count} texels are not a number; {path.name} is not written")
-    top = HALF_MAX if half else float(np.finfo(np.float32).max)
+    check_pixels(pixels, (1, 3), path.name)
+    top = _top(half)
     clipped = 0
-    if low < -top or high > top:
+    if pixels.min() < -top or pixels.max() > top:
         clipped = int((np.abs(pixels) > top).any(axis=2).sum())
         pixels = np.clip(pixels, -top, top)
     stored = pixels.astype(np.float16 if half else np.float32)
     names = _NAMES[stored.shape[2]]
     planes = {name: np.ascontiguousarray(stored[:, :, index]) for index, name in enumerate(names)}
-    _write(path, planes, dict(header or {}))
+    _write(path, planes, dict(header or {}), compression)
     return clipped
 
 
@@ -91,7 +91,7 @@ def encode_layers(
         If the file cannot be written.
     """
     planes = {name: np.ascontiguousarray(plane, np.float32) for name, plane in layers.items()}
-    _write(path, planes, dict(header or {}))
+    _write(path, planes, dict(header or {}), "zip")
 
 
 def decode_exr(path: Path) -> DecodedImage:
@@ -134,12 +134,27 @@ class ExrEncoding:
     """Files `encode_exr` and `decode_exr` under the name `exr`."""
 
     suffix = ".exr"
+    components = (1, 3)
+
+    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+        """Return the ends of the number format."""
+        return -_top(options.half), _top(options.half)
+
+    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+        """Return pixels rounded to the number format."""
+        clipped = np.clip(pixels, *self.limits(options))
+        return clipped.astype(np.float16).astype(np.float32) if options.half else clipped
+
+    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
+        """Half the step of a half: 2^-11 of the value, 2^-25 near zero; nothing for 32 bit."""
+        size = np.abs(pixels.astype(np.float64))
+        return np.maximum(size * 2.0**-11, 2.0**-25) if options.half else np.zeros_like(size)
 
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, half: bool, header: Mapping[str, str]
-    ) -> int:
+        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+    ) -> None:
         """Write pixels; see `encode_exr`."""
-        return encode_exr(path, pixels, half=half, header=header)
+        encode_exr(path, pixels, half=options.half, compression=options.compression, header=header)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read pixels; see `decode_exr`."""
@@ -149,11 +164,18 @@ class ExrEncoding:
 ENCODINGS.register("exr")(ExrEncoding())
 
 
-def _write(path: Path, planes: Mapping[str, NDArray[Any]], attributes: dict[str, str]) -> None:
+def _top(half: bool) -> float:
+    return HALF_MAX if half else float(np.finfo(np.float32).max)
+
+
+def _write(
+    path: Path, planes: Mapping[str, NDArray[Any]], attributes: dict[str, str], compression: str
+) -> None:
     import OpenEXR
 
+    methods = {"zip": OpenEXR.ZIP_COMPRESSION, "piz": OpenEXR.PIZ_COMPRESSION}
     header: dict[str, object] = dict(sorted(attributes.items()))
-    header["compression"] = OpenEXR.ZIP_COMPRESSION
+    header["compression"] = methods[compression]
     header["type"] = OpenEXR.scanlineimage
     if "R" in planes:
         header["chromaticities"] = REC709

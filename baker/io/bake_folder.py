@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas, InstanceLayout
-from baker.core.encoding import ENCODINGS
+from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene, SceneWarning
 from baker.io.load import load_scene
@@ -124,7 +124,7 @@ def _pages(folder: Path, pages: list[dict[str, Any]], channel: str) -> NDArray[n
     images = []
     for entry in sorted((p for p in pages if p["channel"] == channel), key=lambda p: int(p["page"])):
         path = _present(folder, entry["file"])
-        encoding = next((e for e in _encodings() if e.suffix == path.suffix.lower()), None)
+        encoding = encoding_of(path.name)
         if encoding is None:
             raise InputError(f"'{path.suffix}' is not a known image format", file=str(path))
         pixels = encoding.decode(path).pixels
@@ -134,10 +134,6 @@ def _pages(folder: Path, pages: list[dict[str, Any]], channel: str) -> NDArray[n
             raise InputError(message, file=str(path))
         images.append(pixels)
     return np.stack(images)
-
-
-def _encodings() -> list[Any]:
-    return [encoding for name in ENCODINGS.names() if (encoding := ENCODINGS.get(name)) is not None]
 
 
 def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) -> InstanceLayout:

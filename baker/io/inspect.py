@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from baker.core.encoding import ENCODINGS
+from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene
 from baker.io.output_folder import MANIFEST_NAME, own_files
@@ -40,10 +40,9 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
         path = path.parent
     if path.is_dir():
         return _bake(path)
-    for name in ENCODINGS.names():
-        encoding = ENCODINGS.get(name)
-        if encoding is not None and path.suffix.lower() == encoding.suffix:
-            return _image(path, encoding.decode(path))
+    encoding = encoding_of(path.name)
+    if encoding is not None:
+        return _image(path, encoding.decode(path))
     from baker.io.load import load_scene
 
     return _scene(path, load_scene(path))

@@ -36,7 +36,7 @@ def make_manifest(
     pages: list[dict[str, Any]],
     files: list[dict[str, Any]],
     instance_mesh: tuple[int, ...],
-    clipped: dict[str, int],
+    warnings: tuple[SceneWarning, ...] = (),
     created: datetime | None = None,
 ) -> dict[str, Any]:
     """Return the manifest of a bake as plain JSON values.
@@ -47,13 +47,13 @@ def make_manifest(
     out : Path
         The folder that the input's path is relative to.
     pages : list of dict
-        One entry {channel, page, file, sha256, width, height, unit} for each image.
+        One entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of a channel.
     files : list of dict
         Every file of the folder but the manifest: {file, sha256}.
     instance_mesh : tuple of int
         Mesh of each instance in `scene.glb`.
-    clipped : dict of channel to count
-        Texels that did not fit the number format.
+    warnings : tuple of SceneWarning
+        What writing the maps found.
     created : datetime or None
         Time of writing; None is now.
 
@@ -76,10 +76,13 @@ def make_manifest(
         "rays": result.rays,
         "solve": result.solve,
         "statistics": {
-            channel: {**_statistics(result, channel), "clipped": clipped.get(channel, 0)}
+            channel: {
+                **_statistics(result, channel),
+                "clipped": sum(int(page["clipped"]) for page in pages if page["channel"] == channel),
+            }
             for channel in result.lightmaps
         },
-        "warnings": _warnings(result, clipped),
+        "warnings": _warnings(result, warnings),
         "denoise": result.denoise,
         "files": files,
     }
@@ -207,14 +210,8 @@ def _statistics(result: BakeResult, channel: str) -> dict[str, Any]:
     }
 
 
-def _warnings(result: BakeResult, clipped: dict[str, int]) -> list[dict[str, str]]:
-    found = [*result.scene.warnings, *result.atlas.warnings, *result.warnings]
-    for channel, count in clipped.items():
-        if count:
-            message = (
-                f"{count} texels are brighter than {result.settings.dtype} numbers reach and were clipped"
-            )
-            found.append(SceneWarning("clipped", f"{message}; use --dtype float", channel))
+def _warnings(result: BakeResult, more: tuple[SceneWarning, ...]) -> list[dict[str, str]]:
+    found = [*result.scene.warnings, *result.atlas.warnings, *result.warnings, *more]
     return [{"code": w.code, "message": w.message, "object": w.object} for w in dict.fromkeys(found)]
 
 

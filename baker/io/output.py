@@ -8,10 +8,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from baker.core.encoding import ENCODINGS
-from baker.core.errors import ResourceError
+from baker.core.encoding import ENCODINGS, EncodeOptions, Encoding, Loss, measure_loss
+from baker.core.errors import ResourceError, SettingsError
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.progress import Progress, report, silent
+from baker.core.scene import SceneWarning
 from baker.io.gltf_write import make_glb
 from baker.io.manifest import make_manifest, manifest_text
 from baker.io.output_folder import MANIFEST_NAME, OutputFolder, check_out, remove_leftovers
@@ -27,6 +28,9 @@ STATUS_COLOURS = {
     TexelStatus.INVALID: (230, 159, 0),
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
+
+# Fewer banded texels than this share of a page are told in the manifest, but not warned of.
+BANDED_SHARE = 0.01
 
 _QUANTITY = {
     "irradiance": "irradiance E on the surface, direct and indirect, without the receiver's albedo",
@@ -102,21 +106,20 @@ def _write_files(
     steps = n_pages * (len(result.lightmaps) + 1) + 1
     pages: list[dict[str, Any]] = []
     files: list[dict[str, Any]] = []
-    clipped: dict[str, int] = {}
-    for channel, lightmap in result.lightmaps.items():
-        clipped[channel] = 0
+    warnings: list[SceneWarning] = []
+    for lightmap in result.lightmaps.values():
         for page in range(len(lightmap.value)):
-            entry, count = _write_page(result, lightmap, page, folder.path)
-            clipped[channel] += count
+            entry, found = _write_page(result, lightmap, page, folder.path)
+            warnings += found
             pages.append(entry)
-            files.append({"file": entry["file"], "sha256": entry["sha256"]})
-            report(progress, "write", len(files) / steps, entry["file"])
+            files += [{"file": e["file"], "sha256": e["sha256"]} for e in (entry, *entry["encodings"])]
+            report(progress, "write", len(pages) / steps, entry["file"])
     for page in range(n_pages):
         legend = ", ".join(f"{status.value} {status.name.lower()}" for status in TexelStatus)
         colours = {status.value: colour for status, colour in STATUS_COLOURS.items()}
         data = encode_palette_png(result.status[page], colours, {"Legend": legend, "Software": _signature()})
         files.append(_write_data(folder.path, f"status_{page}.png", data))
-        report(progress, "write", len(files) / steps, files[-1]["file"])
+        report(progress, "write", (len(pages) + page + 1) / steps, files[-1]["file"])
     ao = result.lightmaps.get("ao")
     ao_png = {p: encode_png(grey_levels(ao.value[p, :, :, 0])) for p in range(len(ao.value))} if ao else None
     glb = make_glb(result.scene, result.atlas, ao_png)
@@ -128,7 +131,7 @@ def _write_files(
         pages=pages,
         files=files,
         instance_mesh=glb.instance_mesh,
-        clipped=clipped,
+        warnings=tuple(warnings),
         created=created,
     )
     (folder.path / MANIFEST_NAME).write_text(manifest_text(manifest), "utf-8", newline="\n")
@@ -137,28 +140,103 @@ def _write_files(
 
 def _write_page(
     result: BakeResult, lightmap: Lightmap, page: int, folder: Path
-) -> tuple[dict[str, Any], int]:
-    """Write one page of a channel; return its manifest entry and the texels that were clipped."""
-    encoding = ENCODINGS.get("exr")
-    if encoding is None:
-        raise ResourceError("the EXR encoding is missing from this installation; install baker again")
-    name = f"{lightmap.channel}_{page}{encoding.suffix}"
+) -> tuple[dict[str, Any], list[SceneWarning]]:
+    """Write one page of a channel in all formats; return its manifest entry and what got lost."""
     value = lightmap.value[page]
+    height, width, components = value.shape
     quantity = _QUANTITY.get(lightmap.channel, lightmap.channel)
-    colour_space = "linear Rec.709, D65" if value.shape[2] == 3 else "none"
+    colour_space = "linear Rec.709, D65" if components == 3 else "none"
     header = {
         "quantity": quantity,
         "unit": lightmap.unit,
         "colourSpace": colour_space,
         "software": _signature(),
     }
-    count = encoding.encode(folder / name, value, half=result.settings.dtype == "half", header=header)
-    with (folder / name).open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    height, width = value.shape[:2]
-    entry: dict[str, Any] = {"channel": lightmap.channel, "page": page, "file": name, "sha256": digest}
-    entry |= {"width": width, "height": height, "unit": lightmap.unit}
-    return {**entry, "quantity": quantity, "colour_space": colour_space}, count
+    settings = result.settings
+    surface = result.status[page] != TexelStatus.EMPTY
+    entries: list[dict[str, Any]] = []
+    warnings: list[SceneWarning] = []
+    for name in ("exr", *settings.encode):
+        encoding = encoding_named(name)
+        if components not in encoding.components:
+            continue
+        top = settings.rgbm_top(float(lightmap.value.max(initial=0.0)))
+        options = EncodeOptions(settings.dtype == "half", settings.exr_compression, top)
+        file = f"{lightmap.channel}_{page}{encoding.suffix}"
+        encoding.encode(folder / file, value, options=options, header=header)
+        with (folder / file).open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        loss = measure_loss(encoding, value, surface, options)
+        warnings += _told(loss, file, lightmap.channel, name)
+        low, high = encoding.limits(options)
+        entry: dict[str, Any] = {"encoding": name, "file": file, "sha256": digest}
+        entries.append({**entry, "min": low, "max": high, "clipped": loss.clipped, "banded": loss.banded})
+    exr, *others = entries
+    page_entry: dict[str, Any] = {"channel": lightmap.channel, "page": page, **exr}
+    for key in ("encoding", "min", "max"):
+        del page_entry[key]
+    page_entry |= {"width": width, "height": height, "unit": lightmap.unit}
+    page_entry |= {"quantity": quantity, "colour_space": colour_space, "encodings": others}
+    return page_entry, warnings
+
+
+def encoding_named(name: str) -> Encoding:
+    """Return the encoding of that name.
+
+    Raises
+    ------
+    SettingsError
+        If there is none.
+    """
+    encoding = ENCODINGS.get(name)
+    if encoding is None:
+        known = ", ".join(other for other in ENCODINGS.names() if other != "exr")
+        raise SettingsError(f"there is no encoding '{name}'; known are {known}", object="encode")
+    return encoding
+
+
+def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
+    """Make sure, before the long work, that each encoding asked for has a channel to hold.
+
+    Parameters
+    ----------
+    names : tuple of str
+    components : dict of channel to its number of components
+
+    Raises
+    ------
+    SettingsError
+    """
+    for name in names:
+        encoding = encoding_named(name)
+        if name == "exr":
+            raise SettingsError("exr is written in any case; name further formats only", object="encode")
+        if not set(encoding.components) & set(components.values()):
+            number = "three" if encoding.components == (3,) else "one"
+            message = f"'{name}' holds maps of {number} component(s), and no such channel is baked"
+            raise SettingsError(message, object="encode")
+
+
+_REMEDY = {
+    "exr": "use --dtype float",
+    "rgbm": "raise --rgbm-range or set it to auto",
+    "png8": "use png16 or the EXR",
+}
+
+
+def _told(loss: Loss, file: str, channel: str, encoding: str) -> list[SceneWarning]:
+    """Return the warnings that a page's loss deserves."""
+    warnings = []
+    remedy = _REMEDY.get(encoding, "use the EXR")
+    if loss.clipped:
+        message = f"{file}: {loss.clipped} texels are outside the range of the format and were clipped"
+        warnings.append(SceneWarning("clipped", f"{message}; {remedy}", channel))
+    if loss.banded > BANDED_SHARE * loss.surface:
+        share = 100.0 * loss.banded / loss.surface
+        message = f"{file}: steps of the format show in {share:.1f} % of the texels"
+        remedy = "lower --rgbm-range or use the EXR" if encoding == "rgbm" else remedy
+        warnings.append(SceneWarning("banding", f"{message}; {remedy}", channel))
+    return warnings
 
 
 def _write_data(folder: Path, name: str, data: bytes) -> dict[str, Any]:

@@ -7,18 +7,59 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.errors import InputError
 
-def encode_png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return a PNG of (H, W) grey, (H, W, 3) RGB or (H, W, 4) RGBA uint8 pixels, row 0 on top."""
+
+def encode_png(pixels: NDArray[np.unsignedinteger], text: Mapping[str, str] | None = None) -> bytes:
+    """Return a PNG, row 0 on top.
+
+    Parameters
+    ----------
+    pixels : (H, W) grey, (H, W, 3) RGB or (H, W, 4) RGBA uint8; or (H, W) grey uint16
+    text : mapping of str to str, optional
+        Text chunks.
+    """
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, "PNG")
+    Image.fromarray(pixels).save(stream, "PNG", pnginfo=_chunks(text or {}))
     return stream.getvalue()
+
+
+def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger], dict[str, str]]:
+    """Read the numbers of a PNG without a palette, as they are stored, and its text chunks.
+
+    Returns
+    -------
+    pixels : (H, W) or (H, W, C) uint8, or (H, W) uint16, row 0 on top
+    text : dict of str to str
+
+    Raises
+    ------
+    InputError
+        If the file is absent, or no such PNG.
+    """
+    from PIL import Image, PngImagePlugin, UnidentifiedImageError
+
+    try:
+        with Image.open(path, formats=["PNG"]) as image:
+            image.load()
+            assert isinstance(image, PngImagePlugin.PngImageFile)
+            if image.mode not in ("L", "RGB", "RGBA", "I;16", "I"):
+                raise InputError(f"its pixels are of the kind {image.mode}", file=str(path))
+            pixels = np.array(image)
+            text = {str(key): str(value) for key, value in image.text.items()}
+    except FileNotFoundError:
+        raise InputError("there is no such file", file=str(path)) from None
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"this is not a readable PNG image ({error})", file=str(path)) from None
+    return (pixels.astype(np.uint16) if pixels.dtype != np.uint8 else pixels), text
 
 
 def encode_palette_png(
@@ -34,7 +75,7 @@ def encode_palette_png(
     text : mapping of str to str
         Text chunks.
     """
-    from PIL import Image, PngImagePlugin
+    from PIL import Image
 
     # All 256 places, so that a texel takes eight bits and a reader of raw bytes finds the number itself.
     palette = np.zeros((256, 3), np.uint8)
@@ -42,11 +83,8 @@ def encode_palette_png(
         palette[number] = colour
     image = Image.fromarray(index)
     image.putpalette(palette.ravel().tolist())
-    info = PngImagePlugin.PngInfo()
-    for key, value in text.items():
-        info.add_text(key, value)
     stream = io.BytesIO()
-    image.save(stream, "PNG", pnginfo=info)
+    image.save(stream, "PNG", pnginfo=_chunks(text))
     return stream.getvalue()
 
 
@@ -80,3 +118,12 @@ def decode_palette_png(data: bytes) -> NDArray[np.uint8]:
             return np.array(image, np.uint8)
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
         raise ValueError(str(error)) from None
+
+
+def _chunks(text: Mapping[str, str]) -> Any:
+    from PIL import PngImagePlugin
+
+    info = PngImagePlugin.PngInfo()
+    for key, value in sorted(text.items()):
+        info.add_text(key, value)
+    return info

@@ -8,16 +8,20 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from glb_reader import Glb
 from io_scenes import quad_result
 from PIL import Image
 
+from baker.core.encoding import ENCODINGS, EncodeOptions
 from baker.core.errors import Cancelled, ResourceError, SettingsError
+from baker.core.lightmap import TexelStatus
 from baker.encodings.exr import decode_exr
 from baker.io import output, output_folder
-from baker.io.output import OutputFolder, check_out, remove_leftovers, write_bake
+from baker.io.manifest import manifest_schema
+from baker.io.output import OutputFolder, check_encodings, check_out, remove_leftovers, write_bake
 
 NOON = datetime(2024, 1, 2, 12, 0, tzinfo=UTC)
 NAMES = ["ao_0.exr", "bake.json", "irradiance_0.exr", "scene.glb", "status_0.png"]
@@ -312,3 +316,67 @@ def test_a_place_that_cannot_be_written_is_found_before_the_work(
     # The folder itself may be written to, though it cannot be renamed.
     write_bake(quad_result(tmp_path / "in"), out)
     assert names(out) == NAMES
+
+
+def test_further_encodings_lie_beside_the_exr(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in", encode="hdr,rgbm,png8,png16", rgbm_range=40)
+    result.lightmaps["irradiance"].value[0, 3, 4:9, 1] = 41.0
+    status = result.status
+    status[:] = TexelStatus.COVERED
+    out = tmp_path / "out"
+    manifest = write_bake(result, out)
+    listed = {entry["file"]: entry["sha256"] for entry in manifest["files"]}
+    assert set(listed) | {"bake.json"} == set(names(out))
+    jsonschema.validate(manifest, manifest_schema())
+    pages = {page["channel"]: page for page in manifest["pages"]}
+    assert [e["encoding"] for e in pages["irradiance"]["encodings"]] == ["hdr", "rgbm"]
+    assert [e["encoding"] for e in pages["ao"]["encodings"]] == ["png8", "png16"]
+    for page in pages.values():
+        for entry in page["encodings"]:
+            encoding = ENCODINGS.get(entry["encoding"])
+            assert encoding is not None
+            assert listed[entry["file"]] == entry["sha256"]
+            options = EncodeOptions(top=entry["max"])
+            value = result.lightmaps[page["channel"]].value[0]
+            assert np.array_equal(
+                encoding.decode(out / entry["file"]).pixels, encoding.stored(value, options)
+            )
+    rgbm = pages["irradiance"]["encodings"][1]
+    assert (rgbm["min"], rgbm["max"]) == (0.0, 40.0)
+    value = result.lightmaps["irradiance"].value[0]
+    assert rgbm["clipped"] == int((value > 40).any(axis=2).sum()) > 5
+    assert [w["message"] for w in manifest["warnings"] if w["code"] == "clipped"] == [
+        f"irradiance_0.rgbm.png: {rgbm['clipped']} texels are outside the range of the format "
+        "and were clipped; raise --rgbm-range or set it to auto"
+    ]
+
+
+def test_steps_that_show_are_warned_of(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in", encode="png8,png16")
+    result.status[:] = TexelStatus.COVERED
+    result.lightmaps["ao"].value[0, :8] = np.linspace(0.0105, 0.0131, 128, dtype=np.float32).reshape(8, 16, 1)
+    manifest = write_bake(result, tmp_path / "out")
+    found = [w for w in manifest["warnings"] if w["code"] == "banding"]
+    assert len(found) == 1
+    assert found[0]["object"] == "ao"
+    assert found[0]["message"].startswith("ao_0.8bit.png: steps of the format show in ")
+    assert found[0]["message"].endswith("use png16 or the EXR")
+
+
+def test_auto_range_is_the_brightest_texel_of_all_pages(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in", encode=["rgbm"])
+    entry = write_bake(result, tmp_path / "out")["pages"][0]["encodings"][0]
+    assert entry["max"] == float(result.lightmaps["irradiance"].value.max())
+    assert entry["clipped"] == 0
+
+
+def test_an_encoding_that_no_channel_fits_is_refused() -> None:
+    check_encodings(("hdr", "png8"), {"irradiance": 3, "ao": 1})
+    for names_, components, words in [
+        (("hdr",), {"ao": 1}, "three"),
+        (("png16",), {"irradiance": 3}, "one component"),
+        (("exr",), {"ao": 1}, "in any case"),
+        (("jpeg",), {"ao": 1}, "known are hdr, png16, png8, rgbm"),
+    ]:
+        with pytest.raises(SettingsError, match=words):
+            check_encodings(names_, components)

@@ -1,0 +1,87 @@
+"""Shares from 0 to 1 as a grey PNG of 8 or 16 bits: linear, 0 is black, row 0 on top.
+
+`png8` and `png16` are made of this; it registers nothing itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.encoding import DecodedImage, EncodeOptions, check_pixels
+from baker.core.errors import InputError, ResourceError
+from baker.io.png import decode_png, encode_png
+
+
+class GreyPng:
+    """Writes and reads grey PNG files with so many bits a texel.
+
+    Parameters
+    ----------
+    bits : int
+        8 or 16.
+    """
+
+    components = (1,)
+
+    def __init__(self, bits: int) -> None:
+        self.suffix = f".{bits}bit.png"
+        self._dtype = np.dtype(f"uint{bits}")
+        self._steps = 2**bits - 1
+
+    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+        """Return 0 and 1."""
+        return 0.0, 1.0
+
+    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+        """Return pixels rounded to the nearest step."""
+        return self._value(self._code(pixels))
+
+    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
+        """Half a step, and what single precision adds."""
+        return np.full(pixels.shape, 0.5 / self._steps + 1e-7)
+
+    def encode(
+        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+    ) -> None:
+        """Write pixels (H, W, 1).
+
+        Raises
+        ------
+        ValueError
+            If a pixel is not a number or the shape is another.
+        ResourceError
+            If the file cannot be written.
+        """
+        check_pixels(pixels, self.components, path.name)
+        try:
+            path.write_bytes(encode_png(self._code(pixels)[:, :, 0], header))
+        except OSError as error:
+            raise ResourceError(
+                f"the image could not be written ({error.strerror})", file=str(path)
+            ) from None
+
+    def decode(self, path: Path) -> DecodedImage:
+        """Read a file.
+
+        Raises
+        ------
+        InputError
+            If the file is absent, no PNG, or not grey with this many bits.
+        """
+        code, header = decode_png(path)
+        if code.dtype != self._dtype or code.ndim != 2:
+            bits = self._dtype.itemsize * 8
+            raise InputError(f"the picture is not grey with {bits} bits a texel", file=str(path))
+        return DecodedImage(self._value(code)[:, :, None], header, "uint", ("Y",))
+
+    def _code(self, pixels: NDArray[np.float32]) -> NDArray[np.unsignedinteger]:
+        scaled = np.clip(pixels.astype(np.float64), 0.0, 1.0) * self._steps
+        code: NDArray[np.unsignedinteger] = np.rint(scaled).astype(self._dtype)
+        return code
+
+    def _value(self, code: NDArray[np.unsignedinteger]) -> NDArray[np.float32]:
+        return (code.astype(np.float64) / self._steps).astype(np.float32)

@@ -1,0 +1,107 @@
+"""RGBM: high dynamic range in an 8-bit RGBA PNG, for engines and phones without float textures.
+
+value = top * (rgb * a)^GAMMA, with rgb and a from 0 to 1 as stored (no sRGB decoding). a is the brightest
+channel, rounded up, so that rgb never exceeds 1. `top` and the gamma stand in the file's text chunks.
+
+Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, whose gamma of 2.2 this has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.encoding import ENCODINGS, DecodedImage, EncodeOptions, check_pixels
+from baker.core.errors import InputError, ResourceError
+from baker.io.png import decode_png, encode_png
+
+GAMMA = 2.2
+
+
+class RgbmEncoding:
+    """Files RGBM under the name `rgbm`."""
+
+    suffix = ".rgbm.png"
+    components = (3,)
+
+    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+        """Return 0 and the top."""
+        return 0.0, options.top
+
+    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+        """Return pixels after rounding multiplier and colour to 8 bits."""
+        return _from_rgbm(_to_rgbm(pixels, options.top), options.top)
+
+    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
+        """Half a step of the colour at the multiplier chosen, through the power."""
+        root = _root(pixels, options.top)
+        multiplier = root.max(axis=-1, keepdims=True) + 1.0 / 255.0
+        upper = (root + multiplier * (0.5 / 255.0)) ** GAMMA
+        # Single precision holds what is read.
+        bound: NDArray[np.float64] = options.top * (upper - root**GAMMA) + 1e-6 * pixels
+        return bound
+
+    def encode(
+        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+    ) -> None:
+        """Write pixels (H, W, 3).
+
+        Raises
+        ------
+        ValueError
+            If a pixel is not a number or the shape is another.
+        ResourceError
+            If the file cannot be written.
+        """
+        check_pixels(pixels, self.components, path.name)
+        about = {**header, "rgbm": "value = top * (rgb * a)^gamma", "top": repr(options.top)}
+        data = encode_png(_to_rgbm(pixels, options.top), {**about, "gamma": repr(GAMMA)})
+        try:
+            path.write_bytes(data)
+        except OSError as error:
+            raise ResourceError(
+                f"the image could not be written ({error.strerror})", file=str(path)
+            ) from None
+
+    def decode(self, path: Path) -> DecodedImage:
+        """Read a file that says its own top.
+
+        Raises
+        ------
+        InputError
+            If the file is absent, no PNG, or does not say what its numbers mean.
+        """
+        pixels, header = decode_png(path)
+        try:
+            top, gamma = float(header["top"]), float(header["gamma"])
+        except (KeyError, ValueError):
+            raise InputError("the picture does not say top and gamma of its RGBM", file=str(path)) from None
+        if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 4:
+            raise InputError("the picture is not 8-bit RGBA, so it cannot be RGBM", file=str(path))
+        return DecodedImage(_from_rgbm(pixels, top, gamma), header, "uint", ("R", "G", "B"))
+
+
+ENCODINGS.register("rgbm")(RgbmEncoding())
+
+
+def _root(pixels: NDArray[np.float32], top: float) -> NDArray[np.float64]:
+    scaled = np.clip(pixels.astype(np.float64) / top, 0.0, 1.0)
+    root: NDArray[np.float64] = scaled ** (1.0 / GAMMA)
+    return root
+
+
+def _to_rgbm(pixels: NDArray[np.float32], top: float) -> NDArray[np.uint8]:
+    root = _root(pixels, top)
+    # Black keeps a multiplier of one step, so that nothing is divided by zero.
+    multiplier = np.maximum(np.ceil(root.max(axis=-1, keepdims=True) * 255.0 - 1e-9), 1.0)
+    colour = np.rint(np.minimum(root * 255.0 / multiplier, 1.0) * 255.0)
+    return np.concatenate([colour, multiplier], axis=-1).astype(np.uint8)
+
+
+def _from_rgbm(code: NDArray[np.uint8], top: float, gamma: float = GAMMA) -> NDArray[np.float32]:
+    share = code.astype(np.float64) / 255.0
+    value: NDArray[np.float32] = (top * (share[..., :3] * share[..., 3:]) ** gamma).astype(np.float32)
+    return value

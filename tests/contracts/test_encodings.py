@@ -1,0 +1,203 @@
+"""What every encoding promises: its files hold what it says, within the tolerance it states."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baker.core.encoding import ENCODINGS, EncodeOptions, encoding_of, measure_loss
+from baker.core.errors import InputError, ResourceError
+
+HEADER = {"quantity": "irradiance", "unit": "lx"}
+OPTIONS = {
+    "exr": [EncodeOptions(half, method) for half in (True, False) for method in ("zip", "piz")],
+    "rgbm": [EncodeOptions(top=top) for top in (0.5, 34.49, 20000.0)],
+}
+CASES = [
+    pytest.param(name, number, options, id=f"{name}-{number}")
+    for name in ENCODINGS.names()
+    for number in ENCODINGS.get(name).components
+    for options in OPTIONS.get(name, [EncodeOptions()])
+]
+
+
+def image(encoding, options, number, height=23, width=70, seed=5):
+    """Return pixels all over the range that a lightmap may use: zero, tiny, smooth, random, the very top."""
+    low, high = encoding.limits(options)
+    high = min(high, 1e30)
+    rng = np.random.default_rng(seed)
+    pixels = high * 10.0 ** rng.uniform(-6, 0, (height, width, number))
+    pixels[0] = 0.0
+    pixels[1] = np.linspace(0.0, high, width)[:, None]
+    pixels[2:5] = high * 10.0 ** np.linspace(-9, 0, width)[:, None]
+    # One channel alone, and flat areas that run-length coding folds up.
+    pixels[5:9, :, 1:] = 0.0
+    pixels[9:13] = 0.25 * high
+    pixels[13, ::2] = high
+    if low < 0:
+        pixels[14] *= -1.0
+    return np.clip(pixels, low, high).astype(np.float32)
+
+
+@pytest.mark.parametrize(("name", "number", "options"), CASES)
+def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, number, options):
+    encoding = ENCODINGS.get(name)
+    pixels = image(encoding, options, number)
+    path = tmp_path / f"a{encoding.suffix}"
+    encoding.encode(path, pixels, options=options, header=HEADER)
+    assert encoding_of(path.name) is encoding
+    read = encoding.decode(path)
+    assert read.pixels.dtype == np.float32
+    assert read.channels == (("Y",) if number == 1 else ("R", "G", "B"))
+    assert read.header["unit"] == "lx"
+    assert read.header["quantity"] == "irradiance"
+    miss = np.abs(read.pixels.astype(np.float64) - pixels)
+    tolerance = encoding.tolerance(pixels, options)
+    assert tolerance.shape == pixels.shape
+    assert (miss <= tolerance).all(), (miss / np.maximum(tolerance, 1e-300)).max()
+    assert np.array_equal(read.pixels, encoding.stored(pixels, options))
+    # The bound is no excuse: somewhere the format really is that coarse.
+    if tolerance.any():
+        assert (miss > 0.4 * tolerance).any()
+
+
+@pytest.mark.parametrize(("name", "number", "options"), CASES)
+def test_zero_stays_zero_and_the_top_is_held(tmp_path, name, number, options):
+    encoding = ENCODINGS.get(name)
+    low, high = encoding.limits(options)
+    assert low <= 0 < high
+    pixels = np.zeros((9, 9, number), np.float32)
+    pixels[4, 4] = high
+    stored = encoding.stored(pixels, options)
+    assert not stored[pixels == 0].any()
+    assert stored[4, 4] == pytest.approx(np.float32(high), rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "number", "options"), CASES)
+def test_what_does_not_fit_is_counted_and_stored_at_the_end(tmp_path, name, number, options):
+    encoding = ENCODINGS.get(name)
+    low, high = encoding.limits(options)
+    pixels = np.full((12, 12, number), 0.5 * min(high, 1e30), np.float32)
+    pixels[0, 0, 0], pixels[7, 3] = np.inf, np.inf
+    if low == 0:
+        pixels[2, 2, 0] = -1.0
+    loss = measure_loss(encoding, pixels, np.ones((12, 12), bool), options)
+    assert loss.clipped == (3 if low == 0 else 2)
+    encoding.encode(tmp_path / f"a{encoding.suffix}", pixels, options=options, header={})
+    read = encoding.decode(tmp_path / f"a{encoding.suffix}").pixels
+    assert np.isfinite(read).all()
+    assert read.min() >= low
+    assert read[7, 3] == pytest.approx(high, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "number", "options"), CASES)
+def test_the_same_pixels_give_the_same_bytes(tmp_path, name, number, options):
+    encoding = ENCODINGS.get(name)
+    digests = set()
+    for file in ("a", "b"):
+        path = tmp_path / f"{file}{encoding.suffix}"
+        encoding.encode(path, image(encoding, options, number), options=options, header=HEADER)
+        digests.add(hashlib.sha256(path.read_bytes()).hexdigest())
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize("name", ENCODINGS.names())
+def test_odd_sizes(tmp_path, name):
+    encoding = ENCODINGS.get(name)
+    for shape in ((1, 1), (1, 7), (3, 8), (2, 129), (2, 300)):
+        pixels = np.random.default_rng(1).random((*shape, encoding.components[-1]), np.float32)
+        pixels[0] = pixels[0, :1]
+        path = tmp_path / f"{shape[1]}{encoding.suffix}"
+        encoding.encode(path, pixels, options=EncodeOptions(), header={})
+        assert np.array_equal(encoding.decode(path).pixels, encoding.stored(pixels, EncodeOptions()))
+
+
+@pytest.mark.parametrize("name", ENCODINGS.names())
+def test_errors_are_sentences(tmp_path, name):
+    encoding = ENCODINGS.get(name)
+    path = tmp_path / f"a{encoding.suffix}"
+    number = encoding.components[0]
+    bad = np.ones((4, 5, number), np.float32)
+    bad[2, 2] = np.nan
+    with pytest.raises(ValueError, match="1 texels are not a number"):
+        encoding.encode(path, bad, options=EncodeOptions(), header={})
+    with pytest.raises(ValueError, match="pixels of shape"):
+        encoding.encode(path, np.ones((4, 5, 2), np.float32), options=EncodeOptions(), header={})
+    assert not path.exists()
+    with pytest.raises(ResourceError, match="could not be written"):
+        encoding.encode(
+            tmp_path / "absent" / path.name,
+            np.ones((4, 5, number), np.float32),
+            options=EncodeOptions(),
+            header={},
+        )
+    with pytest.raises(InputError, match=r"no such file|cannot be read"):
+        encoding.decode(path)
+    path.write_bytes(b"hello")
+    with pytest.raises(InputError, match="not a readable"):
+        encoding.decode(path)
+    pixels = np.random.default_rng(2).random((64, 64, number), np.float32)
+    encoding.encode(path, pixels, options=EncodeOptions(), header={})
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="not a readable"):
+        encoding.decode(path)
+
+
+def test_suffixes_tell_encodings_apart():
+    suffixes = [ENCODINGS.get(name).suffix for name in ENCODINGS.names()]
+    assert len(set(suffixes)) == len(suffixes)
+    assert {"exr", "hdr", "rgbm", "png8", "png16"} <= set(ENCODINGS.names())
+    assert encoding_of("a.png") is None
+    assert encoding_of("A.RGBM.PNG") is ENCODINGS.get("rgbm")
+
+
+def test_rgbm_by_hand(tmp_path):
+    """a = ceil(255 m), rgb = root / a, where root = (value / top)^(1 / 2.2) and m is the largest root."""
+    encoding = ENCODINGS.get("rgbm")
+    encoding.encode(
+        tmp_path / "a.rgbm.png", np.float32([[[8, 2, 0]]]), options=EncodeOptions(top=34.49), header={}
+    )
+    with Image.open(tmp_path / "a.rgbm.png") as picture:
+        red, green, blue, alpha = np.asarray(picture)[0, 0].tolist()
+        assert (picture.text["top"], picture.text["gamma"]) == ("34.49", "2.2")
+    root = [(v / 34.49) ** (1 / 2.2) for v in (8, 2)]
+    assert alpha == np.ceil(root[0] * 255)
+    assert red == round(root[0] * 255 * 255 / alpha)
+    assert green == round(root[1] * 255 * 255 / alpha)
+    assert blue == 0
+    assert 34.49 * (red / 255 * alpha / 255) ** 2.2 == pytest.approx(8, rel=0.01)
+
+
+def test_radiance_hdr_by_hand(tmp_path):
+    """1.0 is mantissa 128 at exponent 129, and a line is its four planes run-length coded."""
+    ENCODINGS.get("hdr").encode(
+        tmp_path / "a.hdr", np.ones((1, 10, 3), np.float32), options=EncodeOptions(), header={}
+    )
+    head, _, body = (tmp_path / "a.hdr").read_bytes().partition(b"-Y 1 +X 10\n")
+    assert head.startswith(b"#?RADIANCE\n")
+    assert b"FORMAT=32-bit_rle_rgbe\n" in head
+    assert list(body) == [2, 2, 0, 10, 138, 128, 138, 128, 138, 128, 138, 129]
+
+
+def test_banding_is_where_steps_show():
+    surface = np.ones((64, 64), bool)
+    ramp = np.linspace(0.02, 1.0, 64 * 64, dtype=np.float32).reshape(64, 64, 1)
+    eight, sixteen = ENCODINGS.get("png8"), ENCODINGS.get("png16")
+    # Half a step of 1/255 is more than 1 % of what is below 0.196.
+    loss = measure_loss(eight, ramp, surface, EncodeOptions())
+    wrong = np.abs(np.rint(ramp * 255) / 255 - ramp) > 0.01 * ramp
+    assert loss.banded == int(wrong.sum()) > 300
+    assert measure_loss(sixteen, ramp, surface, EncodeOptions()).banded == 0
+    # A range that is far too wide for the page shows as steps; the right one does not.
+    light = np.repeat(ramp, 3, axis=2)
+    rgbm = ENCODINGS.get("rgbm")
+    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1e6)).banded > 500
+    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1.0)).banded < 41
+    # What is not shown, or as good as black, does not count.
+    assert measure_loss(rgbm, light, ~surface, EncodeOptions(top=1e6)).banded == 0
+    light[:32] *= 1e-4
+    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1.0)).banded < 41
