@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +136,7 @@ def measure_loss(
     clipped = banded = 0
     for start in range(0, len(pixels), _ROWS):
         rows, shown = pixels[start : start + _ROWS], surface[start : start + _ROWS]
-        beyond: NDArray[Any] = ((rows < low) | (rows > high)).any(axis=2)
+        beyond = np.asarray(((rows < low) | (rows > high)).any(axis=2))
         clipped += int(beyond.sum())
         size = np.abs(rows).max(axis=2)
         miss = np.abs(encoding.stored(rows, options) - rows).max(axis=2)

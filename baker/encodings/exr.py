@@ -134,7 +134,7 @@ class ExrEncoding:
     """Files `encode_exr` and `decode_exr` under the name `exr`."""
 
     suffix = ".exr"
-    components = (1, 3)
+    components: tuple[int, ...] = (1, 3)
 
     def limits(self, options: EncodeOptions) -> tuple[float, float]:
         """Return the ends of the number format."""

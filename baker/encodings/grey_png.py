@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ class GreyPng:
         8 or 16.
     """
 
-    components = (1,)
+    components: tuple[int, ...] = (1,)
 
     def __init__(self, bits: int) -> None:
         self.suffix = f".{bits}bit.png"
@@ -78,10 +79,11 @@ class GreyPng:
             raise InputError(f"the picture is not grey with {bits} bits a texel", file=str(path))
         return DecodedImage(self._value(code)[:, :, None], header, "uint", ("Y",))
 
-    def _code(self, pixels: NDArray[np.float32]) -> NDArray[np.unsignedinteger]:
+    def _code(self, pixels: NDArray[np.float32]) -> NDArray[np.unsignedinteger[Any]]:
         scaled = np.clip(pixels.astype(np.float64), 0.0, 1.0) * self._steps
-        code: NDArray[np.unsignedinteger] = np.rint(scaled).astype(self._dtype)
+        code: NDArray[np.unsignedinteger[Any]] = np.rint(scaled).astype(self._dtype)
         return code
 
-    def _value(self, code: NDArray[np.unsignedinteger]) -> NDArray[np.float32]:
-        return (code.astype(np.float64) / self._steps).astype(np.float32)
+    def _value(self, code: NDArray[np.unsignedinteger[Any]]) -> NDArray[np.float32]:
+        value: NDArray[np.float32] = (code.astype(np.float64) / self._steps).astype(np.float32)
+        return value

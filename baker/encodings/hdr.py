@@ -29,7 +29,7 @@ class HdrEncoding:
     """Files Radiance HDR under the name `hdr`."""
 
     suffix = ".hdr"
-    components = (3,)
+    components: tuple[int, ...] = (3,)
 
     def limits(self, options: EncodeOptions) -> tuple[float, float]:
         """Return the range: no negative light, and 2^127 at the top."""

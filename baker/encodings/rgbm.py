@@ -25,7 +25,7 @@ class RgbmEncoding:
     """Files RGBM under the name `rgbm`."""
 
     suffix = ".rgbm.png"
-    components = (3,)
+    components: tuple[int, ...] = (3,)
 
     def limits(self, options: EncodeOptions) -> tuple[float, float]:
         """Return 0 and the top."""

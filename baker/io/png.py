@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 
 
-def encode_png(pixels: NDArray[np.unsignedinteger], text: Mapping[str, str] | None = None) -> bytes:
+def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str] | None = None) -> bytes:
     """Return a PNG, row 0 on top.
 
     Parameters
@@ -32,7 +32,7 @@ def encode_png(pixels: NDArray[np.unsignedinteger], text: Mapping[str, str] | No
     return stream.getvalue()
 
 
-def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger], dict[str, str]]:
+def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, str]]:
     """Read the numbers of a PNG without a palette, as they are stored, and its text chunks.
 
     Returns
