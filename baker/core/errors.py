@@ -48,6 +48,10 @@ class InputError(BakerError):
     exit_code = 3
 
 
+class IndexRangeError(InputError):
+    """Says that a face names a vertex that does not exist: readable, but nothing to bake."""
+
+
 class ResourceError(BakerError):
     """Says that memory, disk or a needed library ran out or is absent (exit code 4)."""
 

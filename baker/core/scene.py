@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.raw import RawScene
+
 
 @dataclass(frozen=True)
 class Texture:
@@ -202,6 +204,8 @@ class Scene:
         None for formats other than glTF: the writer builds a new document.
     sha256 : str
         Hash over the scene file and every file it names, in order of mention.
+    raw : RawScene or None
+        The triangles as the file has them, if the scene was loaded leniently.
     """
 
     name: str
@@ -214,6 +218,7 @@ class Scene:
     source: SourceDocument | None = None
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
+    raw: RawScene | None = None
 
     @property
     def n_triangles(self) -> int:

@@ -19,8 +19,15 @@ from baker.io.gltf_node import Placed
 _KINDS = ("point", "spot", "directional")
 
 
-def read_light(light: JsonObject, node: Placed, warnings: list[SceneWarning]) -> PunctualLight | None:
+def read_light(
+    light: JsonObject, node: Placed, warnings: list[SceneWarning], *, lenient: bool = False
+) -> PunctualLight | None:
     """Return a light in world space, or None with a warning if its node leaves it no direction.
+
+    Parameters
+    ----------
+    lenient : bool
+        Let negative colours and intensities pass.
 
     Raises
     ------
@@ -31,9 +38,9 @@ def read_light(light: JsonObject, node: Placed, warnings: list[SceneWarning]) ->
     if kind not in _KINDS:
         light.fail(f"'{kind[:20]}' is none of {', '.join(_KINDS)}", "type")
     name = node.json.string("name", light.string("name", f"light_{node.index}"))
-    strength = light.number("intensity", 1.0, low=0.0)
+    strength = light.number("intensity", 1.0, low=-math.inf if lenient else 0.0)
     colour = light.numbers("color", 3, (1.0, 1.0, 1.0))
-    if min(colour) < 0:
+    if min(colour) < 0 and not lenient:
         light.fail("a colour is negative", "color")
     if "range" in light:
         message = "the light's range is not applied: it falls off with the square of the distance only"

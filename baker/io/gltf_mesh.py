@@ -9,19 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.raw import PrimitiveArrays
 from baker.core.scene import SceneWarning
 from baker.io.gltf_accessor import FLOAT, component_type, read_accessor, read_indices
 from baker.io.gltf_document import GltfDocument
 from baker.io.gltf_json import JsonObject
 from baker.io.gltf_material import MOST_TEXCOORDS
-from baker.io.mesh_build import PrimitiveArrays
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DRACO = "KHR_draco_mesh_compression"
 
 
 def read_primitives(
-    document: GltfDocument, mesh: JsonObject, name: str, default_material: int
+    document: GltfDocument, mesh: JsonObject, name: str, default_material: int, *, lenient: bool = False
 ) -> tuple[list[PrimitiveArrays], list[SceneWarning]]:
     """Return the triangle primitives of a mesh; points and lines are left out with a warning.
 
@@ -33,6 +33,8 @@ def read_primitives(
         The mesh's name, for warnings.
     default_material : int
         Index of the material of primitives that name none.
+    lenient : bool
+        Let indices out of range pass.
 
     Raises
     ------
@@ -52,7 +54,7 @@ def read_primitives(
         if primitive.children("targets"):
             message = f"primitive {i} has morph targets; its base shape is baked"
             warnings.append(SceneWarning("morphed", message, name))
-        arrays.append(_primitive(document, primitive, i, mode, default_material))
+        arrays.append(_primitive(document, primitive, i, mode, default_material, lenient))
         left = _corner_count(document, primitive, arrays[-1]) % 3
         if mode == _TRIANGLES and left:
             warnings.append(
@@ -72,7 +74,12 @@ def _corner_count(document: GltfDocument, primitive: JsonObject, arrays: Primiti
 
 
 def _primitive(
-    document: GltfDocument, primitive: JsonObject, number: int, mode: int, default_material: int
+    document: GltfDocument,
+    primitive: JsonObject,
+    number: int,
+    mode: int,
+    default_material: int,
+    lenient: bool,
 ) -> PrimitiveArrays:
     accessors = document.root.children("accessors")
     attributes = primitive.child("attributes")
@@ -106,7 +113,7 @@ def _primitive(
         if "material" in primitive
         else default_material,
         position=position,
-        triangle=triangles_of(_corners(document, primitive, len(position)), mode),
+        triangle=triangles_of(_corners(document, primitive, len(position), lenient), mode),
         normal=optional("NORMAL", ("VEC3",)),
         texcoord={k: value for k, value in texcoord.items() if value is not None},
         colour=colour,
@@ -133,14 +140,16 @@ def _colour(document: GltfDocument, accessor: int, colour: NDArray[np.float32]) 
     return colour
 
 
-def _corners(document: GltfDocument, primitive: JsonObject, n_vertices: int) -> NDArray[np.int64]:
+def _corners(
+    document: GltfDocument, primitive: JsonObject, n_vertices: int, lenient: bool
+) -> NDArray[np.int64]:
     if "indices" not in primitive:
         return np.arange(n_vertices, dtype=np.int64)
     accessors = document.root.children("accessors")
     at = primitive.index("indices", len(accessors), "accessors")
     corner = read_indices(document, at)
     largest = int(corner.max())
-    if largest >= n_vertices:
+    if largest >= n_vertices and not lenient:
         primitive.fail(
             f"index {largest} in accessor {at} is out of range: POSITION has {n_vertices} vertices", "indices"
         )

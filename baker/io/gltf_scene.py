@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
+from baker.core.raw import RawInstance, RawMesh, RawScene
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
 from baker.io.gltf_camera import read_cameras
 from baker.io.gltf_document import GltfDocument, open_document
@@ -23,7 +24,7 @@ from baker.io.gltf_mesh import read_primitives
 from baker.io.gltf_node import Placed, place_nodes
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_build import build_mesh
-from baker.io.triangle_check import LARGEST_COORDINATE
+from baker.core.triangle_check import LARGEST_COORDINATE
 
 # Smallest over largest stretch of a node: below it a mesh is squashed flat.
 _FLATTEST = 1e-7
@@ -49,11 +50,13 @@ def import_gltf(source: SceneFile) -> Scene:
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
-    number, placed = _choose_scene(document, source.scene_index, warnings)
+    number, placed = _choose_scene(
+        document, source.scene_index, warnings, lenient=source.lenient
+    )
     materials = read_materials(document, reflections=source.reflections)
-    meshes, instances = _instances(document, placed, materials, warnings)
-    lights = _lights(placed, document, warnings)
-    if not instances:
+    meshes, instances, raw = _instances(document, placed, materials, warnings, lenient=source.lenient)
+    lights = _lights(placed, document, warnings, lenient=source.lenient)
+    if not instances and not source.lenient:
         where = f"scenes[{number}]" if number is not None else None
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
         raise InputError(
@@ -72,11 +75,12 @@ def import_gltf(source: SceneFile) -> Scene:
         source=SourceDocument(document.root.value, document.buffers, Path(document.folder)),
         sha256=document.sha256,
         cameras=tuple(read_cameras(placed, document)),
+        raw=raw,
     )
 
 
 def _choose_scene(
-    document: GltfDocument, asked: int | None, warnings: list[SceneWarning]
+    document: GltfDocument, asked: int | None, warnings: list[SceneWarning], *, lenient: bool
 ) -> tuple[int | None, list[Placed]]:
     """Return the number of the chosen scene (None if the file has none) and its nodes."""
     root = document.root
@@ -91,14 +95,19 @@ def _choose_scene(
         message = f"the file has {len(scenes)} scenes; scene {number} is taken"
         warnings.append(SceneWarning("several-scenes", message, scenes[number].string("name", "")))
     roots = scenes[number].indices("nodes", len(nodes), "nodes")
-    if not roots:
+    if not roots and not lenient:
         scenes[number].fail("there is nothing to bake: the scene has no nodes")
     return number, place_nodes(nodes, roots)
 
 
 def _instances(
-    document: GltfDocument, placed: list[Placed], materials: list[Material], warnings: list[SceneWarning]
-) -> tuple[list[Mesh], list[Instance]]:
+    document: GltfDocument,
+    placed: list[Placed],
+    materials: list[Material],
+    warnings: list[SceneWarning],
+    *,
+    lenient: bool,
+) -> tuple[list[Mesh], list[Instance], RawScene | None]:
     """Return the meshes that are used, each once, and where they stand. May append the default material."""
     sources = document.root.children("meshes")
     default = len(materials)
@@ -106,16 +115,20 @@ def _instances(
     meshes: list[Mesh] = []
     extents: list[NDArray[np.float64]] = []
     instances: list[Instance] = []
+    raw: dict[int, RawMesh] = {}
+    shown: list[RawInstance] = []
     for node in placed:
         if "mesh" not in node.json:
             continue
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
         if number not in built:
-            arrays, found = read_primitives(document, sources[number], name, default)
+            arrays, found = read_primitives(document, sources[number], name, default, lenient=lenient)
             if len(materials) == default and any(a.material == default for a in arrays):
                 materials.append(DEFAULT_MATERIAL)
             mesh, defects = build_mesh(name, arrays, materials)
+            if lenient:
+                raw[number] = RawMesh(name, tuple(arrays))
             warnings += found + defects
             if mesh is None:
                 warnings.append(
@@ -127,13 +140,16 @@ def _instances(
                 extents.append(np.abs(mesh.position).max(axis=0).astype(np.float64))
         at = built[number]
         label = node.json.string("name", name)
+        if lenient:
+            shown.append(RawInstance(node.index, label, list(raw).index(number), node.matrix))
         if at is None or not _stands(node, extents[at], label, warnings):
             continue
         if "skin" in node.json:
             message = "the mesh is skinned; its bind pose is baked, placed by its node"
             warnings.append(SceneWarning("skinned", message, label))
         instances.append(Instance(node.index, label, at, node.matrix))
-    return _drop_unused(meshes, instances)
+    kept = RawScene(tuple(raw.values()), tuple(shown)) if lenient else None
+    return *_drop_unused(meshes, instances), kept
 
 
 def _stands(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
@@ -160,7 +176,7 @@ def _drop_unused(meshes: list[Mesh], instances: list[Instance]) -> tuple[list[Me
 
 
 def _lights(
-    placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning]
+    placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning], *, lenient: bool
 ) -> list[PunctualLight]:
     extension = document.root.extension("KHR_lights_punctual")
     known: list[JsonObject] = extension.children("lights") if extension is not None else []
@@ -170,6 +186,6 @@ def _lights(
         if reference is None:
             continue
         light = known[reference.index("light", len(known), "lights")]
-        made = read_light(light, node, warnings)
+        made = read_light(light, node, warnings, lenient=lenient)
         lights += [] if made is None else [made]
     return lights

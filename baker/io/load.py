@@ -33,6 +33,8 @@ class SceneFile:
         Which glTF scene to take; None takes the file's default.
     reflections : bool
         Also read textures that only say how mirror-like a surface is.
+    lenient : bool
+        Report what a bake refuses instead of raising, and keep the raw triangles.
     """
 
     path: Path
@@ -41,6 +43,7 @@ class SceneFile:
     scale: float = 1.0
     scene_index: int | None = None
     reflections: bool = False
+    lenient: bool = False
 
 
 Importer = Callable[[SceneFile], Scene]
@@ -54,6 +57,7 @@ def load_scene(
     scale: float = 1.0,
     scene_index: int | None = None,
     reflections: bool = False,
+    lenient: bool = False,
 ) -> Scene:
     """Read a scene file into metres, +Y up, linear Rec.709.
 
@@ -69,11 +73,14 @@ def load_scene(
         glTF scene to load; None loads the default one.
     reflections : bool
         Also read textures that only say how mirror-like a surface is: bakes do not look at them.
+    lenient : bool
+        For those who judge the file: indices out of range, negative lights and a scene without a good
+        triangle are no errors, and `Scene.raw` holds all triangles as they are in the file.
 
     Returns
     -------
     Scene
-        With at least one triangle. What was left out is in `Scene.warnings`.
+        With at least one triangle, unless lenient. What was left out is in `Scene.warnings`.
 
     Raises
     ------
@@ -101,7 +108,7 @@ def load_scene(
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
     try:
-        return importer(SceneFile(path, data, up, scale, scene_index, reflections))
+        return importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
     except MemoryError:
         raise ResourceError("the scene does not fit into memory", file=str(path)) from None
 

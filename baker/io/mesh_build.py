@@ -6,43 +6,13 @@ Every importer ends here, so that all formats are held to the same rules.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.raw import PrimitiveArrays
 from baker.core.scene import Material, Mesh, SceneWarning
-from baker.io.triangle_check import duplicates, face_normal, usable_vertices, zero_area
-
-
-@dataclass(frozen=True)
-class PrimitiveArrays:
-    """One primitive as its file has it.
-
-    Attributes
-    ----------
-    index : int
-        Number of the primitive in its mesh.
-    material : int
-        Index into the scene's materials.
-    position : (V, 3) float32, object space
-    triangle : (T, 3) int64, indices below V
-    normal : (V, 3) float32 or None
-        None asks for flat normals.
-    texcoord : dict of int to (V, 2) float32
-    colour : (V, 4) float32, linear, or None
-    stitched : bool
-        True for strips, whose triangles with a repeated index only join pieces: left out without a word.
-    """
-
-    index: int
-    material: int
-    position: NDArray[np.float32]
-    triangle: NDArray[np.int64]
-    normal: NDArray[np.float32] | None = None
-    texcoord: dict[int, NDArray[np.float32]] = field(default_factory=dict)
-    colour: NDArray[np.float32] | None = None
-    stitched: bool = False
+from baker.core.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
 
 
 def build_mesh(
@@ -128,6 +98,9 @@ def _good_triangles(
             warnings.append(SceneWarning(code, f"{some} {what} left out", name))
 
     keep(~(stitched & repeats), "", "")
+    within = in_range(triangle, start[owner], start[owner + 1])
+    if not within.all():
+        keep(within, "index-range", "that name a vertex which does not exist")
     usable = usable_vertices(position)
     if not usable.all():
         keep(usable[triangle].all(axis=1), "bad-vertices", "with NaN, infinite or huge coordinates")

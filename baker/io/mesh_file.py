@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
+from baker.core.raw import PrimitiveArrays
 from baker.core.scene import Material, Scene
 from baker.io.load import SceneFile, importers
-from baker.io.mesh_build import PrimitiveArrays
 from baker.io.mesh_scene import scene_of_meshes, to_world
 
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
@@ -50,7 +50,7 @@ def import_mesh_file(source: SceneFile) -> Scene:
     name = source.path.name.split(".")[0]
     primitives = []
     for number, (position, face, normal, colour) in enumerate(arrays):
-        if len(face) and not (face.min() >= 0 and face.max() < len(position)):
+        if not source.lenient and len(face) and not (face.min() >= 0 and face.max() < len(position)):
             worst = face.max() if face.max() >= len(position) else face.min()
             raise InputError(
                 f"face index {worst} is out of range: there are {len(position)} vertices", file=file

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
+from baker.core.raw import PrimitiveArrays, RawInstance, RawMesh, RawScene
 from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
 from baker.io.load import SceneFile
-from baker.io.mesh_build import PrimitiveArrays, build_mesh
+from baker.io.mesh_build import build_mesh
 
 
 def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.float32]:
@@ -42,7 +43,7 @@ def scene_of_meshes(
     Raises
     ------
     InputError
-        If no triangle is left.
+        If no triangle is left, unless the source is read leniently.
     """
     found = list(warnings)
     meshes: list[Mesh] = []
@@ -57,7 +58,7 @@ def scene_of_meshes(
             found.append(
                 SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
             )
-    if not meshes:
+    if not meshes and not source.lenient:
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in found[:3])
         message = (
             f"there is nothing to bake: the file holds no usable triangle{f' ({detail})' if detail else ''}"
@@ -71,4 +72,11 @@ def scene_of_meshes(
         instances=tuple(instances),
         warnings=tuple(found),
         sha256=sha256,
+        raw=_raw(groups) if source.lenient else None,
     )
+
+
+def _raw(groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]]) -> RawScene:
+    meshes = tuple(RawMesh(name, tuple(primitives)) for name, primitives in groups)
+    stand = tuple(RawInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
+    return RawScene(meshes, stand)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
-from baker.core.errors import InputError
+from baker.core.errors import IndexRangeError, InputError
+from baker.core.raw import PrimitiveArrays
 from baker.core.scene import Material, Scene, SceneWarning
 from baker.io.load import SceneFile, importers
-from baker.io.mesh_build import PrimitiveArrays
 from baker.io.mesh_scene import scene_of_meshes, to_world
 from baker.io.mtl import read_mtl
 
@@ -142,9 +142,9 @@ def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) ->
     for (index, what), count in zip(kinds, counts, strict=True):
         if index and max(index) >= count:
             message = f"a face names {what} {max(index) + 1}, but the file has {count}"
-            raise InputError(message, file=file, object=shape)
+            raise IndexRangeError(message, file=file, object=shape)
     if kinds[0][0] and min(kinds[0][0]) < 0:
-        raise InputError("a face has an index of zero or less", file=file, object=shape)
+        raise IndexRangeError("a face has an index of zero or less", file=file, object=shape)
 
 
 def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:

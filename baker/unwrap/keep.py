@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.scene import Mesh, Scene, SceneWarning
 from baker.unwrap.check import PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
-from baker.unwrap.topology import connected_vertices, weld
+from baker.core.topology import connected_vertices, weld
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.unwrap.topology import connected_faces, connected_vertices
+from baker.core.topology import connected_faces, connected_vertices
 
 # A part has at most about this many triangles if it had to be cut, and small parts are gathered into
 # worker's jobs of this many.

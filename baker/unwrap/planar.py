@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.unwrap.check import CHART_TOLERANCE, chart_overlap
-from baker.unwrap.topology import connected_faces, number_by_first
+from baker.core.topology import connected_faces, number_by_first
 
 
 def planar_charts(

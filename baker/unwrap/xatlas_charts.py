@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.unwrap.topology import connected_vertices, number_by_first
+from baker.core.topology import connected_vertices, number_by_first
 
 # Faces a chart should have at most, on average: the cost of growing a chart rises faster than
 # linearly (82 k triangles: 14 charts 54 s, 46 charts 3.6 s, 123 charts 1.2 s).

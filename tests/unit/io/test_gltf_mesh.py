@@ -12,7 +12,7 @@ from PIL import Image
 
 from baker.io.gltf_mesh import triangles_of
 from baker.io.load import load_scene
-from baker.io.triangle_check import duplicates, zero_area
+from baker.core.triangle_check import duplicates, zero_area
 
 
 def codes(scene):

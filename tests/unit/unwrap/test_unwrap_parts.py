@@ -20,7 +20,7 @@ from baker.unwrap.check import chart_overlap, page_overlap
 from baker.unwrap.pack import Shapes, fit_page, pack
 from baker.unwrap.parts import cut_parts
 from baker.unwrap.planar import lay_flat, planar_charts
-from baker.unwrap.topology import connected_faces, connected_vertices, number_by_first, weld
+from baker.core.topology import connected_faces, connected_vertices, number_by_first, weld
 from baker.unwrap.xatlas_charts import ChartJob, cut_charts
 
 

@@ -11,6 +11,14 @@ LARGEST_COORDINATE = 1e18
 _FLATTEST = 1e-7
 
 
+def in_range(
+    triangle: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell which (T, 3) triangles name only vertices from `low` to below `high` (T,), (T,) bool."""
+    within: NDArray[np.bool_] = np.asarray((triangle.min(axis=1) >= low) & (triangle.max(axis=1) < high))
+    return within
+
+
 def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Tell which (V, 3) positions are finite and within single precision's safe range, (V,) bool."""
     # A comparison with NaN is false, so this one test covers NaN, inf and huge values.

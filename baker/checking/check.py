@@ -1,0 +1,134 @@
+"""Runs every check on a scene and says whether it passed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from baker.checking.ignore import Ignore, parse_ignore
+from baker.core.errors import IndexRangeError
+from baker.core.progress import Progress, silent
+from baker.core.progress import report as tell_progress
+from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
+from baker.io.load import load_scene
+from baker.lint.finding import SEVERITIES, Finding, Found, Place
+from baker.lint.registry import CHECKS, all_checks, run_check
+from baker.lint.subject import DEFAULT_MIP, Subject
+
+
+@dataclass(frozen=True)
+class CheckSettings:
+    """How a check judges.
+
+    Attributes
+    ----------
+    fail_on : str
+        "warning" or "error": the least severity that fails the check.
+    ignore : tuple of str
+        Findings that do not count: CODE or CODE@OBJECT; both may hold `*`.
+    mip : int
+        Mip level of the lightmap down to which charts must not bleed into each other.
+    """
+
+    fail_on: str = "error"
+    ignore: tuple[str, ...] = ()
+    mip: int = DEFAULT_MIP
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """All that was found about one scene.
+
+    Attributes
+    ----------
+    path : Path
+    findings : tuple of Finding
+        Worst first.
+    ignored : tuple of Finding
+    fail_on : str
+    seconds : float
+    """
+
+    path: Path
+    findings: tuple[Finding, ...]
+    ignored: tuple[Finding, ...]
+    fail_on: str
+    seconds: float = 0.0
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether nothing reaches the limit."""
+        limit = SEVERITIES.index(self.fail_on)
+        return all(finding.rank < limit for finding in self.findings)
+
+
+def check_scene(
+    path: Path | str,
+    settings: CheckSettings,
+    bake_settings: BakeSettings,
+    progress: Progress = silent,
+) -> CheckReport:
+    """Read a scene leniently and run every check on it.
+
+    Parameters
+    ----------
+    path : Path or str
+    settings : CheckSettings
+    bake_settings : BakeSettings
+        What the scene is to be baked with: resolution, padding, uv, sky ...
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read at all.
+    SettingsError
+        For an unknown code among `ignore`.
+    """
+    start = time.perf_counter()
+    path = Path(path)
+    ignore = parse_ignore(settings.ignore)
+    timings: dict[str, float] = {}
+    try:
+        scene = load_scene(path, up=bake_settings.up, scale=bake_settings.scale, lenient=True)
+    except IndexRangeError as error:
+        found = [_index_range(error)]
+    else:
+        timings["load"] = time.perf_counter() - start
+        found = _run(scene, settings, bake_settings, progress, timings)
+    found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
+    counted = tuple(finding for finding in found if not _ignored(ignore, finding))
+    ignored = tuple(finding for finding in found if _ignored(ignore, finding))
+    return CheckReport(path, counted, ignored, settings.fail_on, time.perf_counter() - start, timings)
+
+
+def _run(
+    scene: Scene,
+    settings: CheckSettings,
+    bake_settings: BakeSettings,
+    progress: Progress,
+    timings: dict[str, float],
+) -> list[Finding]:
+    subject = Subject(scene, bake_settings, mip=settings.mip)
+    found: list[Finding] = []
+    entries = all_checks()
+    for k, entry in enumerate(entries):
+        tell_progress(progress, "checks", k / len(entries))
+        begin = time.perf_counter()
+        found += run_check(entry, subject)
+        timings[entry.code] = time.perf_counter() - begin
+    return found
+
+
+def _index_range(error: IndexRangeError) -> Finding:
+    # Some formats cannot be taken apart any further once an index is wrong.
+    entry = CHECKS.get("index-range")
+    assert entry is not None
+    return Finding(entry.code, entry.severity, error.message, entry.fix, Found(error.message, Place(error.object or "")))
+
+
+def _ignored(ignore: list[Ignore], finding: Finding) -> bool:
+    return any(rule.matches(finding.code, finding.object) for rule in ignore)

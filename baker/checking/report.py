@@ -1,0 +1,58 @@
+"""A check's result as JSON and as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TextIO
+
+from baker.checking.check import CheckReport
+from baker.lint.finding import SEVERITIES, finding_json
+
+
+def report_json(reports: Sequence[CheckReport]) -> dict[str, Any]:
+    """Return the object of `--json`, for one scene or several."""
+    scenes = [
+        {
+            "scene": str(report.path),
+            "passed": report.passed,
+            "counts": _counts(report),
+            "ignored": len(report.ignored),
+            "seconds": round(report.seconds, 3),
+        }
+        for report in reports
+    ]
+    findings = [
+        {**finding_json(finding), "scene": str(report.path)}
+        for report in reports
+        for finding in report.findings
+    ]
+    return {
+        "passed": all(report.passed for report in reports),
+        "fail_on": reports[0].fail_on if reports else "error",
+        "findings": findings,
+        "scenes": scenes,
+    }
+
+
+def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0) -> None:
+    """Write findings one a line, with what to do below each; infos only with -v."""
+    shown = [finding for finding in report.findings if verbose or finding.severity != "info"]
+    for finding in shown:
+        where = f" '{finding.object}'" if finding.object else ""
+        if finding.node is not None:
+            where += f" (node {finding.node})"
+        stream.write(f"{report.path}: {finding.severity}: {finding.code}:{where} {finding.message}\n")
+        faces = finding.found.faces
+        if faces and verbose:
+            primitive = finding.found.primitive
+            stream.write(f"    faces {' '.join(map(str, faces))} of primitive {primitive}\n")
+        stream.write(f"    {finding.fix}\n")
+    counts = _counts(report)
+    parts = [f"{counts[name]} {name}{'s' if counts[name] != 1 else ''}" for name in reversed(SEVERITIES)]
+    tail = f", {len(report.ignored)} ignored" if report.ignored else ""
+    verdict = "passed" if report.passed else "FAILED"
+    stream.write(f"{report.path}: {verdict}: {', '.join(parts)}{tail} ({report.seconds:.1f} s)\n")
+
+
+def _counts(report: CheckReport) -> dict[str, int]:
+    return {name: sum(f.severity == name for f in report.findings) for name in SEVERITIES}

@@ -1,0 +1,69 @@
+"""The edges of a triangle mesh: which faces meet at each, and in which direction they run along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Half edges, sorted so that those of one edge stand together.
+
+    Attributes
+    ----------
+    face, corner : (H,) int64
+        Face of each half edge, and which of its corners it starts at.
+    first, count : (E,) int64
+        Where each edge's half edges start, and how many there are.
+    low, high : (E,) int64
+        The edge's vertices, low < high.
+    balance : (E,) int64
+        Half edges from low to high minus those from high to low.
+    """
+
+    face: NDArray[np.int64]
+    corner: NDArray[np.int64]
+    first: NDArray[np.int64]
+    count: NDArray[np.int64]
+    low: NDArray[np.int64]
+    high: NDArray[np.int64]
+    balance: NDArray[np.int64]
+
+    def connected_faces(self, n_faces: int) -> NDArray[np.int32]:
+        """Return the (F,) component of each face: faces that share an edge."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        link = np.ones(len(self.face), bool)
+        link[self.first] = False
+        b = np.flatnonzero(link)
+        ones = np.ones(len(b), np.int8)
+        graph = coo_array((ones, (self.face[b - 1], self.face[b])), shape=(n_faces, n_faces))
+        _, label = connected_components(graph, directed=False)
+        return np.asarray(label, np.int32)
+
+    def pairs(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return both half edges of the chosen edges, which have two each."""
+        return self.first[chosen], self.first[chosen] + 1
+
+
+def find_edges(triangle: NDArray[np.int64]) -> Edges:
+    """Find the edges of (F, 3) faces whose corners are welded and differ."""
+    n = int(triangle.max(initial=0)) + 1
+    begin = triangle.reshape(-1)
+    end = np.roll(triangle, -1, axis=1).reshape(-1)
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    key = low * n + high
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    new = np.ones(len(order), bool)
+    new[1:] = ordered[1:] != ordered[:-1]
+    first = np.flatnonzero(new)
+    count = np.diff(np.append(first, len(order)))
+    way = np.where(begin[order] < end[order], 1, -1)
+    balance = np.add.reduceat(way, first) if len(first) else np.zeros(0, np.int64)
+    at = order[first]
+    return Edges(order // 3, order % 3, first, count, low[at], high[at], balance)

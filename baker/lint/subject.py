@@ -1,0 +1,88 @@
+"""What is checked: a scene as its file has it, with what checks share about it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.raw import PrimitiveArrays, RawInstance, RawMesh, RawScene
+from baker.core.scene import Mesh, Scene
+from baker.core.settings import BakeSettings
+from baker.lint.finding import Place
+from baker.lint.mesh_facts import MeshFacts
+
+# Mip level down to which charts must not bleed into each other, if none is asked for.
+DEFAULT_MIP = 2
+
+
+class Subject:
+    """A scene with the settings that it is to be baked with.
+
+    Attributes
+    ----------
+    scene : Scene
+        Loaded leniently, or as a bake has it.
+    raw : RawScene
+    settings : BakeSettings
+    mip : int
+        Mip level of the lightmap down to which charts must not bleed into each other.
+    meshes : tuple of MeshFacts, one for each of `raw.meshes`
+    """
+
+    def __init__(self, scene: Scene, settings: BakeSettings, *, mip: int = DEFAULT_MIP) -> None:
+        self.scene = scene
+        self.settings = settings
+        self.mip = mip
+        self.raw = scene.raw if scene.raw is not None else raw_of(scene)
+        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=scene.raw is None) for mesh in self.raw.meshes)
+
+    @cached_property
+    def first_instance(self) -> dict[int, RawInstance]:
+        """Return the first instance of each mesh."""
+        found: dict[int, RawInstance] = {}
+        for instance in self.raw.instances:
+            found.setdefault(instance.mesh, instance)
+        return found
+
+    def place(self, mesh: int) -> Place:
+        """Return where a mesh stands first."""
+        instance = self.first_instance.get(mesh)
+        if instance is None:
+            return Place(self.raw.meshes[mesh].name)
+        return Place(instance.name or self.raw.meshes[mesh].name, instance.node)
+
+    def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
+        """Return a (3,) point of a mesh in the world, where the mesh stands first."""
+        instance = self.first_instance.get(mesh)
+        matrix = np.eye(4) if instance is None else instance.world_from_object
+        x, y, z = (float(v) for v in matrix[:3, :3] @ np.asarray(point, np.float64) + matrix[:3, 3])
+        return x, y, z
+
+
+def raw_of(scene: Scene) -> RawScene:
+    """Return the good triangles of a scene in the form of raw ones, without copies."""
+    meshes = tuple(RawMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
+    stand = tuple(RawInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
+    return RawScene(meshes, stand)
+
+
+def _primitives(mesh: Mesh) -> tuple[PrimitiveArrays, ...]:
+    # Vertices and triangles of a primitive stand together, in the order of primitives.
+    out = []
+    for number in np.unique(mesh.primitive):
+        rows = slice(*np.searchsorted(mesh.vertex_primitive, [number, number + 1]))
+        faces = slice(*np.searchsorted(mesh.primitive, [number, number + 1]))
+        out.append(
+            PrimitiveArrays(
+                index=int(number),
+                material=int(mesh.material[faces][0]),
+                position=mesh.position[rows],
+                triangle=mesh.triangle[faces].astype(np.int64) - rows.start,
+                normal=mesh.normal[rows],
+                texcoord={k: value[rows] for k, value in enumerate(mesh.texcoord) if value is not None},
+                colour=None if mesh.colour is None else mesh.colour[rows],
+            )
+        )
+    return tuple(out)
