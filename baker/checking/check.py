@@ -127,7 +127,8 @@ def _index_range(error: IndexRangeError) -> Finding:
     # Some formats cannot be taken apart any further once an index is wrong.
     entry = CHECKS.get("index-range")
     assert entry is not None
-    return Finding(entry.code, entry.severity, error.message, entry.fix, Found(error.message, Place(error.object or "")))
+    found = Found(error.message, Place(error.object or ""))
+    return Finding(entry.code, entry.severity, error.message, entry.fix, found)
 
 
 def _ignored(ignore: list[Ignore], finding: Finding) -> bool:

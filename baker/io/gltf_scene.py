@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.raw import RawInstance, RawMesh, RawScene
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
+from baker.core.triangle_check import LARGEST_COORDINATE
 from baker.io.gltf_camera import read_cameras
 from baker.io.gltf_document import GltfDocument, open_document
 from baker.io.gltf_json import JsonObject
@@ -24,7 +25,6 @@ from baker.io.gltf_mesh import read_primitives
 from baker.io.gltf_node import Placed, place_nodes
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_build import build_mesh
-from baker.core.triangle_check import LARGEST_COORDINATE
 
 # Smallest over largest stretch of a node: below it a mesh is squashed flat.
 _FLATTEST = 1e-7
@@ -50,9 +50,7 @@ def import_gltf(source: SceneFile) -> Scene:
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
-    number, placed = _choose_scene(
-        document, source.scene_index, warnings, lenient=source.lenient
-    )
+    number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
     materials = read_materials(document, reflections=source.reflections)
     meshes, instances, raw = _instances(document, placed, materials, warnings, lenient=source.lenient)
     lights = _lights(placed, document, warnings, lenient=source.lenient)

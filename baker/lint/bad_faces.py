@@ -97,8 +97,9 @@ def bad_vertices(subject: Subject) -> Iterator[Found]:
 def zero_area_faces(subject: Subject) -> Iterator[Found]:
     """Faces without area: a line or a point.
 
-    Nothing can be seen of them and a bake leaves them out, but a collapsed face often stands where a real one was
-    meant to be. The limit is a height of 1e-7 of the longest side, below which the plane of the face is only rounding.
+    Nothing can be seen of them and a bake leaves them out, but a collapsed face often stands where a real
+    one was meant to be. The limit is a height of 1e-7 of the longest side, below which the plane of the
+    face is only rounding.
     """
     for m, facts in _each(subject):
         bad = np.flatnonzero(facts.flat)
@@ -138,8 +139,9 @@ def needle_faces(subject: Subject) -> Iterator[Found]:
 def duplicate_faces(subject: Subject) -> Iterator[Found]:
     """Faces that repeat another one of the same mesh, corner by corner.
 
-    Two surfaces in the same place shadow each other at random. A bake keeps the first of each; engines keep both. A
-    face with the opposite winding is the other's back and no double, unless their material is double-sided anyway.
+    Two surfaces in the same place shadow each other at random. A bake keeps the first of each; engines
+    keep both. A face with the opposite winding is the other's back and no double, unless their material is
+    double-sided anyway.
     """
     for m, facts in _each(subject):
         bad = np.flatnonzero(facts.repeated)

@@ -1,4 +1,4 @@
-"""What several checks need to know of one mesh, each worked out once: faces, welded corners, edges, pieces."""
+"""What several checks need to know of one mesh, each worked out once: faces, edges, pieces."""
 
 from __future__ import annotations
 
@@ -194,8 +194,8 @@ def number_positions(position: NDArray[np.float32]) -> NDArray[np.int64]:
 
     Notes
     -----
-    Sorts one 64-bit hash instead of three columns: 0.2 s for a million rows instead of 0.9 s. Rows with the same
-    hash are compared; the few that only collide are numbered by value.
+    Sorts one 64-bit hash instead of three columns: 0.2 s for a million rows instead of 0.9 s. Rows with
+    the same hash are compared; the few that only collide are numbered by value.
     """
     from baker.core.topology import weld
 

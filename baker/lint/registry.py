@@ -1,7 +1,7 @@
 """The register of checks: one function a code, with severity, advice and the text of its docs.
 
-A check function takes a `Subject` and yields `Found`. Its docstring is its page in the docs: the first line says
-what it finds, the rest why that matters and what it looks at.
+A check function takes a `Subject` and yields `Found`. Its docstring is its page in the docs: the first
+line says what it finds, the rest why that matters and what it looks at.
 """
 
 from __future__ import annotations

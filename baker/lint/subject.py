@@ -36,7 +36,8 @@ class Subject:
         self.settings = settings
         self.mip = mip
         self.raw = scene.raw if scene.raw is not None else raw_of(scene)
-        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=scene.raw is None) for mesh in self.raw.meshes)
+        trusted = scene.raw is None
+        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.raw.meshes)
 
     @cached_property
     def first_instance(self) -> dict[int, RawInstance]:

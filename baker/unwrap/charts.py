@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress
+from baker.core.topology import number_by_first, weld
 from baker.unwrap.check import CHART_TOLERANCE, chart_overlap, uv_area
 from baker.unwrap.parts import JOB_TRIANGLES, cut_parts
 from baker.unwrap.planar import planar_charts
 from baker.unwrap.pool import run_jobs
-from baker.core.topology import number_by_first, weld
 from baker.unwrap.xatlas_charts import ChartJob, FlatCharts
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Mesh, Scene, SceneWarning
-from baker.unwrap.check import PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
 from baker.core.topology import connected_vertices, weld
+from baker.unwrap.check import PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.unwrap.check import CHART_TOLERANCE, chart_overlap
 from baker.core.topology import connected_faces, number_by_first
+from baker.unwrap.check import CHART_TOLERANCE, chart_overlap
 
 
 def planar_charts(

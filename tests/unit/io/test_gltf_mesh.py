@@ -10,9 +10,9 @@ import pytest
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, mesh_glb, write
 from PIL import Image
 
+from baker.core.triangle_check import duplicates, zero_area
 from baker.io.gltf_mesh import triangles_of
 from baker.io.load import load_scene
-from baker.core.triangle_check import duplicates, zero_area
 
 
 def codes(scene):

@@ -15,12 +15,12 @@ from unwrap_truth import covered_texels
 import baker.unwrap.pool as pool
 from baker.core.errors import Cancelled
 from baker.core.progress import silent
+from baker.core.topology import connected_faces, connected_vertices, number_by_first, weld
 from baker.kernels.uv_overlap import count_close, mark_charts
 from baker.unwrap.check import chart_overlap, page_overlap
 from baker.unwrap.pack import Shapes, fit_page, pack
 from baker.unwrap.parts import cut_parts
 from baker.unwrap.planar import lay_flat, planar_charts
-from baker.core.topology import connected_faces, connected_vertices, number_by_first, weld
 from baker.unwrap.xatlas_charts import ChartJob, cut_charts
 
 
