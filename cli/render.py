@@ -40,7 +40,7 @@ def command() -> Any:
             typer.Option(
                 "--estimator",
                 metavar="NAME",
-                help="uniform, cosine, stratified, light, bsdf, mis, mis-power.",
+                help="uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.",
             ),
             "mis",
         ),

@@ -72,45 +72,56 @@ def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
 def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untyped-def]
     """Write f(v, l) n.l (RGB) to `out` (3,) and return the density with which `bsdf_sample` finds l.
 
-    row : (5, 16) parameters by lane; v, l : unit, pointing away from the surface, in its frame
+    row : (5, n) parameters, those of `lane` in one column
+    v, l : unit, pointing away from the surface, in its frame
     """
+    return bsdf_cosines(row, lane, vz, lz, vx * lx + vy * ly + vz * lz, out)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bsdf_cosines(row, lane, nv, nl, vl, out):  # type: ignore[no-untyped-def]
+    """Do the same from the cosines n.v, n.l and v.l, which are all that an isotropic surface asks for."""
     out[0] = out[1] = out[2] = 0.0
-    if vz <= 0.0 or lz <= 0.0:
+    if nv <= 0.0 or nl <= 0.0:
         return 0.0
     a = row[WIDTH, lane]
     if a < 0.0:
         for c in range(3):
-            out[c] = row[c, lane] * INV_PI * lz
-        return lz * INV_PI
+            out[c] = row[c, lane] * INV_PI * nl
+        return nl * INV_PI
     metallic = row[METALLIC, lane]
-    hx, hy, hz = vx + lx, vy + ly, vz + lz
-    length = math.sqrt(hx * hx + hy * hy + hz * hz)
-    hx, hy, hz = hx / length, hy / length, hz / length
-    vh = vx * hx + vy * hy + vz * hz
+    # h = (v + l) / |v + l|, |v + l|^2 = 2 + 2 v.l
+    length = math.sqrt(max(2.0 + 2.0 * vl, 1.0e-30))
     lobe = 0.0
     if a >= SMOOTH:
-        lobe = ggx_density(hz, a) * ggx_visibility(lz, vz, a)
+        lobe = ggx_density((nv + nl) / length, a) * ggx_visibility(nl, nv, a)
+    vh = 0.5 * length
     for c in range(3):
         base = row[c, lane]
         f = fresnel(DIELECTRIC + (base - DIELECTRIC) * metallic, vh)
-        out[c] = (base * (1.0 - metallic) * (1.0 - f) * INV_PI + f * lobe) * lz
-    return bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz)
+        out[c] = (base * (1.0 - metallic) * (1.0 - f) * INV_PI + f * lobe) * nl
+    return cosines_pdf(row, lane, nv, nl, vl)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):  # type: ignore[no-untyped-def]
     """Return the density per steradian with which `bsdf_sample` finds l from v, mirrors left out."""
-    if vz <= 0.0 or lz <= 0.0:
+    return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cosines_pdf(row, lane, nv, nl, vl):  # type: ignore[no-untyped-def]
+    """Return the same density from the cosines n.v, n.l and v.l."""
+    if nv <= 0.0 or nl <= 0.0:
         return 0.0
     a = row[WIDTH, lane]
     if a < 0.0:
-        return lz * INV_PI
-    chance = specular_chance(row, lane, vz)
-    density = (1.0 - chance) * lz * INV_PI
+        return nl * INV_PI
+    chance = specular_chance(row, lane, nv)
+    density = (1.0 - chance) * nl * INV_PI
     if a >= SMOOTH:
-        hx, hy, hz = vx + lx, vy + ly, vz + lz
-        length = math.sqrt(hx * hx + hy * hy + hz * hz)
-        density += chance * ggx_masking(vz, a) * ggx_density(hz / length, a) / (4.0 * vz)
+        nh = (nv + nl) / math.sqrt(max(2.0 + 2.0 * vl, 1.0e-30))
+        density += chance * ggx_masking(nv, a) * ggx_density(nh, a) / (4.0 * nv)
     return density
 
 

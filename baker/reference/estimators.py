@@ -1,7 +1,8 @@
 """The ways to sample the rendering equation, by name, and what each switches on in a path.
 
 `uniform`, `cosine`, `stratified` and `bsdf` find lamps by chance; `light` aims at them from every vertex;
-`mis` does both and weighs them. Lights without area can only be aimed at, whatever the name.
+`mis` does both and weighs them; `bdpt` connects paths from the eye to paths from lamps. Lights without area
+can only be aimed at, or started from, whatever the name.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.
@@ -28,12 +29,15 @@ class Estimator(NamedTuple):
         1: the first two random pairs of a pass's samples are a scrambled (0,2)-net.
     power : int
         MIS by the power heuristic (exponent 2) instead of the balance heuristic.
+    both : int
+        1: a second path starts at a lamp, and both are connected in all ways (`bidirectional`).
     """
 
     hemisphere: int
     aim: int
     strata: int = 0
     power: int = 0
+    both: int = 0
 
 
 ESTIMATORS = {
@@ -44,6 +48,7 @@ ESTIMATORS = {
     "bsdf": Estimator(0, 0),
     "mis": Estimator(0, 2),
     "mis-power": Estimator(0, 2, power=1),
+    "bdpt": Estimator(0, 2, both=1),
 }
 
 

@@ -118,11 +118,16 @@ def irradiance_pass(
         rows = picked[begin:end]
         out = np.zeros((end - begin, 3))
         places = (position[rows], normal[rows], face_normal[rows])
-        cast = trace_paths(
-            *places, begin, True, reference.surfaces, reference.lamps, reference.shading,
-            new_caster(reference.rays.tracer), net, setting, out,
-        )  # fmt: skip
-        counted[begin // _TILE] = sum(cast)
+        if how.both:
+            from baker.reference.bidirectional_pass import surface_tile
+
+            counted[begin // _TILE] = surface_tile(reference, places, begin, net, setting, out)
+        else:
+            cast = trace_paths(
+                *places, begin, True, reference.surfaces, reference.lamps, reference.shading,
+                new_caster(reference.rays.tracer), net, setting, out,
+            )  # fmt: skip
+            counted[begin // _TILE] = sum(cast)
         add_pass(estimate, rows, out * (math.pi / samples))
 
     run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)

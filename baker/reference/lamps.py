@@ -167,9 +167,15 @@ def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
     square = max(dx * dx + dy * dy + dz * dz, 1.0e-20)
     length = math.sqrt(square)
     dx, dy, dz = dx / length, dy / length, dz / length
-    share = 1.0
-    if point[e, KIND] == 1.0:
-        cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
-        share = min(max((cosine - point[e, OUTER]) * point[e, SCALE], 0.0), 1.0)
-        share *= share
+    cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
+    share = spot_share(point, e, cosine)
     return dx, dy, dz, length * _SHORT, share / square
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def spot_share(point, e, cosine):  # type: ignore[no-untyped-def]
+    """Return the share of its intensity that light e sends at this cosine to its axis; 1 if it is no spot."""
+    if point[e, KIND] != 1.0:
+        return 1.0
+    share = min(max((cosine - point[e, OUTER]) * point[e, SCALE], 0.0), 1.0)
+    return share * share

@@ -50,6 +50,11 @@ def radiance_pass(
     samples, number = estimate.samples, estimate.rounds
     net = sobol_reversed(samples, seed, 1 + number)
     setting = path_setting(how, how.strata, max_bounces, seed, number)
+    if how.both:
+        from baker.reference.bidirectional_pass import picture_pass
+
+        picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
+        return
     counted = np.zeros(-(-width * height // _TILE), np.int64)
     eye = np.array(camera.position)
 

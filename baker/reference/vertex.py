@@ -35,9 +35,12 @@ from baker.reference.lamps import (
 from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
 
 # Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
-# emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces.
-PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES = 0, 3, 6, 9, 12, 13, 16, 25, 28
-N_ROWS = 29
+# emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces, the
+# interpolated normal on the geometric one's side.
+PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = 0, 3, 6, 9, 12, 13, 16, 25, 28, 29
+N_ROWS = 32
+# A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
+GRAZE = 1.0e-3
 # Origins leave the surface by this share of the largest coordinate.
 _OFFSET = 1.0e-5
 _SHORT = 0.9999
@@ -94,8 +97,9 @@ def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  
     if length < 1.0e-6 or nx * fx + ny * fy + nz * fz <= 0.0:
         nx, ny, nz, length = fx, fy, fz, 1.0
     nx, ny, nz = sign * nx / length, sign * ny / length, sign * nz / length
+    path[SHADED, lane], path[SHADED + 1, lane], path[SHADED + 2, lane] = nx, ny, nz
     glossy = lambertian == 0
-    if glossy and nx * dx + ny * dy + nz * dz >= -1.0e-3:
+    if glossy and nx * dx + ny * dy + nz * dz >= -GRAZE:
         # The interpolated normal looks away: a glossy lobe would have no side to reflect from.
         nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
     set_frame(path, lane, nx, ny, nz)

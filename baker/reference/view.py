@@ -49,6 +49,8 @@ class Reference:
     surfaces : Surfaces
     lamps : LampTable
     rays : RayScene
+    sphere : (4,) float64
+        Centre and radius, metres, of a sphere around everything.
     threads : int
     """
 
@@ -57,6 +59,7 @@ class Reference:
     surfaces: Surfaces
     lamps: LampTable
     rays: RayScene
+    sphere: NDArray[np.float64]
     threads: int
 
     def __enter__(self) -> Reference:
@@ -103,7 +106,7 @@ def build_reference(
     rays = RayScene(geometry.position, geometry.triangle, threads=count, see_through=see_through(shading))
     lamps = build_lamps(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lamps, lambertian)
-    return Reference(geometry, shading, surfaces, lamps, rays, count)
+    return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count)
 
 
 def _no_atlas(scene: Scene) -> Atlas:
@@ -125,6 +128,15 @@ def _no_atlas(scene: Scene) -> Atlas:
             )
         )
     return Atlas(1, 1, tuple(layouts), 0, 0)
+
+
+def _sphere(geometry: Geometry) -> NDArray[np.float64]:
+    if not len(geometry.position):
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
+    # A little more than half the diagonal: nothing that parallel light starts at touches the scene.
+    radius = max(0.501 * float(np.linalg.norm(high - low)), 1e-9)
+    return np.array([*(0.5 * (low + high)), radius])
 
 
 def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian: bool) -> Surfaces:
