@@ -20,6 +20,7 @@ from baker import warm
 from baker.channels.channel import CHANNELS, Channel, Transport
 from baker.core.atlas import Atlas
 from baker.core.errors import ResourceError, SettingsError
+from baker.core.export import check_exports
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import thread_count
@@ -115,6 +116,7 @@ def bake(
         from baker.io.output import check_encodings, check_out
 
         check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
+        check_exports(settings.export, settings.channels)
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record = Record(progress)
     compiling = warm.start()

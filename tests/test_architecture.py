@@ -16,7 +16,17 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
 # Libraries that are slow to import or that a file should hide behind an interface.
 HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic")
-NOT_SOURCE = {".git", ".venv", "build", "dist", ".mypy_cache", ".ruff_cache", ".pytest_cache", "__pycache__"}
+NOT_SOURCE = {
+    ".git",
+    ".venv",
+    "node_modules",
+    "build",
+    "dist",
+    ".mypy_cache",
+    ".ruff_cache",
+    ".pytest_cache",
+    "__pycache__",
+}
 
 
 def sources(*folders):

@@ -16,7 +16,7 @@ from baker.core.errors import SettingsError
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
 # Settings that are lists of names: with commas on the command line.
-_LISTS = {"channels", "encode"}
+_LISTS = {"channels", "encode", "export"}
 
 
 class BakeSettings(BaseModel):
@@ -57,6 +57,9 @@ class BakeSettings(BaseModel):
     )
     rgbm_range: str = Field(
         "auto", description="Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel."
+    )
+    export: tuple[str, ...] = Field(
+        (), description="Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
     )
     up: Literal["y", "z"] = Field("y", description="Up axis of OBJ, PLY, STL and OFF files.")
     scale: float = Field(1.0, gt=0, description="Metres per unit of OBJ, PLY, STL and OFF files.")

@@ -10,6 +10,7 @@ from typing import Any
 
 from baker.core.encoding import ENCODINGS, EncodeOptions, Encoding, Loss, measure_loss
 from baker.core.errors import ResourceError, SettingsError
+from baker.core.export import EXPORTS
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
@@ -134,8 +135,34 @@ def _write_files(
         warnings=tuple(warnings),
         created=created,
     )
-    (folder.path / MANIFEST_NAME).write_text(manifest_text(manifest), "utf-8", newline="\n")
+    _write_manifest(folder.path, manifest)
+    # An export reads a bake that is whole but for the exports themselves.
+    for name in result.settings.export:
+        report(progress, "write", 1.0, f"export {name}")
+        manifest["files"] += _write_export(folder.path, name)
+    if result.settings.export:
+        _write_manifest(folder.path, manifest)
     return manifest
+
+
+def _write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
+    (folder / MANIFEST_NAME).write_text(manifest_text(manifest), "utf-8", newline="\n")
+
+
+def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
+    """Write one export into a folder of its name; return its files for the manifest."""
+    export = EXPORTS.get(name)
+    if export is None:
+        raise SettingsError(f"there is no export '{name}'; known are {', '.join(EXPORTS.names())}")
+    target = folder / name
+    target.mkdir()
+    export.write(folder, target)
+    found = []
+    for path in sorted(p for p in target.rglob("*") if p.is_file()):
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        found.append({"file": path.relative_to(folder).as_posix(), "sha256": digest})
+    return found
 
 
 def _write_page(

@@ -88,6 +88,7 @@ OTHER = {
     "exr_compression": ("piz", "piz"),
     "encode": ("hdr,png16", ("hdr", "png16")),
     "rgbm_range": ("8", "8"),
+    "export": ("three,unity", ("three", "unity")),
     "up": ("z", "z"),
     "scale": ("0.01", 0.01),
     "seed": ("7", 7),

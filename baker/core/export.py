@@ -1,0 +1,48 @@
+"""What an export is: one file of `baker.export` that makes a finished bake ready for one engine.
+
+Callers find an export by its name in `EXPORTS` and never import it, so a new engine is one new file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from baker.core.errors import SettingsError
+from baker.core.registry import Registry
+
+
+class Export(Protocol):
+    """Writes what one engine needs.
+
+    `needs` lists the channels that must have been baked.
+    """
+
+    needs: tuple[str, ...]
+
+    def write(self, bake: Path, target: Path) -> None:
+        """Write files for a whole bake in the folder `bake` into the existing empty folder `target`.
+
+        The same bake gives the same bytes.
+        """
+
+
+EXPORTS: Registry[Export] = Registry("baker.export")
+
+
+def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
+    """Make sure that exports exist and that what they need is baked.
+
+    Raises
+    ------
+    SettingsError
+    """
+    for name in names:
+        export = EXPORTS.get(name)
+        if export is None:
+            known = ", ".join(EXPORTS.names())
+            raise SettingsError(f"there is no export '{name}'; known are {known}", object="export")
+        for channel in export.needs:
+            if channel not in channels:
+                message = f"the export '{name}' needs the channel {channel}; add it to --channels"
+                raise SettingsError(message, object="export")

@@ -1,0 +1,143 @@
+"""Bakes whose pixels in an engine are known: a probe square with made-up light, and a room of constant light.
+
+The probe: a square of 2 x 2 in the xy plane, seen from +z. TEXCOORD_0 is one single point, TEXCOORD_1 the
+whole page with v = 0 at the top. Its page has four quadrants of irradiance: pi, 2 pi, pi / 4, pi / 2 (left to
+right, top to bottom), so albedo x E / pi is albedo times 1, 2, 1/4, 1/2.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from gltf_builder import GltfBuilder, write
+
+import baker
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.settings import make_settings
+from baker.io.load import load_scene
+from baker.io.output import write_bake
+
+ALBEDO = (0.8, 0.5, 0.25)
+QUADRANT = np.array([[1.0, 2.0], [0.25, 0.5]])
+# The middles of the quadrants, as shares of the picture from its top left.
+MIDDLE = [(0.25, 0.25), (0.25, 0.75), (0.75, 0.25), (0.75, 0.75)]
+# A name that loaders change, and that two nodes have.
+NAME = "wall.north side"
+SIZE = 64
+
+# A closed room: radiance of the walls EMISSION / (1 - REFLECTED) wherever one looks.
+EMISSION, REFLECTED = 0.5, 0.5
+ROOM_RADIANCE = EMISSION / (1.0 - REFLECTED)
+
+
+def probe_page() -> np.ndarray:
+    """Return (SIZE, SIZE, 3) float32, lx."""
+    page = np.kron(QUADRANT, np.ones((SIZE // 2, SIZE // 2))) * math.pi
+    return np.repeat(page[:, :, None], 3, axis=2).astype(np.float32)
+
+
+def probe_expected(albedo: tuple[float, float, float] = ALBEDO) -> np.ndarray:
+    """Return (4, 3): what the quadrants' middles show, in the order of `MIDDLE`."""
+    return QUADRANT.ravel()[:, None] * np.array(albedo)
+
+
+def probe_builder(alpha: str = "OPAQUE") -> GltfBuilder:
+    """Return the probe's glTF: node 1 is the square, node 2 another far away, of the same name."""
+    builder = GltfBuilder()
+    position = np.float32([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+    whole = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
+    triangle = np.uint16([[0, 2, 1], [0, 3, 2]])
+    material = {"pbrMetallicRoughness": {"baseColorFactor": [*ALBEDO, 1.0], "metallicFactor": 0.0}}
+    mesh = builder.mesh(
+        builder.primitive(
+            position,
+            triangle,
+            NORMAL=np.float32([[0, 0, 1]] * 4),
+            TEXCOORD_0=np.full((4, 2), 0.3, np.float32),
+            TEXCOORD_1=whole,
+            material=builder.add("materials", material),
+        )
+    )
+    for accessor in builder.json["accessors"]:
+        if accessor["type"] == "VEC3" and "min" not in accessor:
+            accessor |= {"min": [-1, -1, 0], "max": [1, 1, 0]}
+            break
+    builder.node(name="empty")
+    builder.node(name=NAME, mesh=mesh)
+    builder.node(name=NAME, mesh=mesh, translation=[50.0, 0.0, 0.0])
+    return builder
+
+
+def write_probe(folder: Path, exports: str, *, page: np.ndarray | None = None, **settings: object) -> Path:
+    """Write the probe as a bake with these exports and return the output folder.
+
+    The far square lies on a page of its own, which is black.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load_scene(write(folder / "probe.glb", probe_builder()))
+    layouts = tuple(_whole(scene, index) for index in range(2))
+    light = np.stack([probe_page() if page is None else page, np.zeros((SIZE, SIZE, 3), np.float32)])
+    result = BakeResult(
+        scene=scene,
+        atlas=Atlas(SIZE, 2, layouts, 2, 0),
+        settings=make_settings({"resolution": SIZE, "export": exports, **settings}),
+        lightmaps={
+            "irradiance": Lightmap("irradiance", "lx", light),
+            "ao": Lightmap("ao", "1", np.full((2, SIZE, SIZE, 1), 0.5, np.float32)),
+        },
+        status=np.ones((2, SIZE, SIZE), np.uint8),
+        texel_count=np.full(2, SIZE * SIZE),
+    )
+    write_bake(result, folder / "out")
+    return folder / "out"
+
+
+def _whole(scene: baker.Scene, index: int) -> InstanceLayout:
+    mesh = scene.meshes[scene.instances[index].mesh]
+    uv, vertex = mesh.texcoord[1], np.arange(len(mesh.position), dtype=np.int32)
+    assert uv is not None
+    chart = np.full(len(mesh.triangle), index, np.int32)
+    return InstanceLayout(index, index, vertex, uv, mesh.triangle, chart, True, SIZE / 2)
+
+
+def room_builder() -> GltfBuilder:
+    """Return a closed box of 2 x 2 x 2 seen from inside, all walls of one grey that glows."""
+    builder = GltfBuilder()
+    grey = builder.add(
+        "materials",
+        {
+            "pbrMetallicRoughness": {"baseColorFactor": [REFLECTED] * 3 + [1.0], "metallicFactor": 0.0},
+            "emissiveFactor": [EMISSION] * 3,
+        },
+    )
+    square = np.float32([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            position = np.zeros((4, 3), np.float32)
+            position[:, (axis + 1) % 3], position[:, (axis + 2) % 3] = square.T
+            position[:, axis] = side
+            triangle = np.uint16([[0, 1, 2], [0, 2, 3]])
+            normal = np.zeros((4, 3), np.float32)
+            normal[:, axis] = -side
+            primitive = builder.primitive(
+                position,
+                triangle if side < 0 else triangle[:, ::-1].copy(),
+                NORMAL=normal,
+                TEXCOORD_0=np.zeros((4, 2), np.float32),
+                material=grey,
+            )
+            accessor = builder.json["accessors"][primitive["attributes"]["POSITION"]]
+            accessor |= {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()}
+            builder.node(name="wall", mesh=builder.mesh(primitive))
+    return builder
+
+
+def write_room(folder: Path, exports: str) -> Path:
+    """Bake the room with these exports and return the output folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = write(folder / "room.glb", room_builder())
+    baker.bake(scene, out=folder / "out", resolution=64, samples=256, export=exports)
+    return folder / "out"
