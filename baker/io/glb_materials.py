@@ -58,7 +58,7 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
     occlusion : bool
         Whether the occlusion texture counts (not if AO takes its place).
     """
-    for holder in _material_holders(primitive):
+    for holder in material_holders(primitive):
         if "material" in holder:
             material = document["materials"][holder["material"]]
             if any(_texcoord(info) == 1 for info in _texture_infos(material, occlusion=occlusion)):
@@ -83,7 +83,7 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
     for mesh in document.get("meshes", []):
         for primitive in mesh["primitives"]:
             use = baked.get(id(primitive))
-            for holder in _material_holders(primitive):
+            for holder in material_holders(primitive):
                 index = holder.get("material", _NONE)
                 need = _need(document, index, use, ao_texture)
                 wanted.setdefault(index, {}).setdefault(need, []).append(holder)
@@ -143,7 +143,7 @@ def _texture_infos(node: Json, *, occlusion: bool) -> Iterator[Json]:
             yield from _texture_infos(value, occlusion=True)
 
 
-def _material_holders(primitive: Json) -> Iterator[Json]:
+def material_holders(primitive: Json) -> Iterator[Json]:
     """List the objects whose `material` a primitive may be drawn with: itself and its variants."""
     yield primitive
     variants = primitive.get("extensions", {}).get("KHR_materials_variants", {})

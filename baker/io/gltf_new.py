@@ -31,7 +31,7 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     extensions: set[str] = set()
     images: dict[int, int] = {}
     if scene.materials:
-        document["materials"] = [_material(packer, m, images, extensions) for m in scene.materials]
+        document["materials"] = [material_json(packer, m, images, extensions) for m in scene.materials]
     order = sorted(range(len(scene.instances)), key=lambda i: (scene.instances[i].node, i))
     uses: list[BakedUse] = []
     instance_mesh = [0] * len(order)
@@ -110,7 +110,19 @@ def _primitives(packer: Packer, mesh: Mesh, layout: InstanceLayout, *, mirrored:
     return primitives
 
 
-def _material(packer: Packer, material: Material, images: dict[int, int], extensions: set[str]) -> Json:
+def material_json(packer: Packer, material: Material, images: dict[int, int], extensions: set[str]) -> Json:
+    """Return a material as glTF has it.
+
+    Parameters
+    ----------
+    packer : Packer
+        Takes the material's images.
+    material : Material
+    images : dict
+        Image index by the identity of its array, of those that are embedded already; added to.
+    extensions : set of str
+        Extensions in use; added to.
+    """
     surface: Json = {
         "baseColorFactor": [min(max(float(v), 0.0), 1.0) for v in material.base_colour],
         "metallicFactor": min(max(float(material.metallic), 0.0), 1.0),

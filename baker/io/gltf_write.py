@@ -126,7 +126,7 @@ def _rewrite(
     for piece in pieces:
         moved = None if piece.kept else _rewrite_primitive(packer, source, piece, ao=ao)
         uses.append(BakedUse(piece.primitive, piece.page, moved))
-    _embed_images(packer, source)
+    embed_images(packer, source)
     for name in (_COMPRESSED_PRIMITIVE, *_COMPRESSED_VIEW):
         if not _mentions(document, name):
             _forget_extension(document, name)
@@ -228,7 +228,7 @@ def _decompress_views(document: Json, source: SourceDocument) -> None:
                     del view["extensions"]
 
 
-def _embed_images(packer: Packer, source: SourceDocument) -> None:
+def embed_images(packer: Packer, source: SourceDocument) -> None:
     """Move image files and data URIs into the buffer, so that the GLB stands alone."""
     for index, image in enumerate(packer.document.get("images", [])):
         uri = image.get("uri")

@@ -1,0 +1,76 @@
+"""Finds rows of bytes that are equal.
+
+Rows are told apart by a 64 bit hash first and compared in full after, so that millions of them take a moment
+and no two different ones are ever taken for one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[np.int64]:
+    """Return for each row the number of the first row that equals it, bit for bit.
+
+    Parameters
+    ----------
+    column : sequence of (N, any) arrays
+        Rows are equal if they are so in every array.
+    n_rows : int
+        N, which no column says if there are none: then all rows are equal.
+
+    Returns
+    -------
+    (N,) int64
+    """
+    if n_rows == 0:
+        return np.zeros(0, np.int64)
+    data = [_words(array) for array in column]
+    key = np.zeros(n_rows, np.uint64)
+    for words in data:
+        for k in range(words.shape[1]):
+            key = mix(key ^ words[:, k])
+    _, index, inverse = np.unique(key, return_index=True, return_inverse=True)
+    first: NDArray[np.int64] = index[inverse].astype(np.int64)
+    if all(np.array_equal(words, words[first]) for words in data):
+        return first
+    # Two different rows share a hash, which is next to impossible: sort the rows themselves.
+    joined = np.concatenate(data, axis=1)
+    _, index, inverse = np.unique(joined, axis=0, return_index=True, return_inverse=True)
+    return index[inverse.ravel()].astype(np.int64)
+
+
+def compact(first: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows that are the first of their kind, and each row's place among them.
+
+    Parameters
+    ----------
+    first : (N,) int64
+        As `first_equal` gives it.
+
+    Returns
+    -------
+    kept : (K,) int64, ascending
+    place : (N,) int64, below K
+    """
+    kept, place = np.unique(first, return_inverse=True)
+    return kept.astype(np.int64), place.astype(np.int64)
+
+
+def _words(array: NDArray[np.generic]) -> NDArray[np.uint64]:
+    """Return the bytes of each row as whole 64 bit words, (N, K) uint64."""
+    flat = np.ascontiguousarray(array).reshape(len(array), -1).view(np.uint8)
+    padded = np.pad(flat, ((0, 0), (0, -flat.shape[1] % 8)))
+    return padded.view(np.uint64)
+
+
+def mix(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return (N,) hashes of (N,) numbers: every bit of the input changes half of the bits."""
+    # Based on: Sebastiano Vigna, SplitMix64's finaliser, 2015.
+    value = value + np.uint64(0x9E3779B97F4A7C15)
+    value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return value ^ (value >> np.uint64(31))

@@ -1,0 +1,308 @@
+"""Mends one mesh: first decides what stays, then makes the new vertices and triangles of each primitive.
+
+Between the two the caller may judge the lightmap uv of what stays, and give new ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.mended import MendedPrimitive
+from baker.core.rows import compact, first_equal
+from baker.core.triangle_check import face_normal, usable_vertices, zero_area
+from baker.mend.faces import FaceChoice, choose_faces
+from baker.mend.normals import NormalChoice, choose_normals
+from baker.mend.part import Part
+from baker.mend.winding import judge_winding
+
+
+@dataclass(frozen=True)
+class Change:
+    """One kind of defect that was mended in an object.
+
+    Attributes
+    ----------
+    change : str
+        Stable name.
+    counted : str
+        What the numbers count.
+    before, after : int
+    """
+
+    change: str
+    counted: str
+    before: int
+    after: int
+
+
+@dataclass(frozen=True)
+class PartPlan:
+    """What stays of a primitive.
+
+    Attributes
+    ----------
+    part : Part
+    touched : bool
+        Something was mended; otherwise the primitive stays as it is in the file.
+    triangle : (T, 3) int64, old vertices; faces to be turned are turned already
+    normal : (T, 3, 3) float32 or None
+        New normals of the corners.
+    turned : (T, 3) bool
+        Corners whose normal points the other way now.
+    """
+
+    part: Part
+    touched: bool
+    triangle: NDArray[np.int64]
+    normal: NDArray[np.float32] | None
+    turned: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MeshPlan:
+    """What stays of a mesh, what was mended, and what was left and why (sentences)."""
+
+    parts: tuple[PartPlan, ...]
+    changes: tuple[Change, ...]
+    left: tuple[str, ...]
+
+
+def plan_mesh(parts: Sequence[Part]) -> MeshPlan:
+    """Decide what stays of a mesh.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        All its primitives of triangles.
+    """
+    left: list[str] = []
+    choices = [choose_faces(part) for part in parts]
+    parts = [_lock_empty(part, choice) for part, choice in zip(parts, choices, strict=True)]
+    free = [not part.locked for part in parts]
+    triangles = [
+        part.arrays.triangle[choice.keep] if is_free else part.arrays.triangle
+        for part, choice, is_free in zip(parts, choices, free, strict=True)
+    ]
+    flips = _choose_flips(parts, triangles, left)
+    plans: list[PartPlan] = []
+    totals = _Totals()
+    for part, choice, kept, flip in zip(parts, choices, triangles, flips, strict=True):
+        turned_faces = np.where(flip[:, None], kept[:, [0, 2, 1]], kept)
+        good = part.arrays.triangle[choice.keep] if part.locked else turned_faces
+        normals = _normals(part, good)
+        n_doubles = _count_doubles(part, good, normals)
+        wanted = bool(choice.n_dropped or flip.any() or normals.n_made or n_doubles)
+        if part.locked:
+            if wanted or choice.n_unlike:
+                left.append(_locked_sentence(part, choice, normals, n_doubles))
+            none = np.zeros(kept.shape, bool)
+            plans.append(PartPlan(part, False, kept, None, none))
+            continue
+        if choice.n_unlike:
+            left.append(_unlike_sentence(part, choice.n_unlike))
+        plans.append(_part_plan(part, wanted, turned_faces, flip, normals))
+        totals.add(choice, len(np.unique(kept)), n_doubles, int(flip.sum()), normals)
+    return MeshPlan(tuple(plans), totals.changes(), tuple(left))
+
+
+def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> MendedPrimitive | None:
+    """Make the new vertices of a primitive: equal ones become one, unused ones go.
+
+    Parameters
+    ----------
+    plan : PartPlan
+    uv : (T, 3, 2) float32 or None
+        New TEXCOORD_1 of each corner.
+
+    Returns
+    -------
+    MendedPrimitive or None
+        None if the primitive stays as it is in the file.
+    """
+    if not plan.touched and uv is None:
+        return None
+    part = plan.part
+    replaced = set() if plan.normal is None else {"NORMAL"}
+    replaced |= set() if uv is None else {"TEXCOORD_1"}
+    column = [data for name, data in part.column.items() if name not in replaced]
+    row = first_equal(column, len(part.arrays.position))[plan.triangle].reshape(-1)
+    own: list[NDArray[np.generic]] = [row.reshape(-1, 1), plan.turned.reshape(-1, 1)]
+    own += [] if plan.normal is None else [plan.normal.reshape(-1, 3)]
+    own += [] if uv is None else [uv.reshape(-1, 2)]
+    corner, place = compact(first_equal(own, len(row)))
+    # Vertices stay in the file's order.
+    order = np.argsort(row[corner], kind="stable")
+    rank = np.zeros(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    corner = corner[order]
+    return MendedPrimitive(
+        row=row[corner],
+        triangle=rank[place].reshape(-1, 3),
+        normal=None if plan.normal is None else plan.normal.reshape(-1, 3)[corner],
+        turned=plan.turned.reshape(-1)[corner],
+        uv=None if uv is None else uv.reshape(-1, 2)[corner],
+    )
+
+
+def _lock_empty(part: Part, choice: FaceChoice) -> Part:
+    if part.locked or choice.keep.any():
+        return part
+    # A primitive cannot be empty in glTF, and to take it away would renumber the others.
+    return replace(part, locked="nothing would be left of it; delete it in the scene it comes from")
+
+
+def _choose_flips(
+    parts: Sequence[Part], triangles: Sequence[NDArray[np.int64]], left: list[str]
+) -> list[NDArray[np.bool_]]:
+    """Return for each primitive which of its faces are to be turned."""
+    nothing = [np.zeros(len(triangle), bool) for triangle in triangles]
+    position = np.concatenate([part.arrays.position for part in parts])
+    start = np.cumsum([0] + [len(part.arrays.position) for part in parts])
+    joined = np.concatenate([t + s for t, s in zip(triangles, start, strict=False)])
+    owner = np.repeat(np.arange(len(parts)), [len(t) for t in triangles])
+    # What is not drawn takes no part: in locked primitives it is still there.
+    drawn = usable_vertices(position)[joined].all(axis=1)
+    drawn[drawn] = ~zero_area(position, joined[drawn])
+    if not drawn.any():
+        return nothing
+    normal = np.concatenate([_face_mean(p, t) for p, t in zip(parts, triangles, strict=True)])[drawn]
+    place = first_equal([position + np.float32(0.0)], len(position))
+    winding = judge_winding(position, place[joined[drawn]], normal)
+    if winding.n_one_sided:
+        left.append(f"{winding.n_one_sided} closed pieces have no outside (like a Klein bottle)")
+    if winding.inward.any():
+        left.append(
+            f"{int(winding.inward.sum())} faces of closed pieces look inwards: right for a room seen from"
+            " inside, else turn them in the scene they come from"
+        )
+    flip = np.zeros(len(joined), bool)
+    flip[np.flatnonzero(drawn)[winding.flip]] = True
+    locked = [part.locked for k, part in enumerate(parts) if part.locked and flip[owner == k].any()]
+    if locked:
+        left.append(f"{int(flip.sum())} faces look the wrong way, but {locked[0]}")
+        return nothing
+    return [flip[owner == k] for k in range(len(parts))]
+
+
+def _face_mean(part: Part, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the (T, 3) mean of each face's vertex normals, zero without normals."""
+    if part.arrays.normal is None:
+        return np.zeros((len(triangle), 3), np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = part.arrays.normal[triangle].mean(axis=1)
+    return np.asarray(np.nan_to_num(mean, nan=0.0, posinf=0.0, neginf=0.0), np.float32)
+
+
+def _normals(part: Part, triangle: NDArray[np.int64]) -> NormalChoice:
+    if not len(triangle):
+        return NormalChoice(None)
+    exact = part.arrays.normal is not None and part.column["NORMAL"].shape[1] == 12
+    return choose_normals(part.arrays.position, triangle, part.arrays.normal, exact=exact)
+
+
+def _count_doubles(part: Part, triangle: NDArray[np.int64], normals: NormalChoice) -> int:
+    """Count the used vertices that equal another used one in everything."""
+    used = np.unique(triangle)
+    if normals.n_missing:
+        # Flat normals part what the file shares: only what is fewer in the end was double.
+        plan = PartPlan(part, True, triangle, normals.corner, np.zeros(triangle.shape, bool))
+        made = finish_part(plan)
+        return max(0, len(used) - len(made.row)) if made is not None else 0
+    first = first_equal([data[used] for data in part.column.values()], len(used))
+    return int((first != np.arange(len(used))).sum())
+
+
+def _part_plan(
+    part: Part,
+    touched: bool,
+    triangle: NDArray[np.int64],
+    flip: NDArray[np.bool_],
+    normals: NormalChoice,
+) -> PartPlan:
+    """Put together what a free primitive becomes; normals follow their faces."""
+    turned = np.zeros(triangle.shape, bool)
+    corner = normals.corner
+    given = part.arrays.normal
+    if flip.any() and given is not None:
+        corner = given[triangle] if corner is None else corner
+        front = face_normal(part.arrays.position, triangle)
+        against = np.einsum("tkx,tx->t", np.nan_to_num(corner).astype(np.float64), front) < 0
+        turned[flip & against] = True
+        if turned.any():
+            corner = np.where(turned[..., None], -corner, corner)
+        else:
+            corner = normals.corner
+    return PartPlan(part, touched, triangle, corner, turned)
+
+
+class _Totals:
+    """Adds up the changes of a mesh's primitives."""
+
+    def __init__(self) -> None:
+        self._faces = 0
+        self._vertices = 0
+        self._n: dict[str, int] = {}
+
+    def add(
+        self, choice: FaceChoice, n_vertices: int, n_doubles: int, n_flipped: int, normals: NormalChoice
+    ) -> None:
+        self._faces += len(choice.keep) - choice.n_stitches
+        self._vertices += n_vertices
+        for name, count in (
+            ("unusable-faces", choice.n_unusable),
+            ("zero-area-faces", choice.n_zero_area),
+            ("duplicate-faces", choice.n_duplicate),
+            ("duplicate-vertices", n_doubles),
+            ("winding", n_flipped),
+            ("missing-normals", normals.n_missing),
+            ("bad-normals", normals.n_empty + normals.n_long),
+        ):
+            self._n[name] = self._n.get(name, 0) + count
+
+    def changes(self) -> tuple[Change, ...]:
+        found = []
+        faces = self._faces
+        for name, count in self._n.items():
+            if not count:
+                continue
+            if name.endswith("-faces"):
+                found.append(Change(name, "faces", faces, faces - count))
+                faces -= count
+            elif name == "duplicate-vertices":
+                found.append(Change(name, "vertices", self._vertices, self._vertices - count))
+            else:
+                found.append(Change(name, _COUNTED[name], count, 0))
+        return tuple(found)
+
+
+_COUNTED = {
+    "winding": "faces that look the wrong way",
+    "missing-normals": "vertices without normal",
+    "bad-normals": "vertices with a normal not of unit length",
+}
+
+
+def _locked_sentence(part: Part, choice: FaceChoice, normals: NormalChoice, n_doubles: int) -> str:
+    counts = (
+        (choice.n_unusable, "faces with unusable coordinates"),
+        (choice.n_zero_area, "faces without area"),
+        (choice.n_duplicate + choice.n_unlike, "duplicate faces"),
+        (n_doubles, "duplicate vertices"),
+        (normals.n_missing, "vertices without normal"),
+        (normals.n_empty + normals.n_long, "vertices with a normal not of unit length"),
+    )
+    what = ", ".join(f"{count} {words}" for count, words in counts if count)
+    return f"primitive {part.arrays.index} keeps {what}: {part.locked}"
+
+
+def _unlike_sentence(part: Part, count: int) -> str:
+    why = (
+        "its material blends, so a face drawn twice covers more"
+        if part.blends
+        else "they differ in normals, uv or other attributes, and which one is seen depends on the renderer"
+    )
+    return f"primitive {part.arrays.index} keeps {count} duplicate faces: {why}"

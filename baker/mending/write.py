@@ -1,0 +1,67 @@
+"""Writes a mended scene so that it is either whole or not there, and never over anything a user made."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from pathlib import Path
+
+from baker.core.errors import ResourceError, SettingsError
+
+
+def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
+    """Make sure, before the work, that a mended scene may be written to `out`.
+
+    Parameters
+    ----------
+    out : Path
+    scene : Path
+        The input, which is never written over.
+    force : bool
+        Also replace a file that exists.
+
+    Raises
+    ------
+    SettingsError
+        If `out` is no GLB name, a folder, the input itself, or exists and `force` is not set.
+    ResourceError
+        If nothing can be written there.
+    """
+    if out.suffix.lower() != ".glb":
+        raise SettingsError("a mended scene is a GLB; name a file that ends in .glb", file=str(out))
+    if out.is_dir():
+        raise SettingsError("this is a folder; name a .glb file", file=str(out))
+    if out.exists():
+        if scene.exists() and out.samefile(scene):
+            raise SettingsError(
+                "this is the input, which is never written over; name another file", file=str(out)
+            )
+        if not force:
+            raise SettingsError("the file exists; name another one, or add --force", file=str(out))
+    parent = next(p for p in out.resolve().parents if p.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+        raise ResourceError("nothing can be written there; name another place", file=str(out))
+
+
+def write_fixed(out: Path, data: bytes) -> None:
+    """Write a mended scene in one step.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written; what was there before is as it was.
+    """
+    target = out.resolve()
+    # A folder of this name is what the supervising process removes if this one is killed.
+    folder = target.with_name(f".{target.name}.baker-{os.getpid()}-{secrets.token_hex(4)}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir()
+        try:
+            (folder / target.name).write_bytes(data)
+            (folder / target.name).replace(target)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    except OSError as error:
+        raise ResourceError(f"the mended scene cannot be written ({error.strerror})", file=str(out)) from None
