@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.rows import mix
+
 # Largest coordinate that is kept; Embree's own limit for single precision is 1.8e18.
 LARGEST_COORDINATE = 1e18
 # Height over longest edge. Below single precision's step the plane of the triangle is only rounding.
@@ -116,21 +118,13 @@ def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
     bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)
     for k in range(3):
-        key = _mix(key ^ bits[:, k])
+        key = mix(key ^ bits[:, k])
     total = key[triangle[:, 0]] + key[triangle[:, 1]] + key[triangle[:, 2]]  # any order gives the same sum
     ordered = np.sort(total)
     twice = ordered[1:][ordered[1:] == ordered[:-1]]
     if not len(twice):
         return np.zeros(0, np.int64)
     return np.flatnonzero(np.isin(total, twice))
-
-
-def _mix(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    # Based on: Sebastiano Vigna, SplitMix64's finaliser, 2015.
-    value = value + np.uint64(0x9E3779B97F4A7C15)
-    value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return value ^ (value >> np.uint64(31))
 
 
 def _position_number(position: NDArray[np.float32]) -> NDArray[np.int64]:
