@@ -25,15 +25,12 @@ class MendRequest:
     Attributes
     ----------
     scene, out : Path
-    repair : bool
-        Also what changes the shape a little.
     force : bool
         Replace `out` if it exists.
     """
 
     scene: Path
     out: Path
-    repair: bool
     force: bool
 
 
@@ -47,25 +44,13 @@ def mend_flags() -> list[inspect.Parameter]:
             False,
         ),
         flag(
-            "repair",
-            bool,
-            typer.Option(
-                "--repair", help="--fix, and mend the shape of meshes, too (needs pip install 'baker[repair]')."
-            ),
-            False,
-        ),
-        flag(
-            "out",
-            Path | None,
-            typer.Option("--out", "-o", metavar="FIXED.glb", help="Where --fix and --repair write."),
+            "out", Path | None, typer.Option("--out", "-o", metavar="FIXED.glb", help="Where --fix writes.")
         ),
         flag("force", bool, typer.Option("--force", help="Let -o replace a file that exists."), False),
     ]
 
 
-def asked(
-    scenes: list[Path], *, fix: bool, repair: bool, out: Path | None, force: bool
-) -> MendRequest | None:
+def asked(scenes: list[Path], *, fix: bool, out: Path | None, force: bool) -> MendRequest | None:
     """Return what is to be mended, or None for a check alone.
 
     Raises
@@ -73,19 +58,18 @@ def asked(
     SettingsError
         If the flags do not go together or `out` cannot be written.
     """
-    if not (fix or repair):
+    if not fix:
         if out is not None:
             raise SettingsError("-o says where --fix writes; add --fix", object="out")
         return None
-    name = "--repair" if repair else "--fix"
     if out is None:
-        raise SettingsError(f"{name} writes a new file; name it with -o FIXED.glb", object="out")
+        raise SettingsError("--fix writes a new file; name it with -o FIXED.glb", object="out")
     if len(scenes) != 1:
-        raise SettingsError(f"{name} takes one scene at a time; {len(scenes)} are named", object="scene")
+        raise SettingsError(f"--fix takes one scene at a time; {len(scenes)} are named", object="scene")
     from baker.mending import check_fixed
 
     check_fixed(out, scenes[0], force=force)
-    return MendRequest(scenes[0], out, repair, force)
+    return MendRequest(scenes[0], out, force)
 
 
 def mend(request: MendRequest, settings: BakeSettings, progress: Progress) -> Mended:
@@ -97,10 +81,9 @@ def mend(request: MendRequest, settings: BakeSettings, progress: Progress) -> Me
         up=settings.up,
         scale=settings.scale,
         threads=settings.threads,
-        repair=request.repair,
     )
     mended = mend_file(request.scene, wanted, progress)
-    write_fixed(request.out, mended.data, force=request.force)
+    write_fixed(request.out, mended.data)
     return mended
 
 
@@ -110,12 +93,10 @@ def write_mended_text(mended: Mended, request: MendRequest, stream: TextIO) -> N
         change = fix.change
         stream.write(
             f"{request.scene}: mended: {change.change}: '{fix.object}' (node {fix.node})"
-            f" {change.counted}: {change.before} -> {change.after}{_more(change)}\n"
+            f" {change.counted}: {change.before} -> {change.after}\n"
         )
     for left in mended.left_alone:
-        stream.write(
-            f"{request.scene}: left alone: '{left.object}' (node {left.node}) {left.reason}\n"
-        )
+        stream.write(f"{request.scene}: left alone: '{left.object}' (node {left.node}) {left.reason}\n")
     if not mended.fixed:
         stream.write(f"{request.scene}: nothing to mend\n")
 
