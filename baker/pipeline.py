@@ -40,6 +40,7 @@ from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gath
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.patches import build_patches
+from baker.radiosity.points import KeptPoints, keep_points
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.texels import build_texels
 from baker.shading.alpha import see_through
@@ -84,6 +85,7 @@ class World:
     emitters: Emitters
     table: HitTable
     mask: NDArray[np.uint16]
+    kept: KeptPoints | None
 
 
 def bake(
@@ -180,7 +182,7 @@ def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) 
             texels, surface, table, rays.tracer, seed=settings.seed, threads=threads, progress=record.progress
         )
         record.rays["buried texels"] = cast
-    return World(geometry, shading, texels, surface, rays, emitters, table, mask)
+    return World(geometry, shading, texels, surface, rays, emitters, table, mask, keep_points(texels.n))
 
 
 def trace_transport(
@@ -209,6 +211,7 @@ def trace_transport(
                 seed=settings.seed,
                 threads=thread_count(settings.threads),
                 progress=record.progress,
+                kept=world.kept,
             )
             record.rays["ambient occlusion"] = n_front * ao_samples
         transport = replace(transport, open=opened, ao_samples=ao_samples)
@@ -241,6 +244,7 @@ def _light(
             seed=seed,
             threads=threads,
             progress=progress,
+            kept=world.kept,
         )
         record.rays["direct light"] = direct.rays
     exitance = np.zeros((texels.n, 4), np.float32)
@@ -267,6 +271,7 @@ def _light(
             seed=seed,
             threads=threads,
             progress=progress,
+            kept=world.kept,
         )
         record.rays["final gather"] = gathered.rays
     return Transport(direct=direct, gathered=gathered)

@@ -22,7 +22,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scram
 from baker.kernels.surface import N_POINTS
 from baker.pipeline import World
 from baker.radiosity.points import points_of
-from baker.trace.packets import new_caster, set_ray, trace
+from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR, new_caster, trace, trace_lanes
 
 # Rows of a packet that hold the ray; the hit needs only its geometry number reset.
 RAY_ROWS = 12
@@ -33,62 +33,55 @@ MOST_READY = 4_000_000
 
 
 @njit(cache=True, nogil=True)
-def _aim_hemisphere(floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far):  # type: ignore[no-untyped-def]
+def _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far):  # type: ignore[no-untyped-def]
     k = s * N_POINTS // len(net)
     if s == 0 or k != (s - 1) * N_POINTS // len(net):
-        load_frames(frame, origin, normal, group, lanes, k)
-    aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, far)
+        load_frames(rays, frame, origin, normal, group, lanes, k)
+    aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, far)
 
 
 @njit(cache=True, nogil=True)
-def _aim_lamp(
-    floats, words, valid, width, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative
-):  # type: ignore[no-untyped-def]
+def _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative):  # type: ignore[no-untyped-def]
     """Aim at points uniform on the emitters' area; lanes that cannot be lit take no part, as in a bake."""
     k = s * N_POINTS // len(net)
+    d = np.zeros(3, np.float32)
     for lane in range(lanes):
         i = group + lane
-        u = texel_scramble(net[s, 0], seeds[0, lane], shared)
-        v = texel_scramble(net[s, 1], seeds[1, lane], shared)
+        u = texel_scramble(net[s, 0], seeds[lane], shared)
+        v = texel_scramble(net[s, 1], seeds[LANES + lane], shared)
         m = min(np.searchsorted(cumulative, u, side="right"), len(cumulative) - 1)
         low = cumulative[m - 1] if m else np.float32(0.0)
         u = min(max((u - low) / (cumulative[m] - low), np.float32(0.0)), np.float32(1.0))
         b1, b2 = triangle_barycentric(u, v)
-        d = np.zeros(3, np.float32)
-        square = np.float32(0.0)
-        facing = np.float32(0.0)
-        emitted = np.float32(0.0)
+        facing = emitted = np.float32(0.0)
         for c in range(3):
             edge1, edge2 = corner[m, 3 + c] - corner[m, c], corner[m, 6 + c] - corner[m, c]
             d[c] = corner[m, c] + b1 * edge1 + b2 * edge2 - origin[i, k, c]
-            square += d[c] * d[c]
             facing += d[c] * normal[i, k, c]
             emitted -= d[c] * corner[m, 9 + c]
-        length = np.sqrt(square)
-        valid[lane] = -1 if facing > 0.0 and emitted > 0.0 else 0
-        set_ray(
-            floats, words, width, lane, origin[i, k, 0], origin[i, k, 1], origin[i, k, 2],
-            d[0] / length, d[1] / length, d[2] / length, length * np.float32(0.9999),
-        )  # fmt: skip
+            rays[(ORG_X + c) * LANES + lane] = origin[i, k, c]
+            rays[(DIR_X + c) * LANES + lane] = d[c]
+        rays[TFAR * LANES + lane] = np.float32(0.9999)
+        on[lane] = -1 if facing > 0.0 and emitted > 0.0 else 0
 
 
 @njit(cache=True, nogil=True)
-def _made(function, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
+def _made(function, hits, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
     """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
-    width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
+    width, scene = caster.width, caster.scene
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
     seeds, frame = new_lanes()
     mixed = np.uint32(0)
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
-            _aim_hemisphere(
-                floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far
-            )
-            trace(function, scene, valid, floats)
-            mixed ^= words[GEOM_ROW * width]
+            _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
+            trace_lanes(function, scene, width, on, rays, spare_on, spare, hits)
+            mixed ^= words[TFAR * LANES]
     return mixed
 
 
@@ -98,27 +91,27 @@ def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, 
 
     With emitters in `corner` the rays go there, else over the hemisphere.
     """
-    width, valid, floats, words = caster.width, caster.valid, caster.floats, caster.words
+    width = caster.width
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     seeds, frame = new_lanes()
     packet = 0
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             if len(corner):
-                _aim_lamp(
-                    floats, words, valid, width, origin, normal, group, lanes, net, shared, seeds, s,
-                    corner, cumulative,
-                )  # fmt: skip
+                _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative)
             else:
-                _aim_hemisphere(
-                    floats, words, width, origin, normal, group, lanes, net, shared, seeds, frame, s, far
-                )
-            bank[packet, :] = floats[: RAY_ROWS * width]
-            lanes_on[packet, :] = valid[:width]
-            packet += 1
+                _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
+            for first in range(0, LANES, width):
+                for row in range(RAY_ROWS):
+                    for lane in range(width):
+                        bank[packet, row * width + lane] = rays[row * LANES + first + lane]
+                for lane in range(width):
+                    lanes_on[packet, lane] = on[first + lane]
+                packet += 1
 
 
 @njit(cache=True, nogil=True)
@@ -127,11 +120,15 @@ def _ready(function, caster, bank, lanes_on):  # type: ignore[no-untyped-def]
     width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
     mixed = np.uint32(0)
     for packet in range(len(bank)):
-        for j in range(RAY_ROWS * width):
-            floats[j] = bank[packet, j]
+        some = np.int32(0)
         for lane in range(width):
             valid[lane] = lanes_on[packet, lane]
+            some |= valid[lane]
             words[GEOM_ROW * width + lane] = np.uint32(0xFFFFFFFF)
+        if some == 0:
+            continue
+        for j in range(RAY_ROWS * width):
+            floats[j] = bank[packet, j]
         trace(function, scene, valid, floats)
         mixed ^= words[GEOM_ROW * width]
     return mixed
@@ -177,6 +174,7 @@ class BareRays:
     ) -> None:
         self._tracer = world.rays.tracer
         self._function = self._tracer.occluded if occlusion else self._tracer.intersect
+        self._hits = not occlusion
         self._threads = threads
         self._net = sobol_reversed(n_samples, seed, 6)
         self._shared = shared_bits_mask(n_samples)
@@ -197,7 +195,7 @@ class BareRays:
     ) -> _Tile:
         origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
         width, n_samples = self._tracer.width, len(self._net)
-        packets = -(-(end - begin) // width) * n_samples
+        packets = -(-(end - begin) // LANES) * (LANES // width) * n_samples
         bank = np.zeros((packets, RAY_ROWS * width), np.float32)
         lanes_on = np.zeros((packets, width), np.int32)
         caster = new_caster(self._tracer)
@@ -227,7 +225,7 @@ class BareRays:
                     _ready(self._function, local.caster, tile.bank, tile.lanes_on)
                 else:
                     _made(
-                        self._function, local.caster, tile.origin, tile.normal, tile.begin,
+                        self._function, self._hits, local.caster, tile.origin, tile.normal, tile.begin,
                         self._net, self._shared, self._far,
                     )  # fmt: skip
 

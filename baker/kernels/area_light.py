@@ -27,7 +27,7 @@ from baker.kernels.hits import front_facing
 from baker.kernels.rays import lane_seeds, new_lanes
 from baker.kernels.sampling import texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, MAX_WIDTH, ORG_X, ORG_Y, ORG_Z, TFAR, trace
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR, trace_lanes
 
 _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
@@ -42,78 +42,100 @@ def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def load_points(frame, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
-    """Write origins and normals of point k of texels group to group + lanes to `frame` (6, 16)."""
+def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
+    """Write origins of point k of texels group to group + lanes to `rays`, normals to `facing` (3 * 16,)."""
     for lane in range(lanes):
         for a in range(3):
-            frame[a, lane] = origin[group + lane, k, a]
-            frame[3 + a, lane] = normal[group + lane, k, a]
+            rays[(ORG_X + a) * LANES + lane] = origin[group + lane, k, a]
+            facing[a * LANES + lane] = normal[group + lane, k, a]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def choose_lanes(lamps, first, second, seeds, shared, width, uv, chosen, lamp):  # type: ignore[no-untyped-def]
-    """Choose an emitter for every lane of a packet and copy what `aim_at_lamps` needs of it.
+def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):  # type: ignore[no-untyped-def]
+    """Choose an emitter for every lane and copy what is needed of it.
 
+    row, starts, chance, cumulative : see `emitters.Lamps`
     first, second : uint32, the sample's bit-reversed Sobol numbers
-    uv : (2, 16) float32, place on the emitter; chosen : (16,) int64
-    lamp : (14, 16) float32: corner 0, edges, normal, density per m2, 1 if two-sided
+    uv : (2 * 16,) float32, place on the emitter; chosen : (16,) int64
+    lamp : (17 * 16,) float32: corner 0, edges, normal, density per m2, 1 if two-sided, radiance
     """
-    row, starts, chance, cumulative = lamps.row, lamps.first, lamps.chance, lamps.cumulative
-    for lane in range(width):
-        uv[0, lane] = texel_scramble(first, seeds[0, lane], shared)
-        uv[1, lane] = texel_scramble(second, seeds[1, lane], shared)
-    for lane in range(width):
-        m, density, u = choose_emitter(row, starts, chance, cumulative, uv[0, lane])
-        uv[0, lane] = u
+    for lane in range(LANES):
+        uv[lane] = texel_scramble(first, seeds[lane], shared)
+        uv[LANES + lane] = texel_scramble(second, seeds[LANES + lane], shared)
+    same = True
+    for lane in range(LANES):
+        m, density, u = choose_emitter(row, starts, chance, cumulative, uv[lane])
+        uv[lane] = u
         chosen[lane] = m
+        lamp[12 * LANES + lane] = density
+        same = same and m == chosen[0]
+    if same:
+        # The rule: neighbouring texels share the first bits of their numbers.
+        m = chosen[0]
         for a in range(3):
-            lamp[a, lane] = row[m, a]
-            lamp[3 + a, lane] = row[m, 3 + a] - row[m, a]
-            lamp[6 + a, lane] = row[m, 6 + a] - row[m, a]
-            lamp[9 + a, lane] = row[m, NORMAL + a]
-        lamp[12, lane] = density
-        lamp[13, lane] = row[m, TWO_SIDED]
+            for lane in range(LANES):
+                lamp[a * LANES + lane] = row[m, a]
+                lamp[(3 + a) * LANES + lane] = row[m, 3 + a] - row[m, a]
+                lamp[(6 + a) * LANES + lane] = row[m, 6 + a] - row[m, a]
+                lamp[(9 + a) * LANES + lane] = row[m, NORMAL + a]
+                lamp[(14 + a) * LANES + lane] = row[m, RADIANCE + a]
+        for lane in range(LANES):
+            lamp[13 * LANES + lane] = row[m, TWO_SIDED]
+        return
+    for lane in range(LANES):
+        m = chosen[lane]
+        for a in range(3):
+            lamp[a * LANES + lane] = row[m, a]
+            lamp[(3 + a) * LANES + lane] = row[m, 3 + a] - row[m, a]
+            lamp[(6 + a) * LANES + lane] = row[m, 6 + a] - row[m, a]
+            lamp[(9 + a) * LANES + lane] = row[m, NORMAL + a]
+            lamp[(14 + a) * LANES + lane] = row[m, RADIANCE + a]
+        lamp[13 * LANES + lane] = row[m, TWO_SIDED]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def aim_at_lamps(floats, width, frame, uv, lamp, n_light, first_n, second_n, weight):  # type: ignore[no-untyped-def]
+def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  # type: ignore[no-untyped-def]
     """Write the shadow ray of every lane and its two weights; lanes that see no light get weight 0.
 
-    uv : (2, 16) float32, becomes the barycentrics b1 and b2 on the emitter
+    uv : (2 * 16,) float32, becomes the barycentrics b1 and b2 on the emitter
     n_light, first_n, second_n : float32, rays that share the work: shadow rays, hemisphere rays of both
-    estimates; weight : (2, 16) float32
+    estimates; weight : (2 * 16,) float32
     """
-    for lane in range(width):
-        b1, b2 = triangle_barycentric(uv[0, lane], uv[1, lane])
-        ox, oy, oz = frame[0, lane], frame[1, lane], frame[2, lane]
-        dx = lamp[0, lane] + b1 * lamp[3, lane] + b2 * lamp[6, lane] - ox
-        dy = lamp[1, lane] + b1 * lamp[4, lane] + b2 * lamp[7, lane] - oy
-        dz = lamp[2, lane] + b1 * lamp[5, lane] + b2 * lamp[8, lane] - oz
+    for lane in range(LANES):
+        b1, b2 = triangle_barycentric(uv[lane], uv[LANES + lane])
+        dx = lamp[lane] + b1 * lamp[3 * LANES + lane] + b2 * lamp[6 * LANES + lane]
+        dy = lamp[LANES + lane] + b1 * lamp[4 * LANES + lane] + b2 * lamp[7 * LANES + lane]
+        dz = lamp[2 * LANES + lane] + b1 * lamp[5 * LANES + lane] + b2 * lamp[8 * LANES + lane]
+        dx -= rays[ORG_X * LANES + lane]
+        dy -= rays[ORG_Y * LANES + lane]
+        dz -= rays[ORG_Z * LANES + lane]
         square = max(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
         length = math.sqrt(square)
-        cosine = (dx * frame[3, lane] + dy * frame[4, lane] + dz * frame[5, lane]) / length
-        light = -(dx * lamp[9, lane] + dy * lamp[10, lane] + dz * lamp[11, lane]) / length
-        light = abs(light) if lamp[13, lane] > _f(0.0) else light
+        cosine = (dx * facing[lane] + dy * facing[LANES + lane] + dz * facing[2 * LANES + lane]) / length
+        light = dx * lamp[9 * LANES + lane] + dy * lamp[10 * LANES + lane] + dz * lamp[11 * LANES + lane]
+        light = -light / length
+        light = abs(light) if lamp[13 * LANES + lane] > _f(0.0) else light
         seen = cosine > _f(0.0) and light > _f(1.0e-6)
-        steradian = lamp[12, lane] * square / max(light, _f(1.0e-6))
+        steradian = lamp[12 * LANES + lane] * square / max(light, _f(1.0e-6))
         cosine = cosine if seen else _f(0.0)
         share = n_light * steradian
-        weight[0, lane] = cosine / (share + first_n * cosine * _INV_PI)
-        weight[1, lane] = cosine / (share + second_n * cosine * _INV_PI)
-        uv[0, lane] = b1
-        uv[1, lane] = b2
-        floats[ORG_X * width + lane] = ox
-        floats[ORG_Y * width + lane] = oy
-        floats[ORG_Z * width + lane] = oz
-        floats[DIR_X * width + lane] = dx
-        floats[DIR_Y * width + lane] = dy
-        floats[DIR_Z * width + lane] = dz
-        floats[TFAR * width + lane] = _SHORT
+        weight[lane] = cosine / (share + first_n * cosine * _INV_PI)
+        weight[LANES + lane] = cosine / (share + second_n * cosine * _INV_PI)
+        uv[lane] = b1
+        uv[LANES + lane] = b2
+        rays[DIR_X * LANES + lane] = dx
+        rays[DIR_Y * LANES + lane] = dy
+        rays[DIR_Z * LANES + lane] = dz
+        rays[TFAR * LANES + lane] = _SHORT
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, out, second):  # type: ignore[no-untyped-def]
-    """Add the light-sampled share of irradiance of texels.
+    """Add the light-sampled share of irradiance of texels, and return the number of shadow rays cast.
+
+    Sixteen neighbouring texels first look: one ray from each of their points. If none of these up to 256
+    rays is blocked, no further one of theirs is cast: where a share p of the light is hidden, the error that
+    this can bring is p (1 - p)^256 of it on average, at most 0.15 %.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
     net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
@@ -122,68 +144,90 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     second : (m,) float32, sum over 16 batches of the square of the first estimate's share
     """
     n_samples = len(net)
-    width, scene, occluded = caster.width, caster.scene, caster.occluded
-    valid, floats = caster.valid, caster.floats
-    row, triangle = lamps.row, lamps.triangle
+    scene, occluded, width = caster.scene, caster.occluded, caster.width
+    on, rays = caster.lane_valid, caster.lane_floats
+    spare_on, spare = caster.valid, caster.floats
+    row, triangle, starts = lamps.row, lamps.triangle, lamps.first
+    chance, cumulative = lamps.chance, lamps.cumulative
     any_alpha = len(shading.alpha.slot) > 0
     radiance = np.zeros(4)
     # Sums of one point's samples are short: float32; those of all points are not.
-    part = np.zeros((6, MAX_WIDTH), np.float32)
-    total = np.zeros((6, MAX_WIDTH))
-    squares = np.zeros(MAX_WIDTH)
-    uv, weight = np.zeros((2, MAX_WIDTH), np.float32), np.zeros((2, MAX_WIDTH), np.float32)
-    chosen, lamp = np.zeros(MAX_WIDTH, np.int64), np.zeros((14, MAX_WIDTH), np.float32)
-    seeds, frame = new_lanes()
+    part = np.zeros((N_POINTS, 6 * LANES), np.float32)
+    uv, weight = np.zeros(2 * LANES, np.float32), np.zeros(2 * LANES, np.float32)
+    chosen, lamp = np.zeros(LANES, np.int64), np.zeros(17 * LANES, np.float32)
+    facing = np.zeros(3 * LANES, np.float32)
+    seeds, _ = new_lanes()
     n_light, first_n, second_n = _f(n_samples), _f(hemisphere[0]), _f(hemisphere[1])
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
-        total[:] = 0.0
-        squares[:] = 0.0
+    cast = 0
+    rounds = 2 if n_samples >= 2 * N_POINTS else 1
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 15, seeds)
-        for s in range(n_samples):
-            k = s * N_POINTS // n_samples
-            if s == 0 or k != (s - 1) * N_POINTS // n_samples:
-                load_points(frame, origin, normal, group, lanes, k)
-                part[:] = _f(0.0)
-            choose_lanes(lamps, net[s, 0], net[s, 1], seeds, shared, width, uv, chosen, lamp)
-            aim_at_lamps(floats, width, frame, uv, lamp, n_light, first_n, second_n, weight)
-            any_lane = False
-            for lane in range(width):
-                there = lane < lanes and weight[0, lane] > _f(0.0)
-                if there and any_alpha:
-                    # What is not there does not shine; rays that find an emitter know that already.
-                    present = _f(presence_at(shading, triangle[chosen[lane]], uv[0, lane], uv[1, lane]))
-                    weight[0, lane] *= present
-                    weight[1, lane] *= present
-                    there = present > _f(0.0)
-                valid[lane] = -1 if there else 0
-                any_lane = any_lane or there
-            if any_lane:
-                trace(occluded, scene, valid, floats)
-                for lane in range(lanes):
-                    if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
+        part[:] = _f(0.0)
+        looked = blocked = 0
+        for turn in range(rounds):
+            clear = turn == 1 and blocked == 0 and looked >= 8 * lanes
+            for k in range(N_POINTS):
+                start, end = -(-k * n_samples // N_POINTS), -(-(k + 1) * n_samples // N_POINTS)
+                if start == end:
+                    continue
+                # Which of a point's samples looks first goes round, so that the looks are spread, too.
+                look = start + k % (end - start)
+                load_points(rays, facing, origin, normal, group, lanes, k)
+                for s in range(start, end):
+                    if rounds == 2 and (s == look) != (turn == 0):
+                        continue
+                    choose_lanes(
+                        row, starts, chance, cumulative, net[s, 0], net[s, 1], seeds, shared, uv, chosen, lamp
+                    )
+                    aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight)
+                    asked = 0
+                    for lane in range(LANES):
+                        on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
+                        asked -= on[lane]
+                    if any_alpha:
+                        # What is not there does not shine; rays that find an emitter know that already.
+                        for lane in range(lanes):
+                            there = _f(
+                                presence_at(shading, triangle[chosen[lane]], uv[lane], uv[LANES + lane])
+                            )
+                            weight[lane] *= there
+                            weight[LANES + lane] *= there
+                    if asked == 0:
+                        continue
+                    if not clear:
+                        trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
+                        cast += asked
+                        looked += asked
+                        for lane in range(LANES):
+                            hidden = on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0)
+                            on[lane] = 0 if hidden else on[lane]
+                            blocked += 1 if hidden else 0
+                    for lane in range(lanes):
                         m = chosen[lane]
-                        if row[m, TEXTURED] > _f(0.0):
-                            emitted_radiance(shading, triangle[m], uv[0, lane], uv[1, lane], radiance)
+                        if on[lane] and row[m, TEXTURED] > _f(0.0):
+                            emitted_radiance(shading, triangle[m], uv[lane], uv[LANES + lane], radiance)
                             for c in range(3):
-                                part[c, lane] += _f(radiance[c]) * weight[0, lane]
-                                part[3 + c, lane] += _f(radiance[c]) * weight[1, lane]
-                        else:
-                            for c in range(3):
-                                part[c, lane] += row[m, RADIANCE + c] * weight[0, lane]
-                                part[3 + c, lane] += row[m, RADIANCE + c] * weight[1, lane]
-            if (s + 1) * N_POINTS // n_samples != k:
-                for lane in range(lanes):
-                    now = 0.0
+                                lamp[(14 + c) * LANES + lane] = radiance[c]
                     for c in range(3):
-                        now += part[c, lane]
-                    squares[lane] += now * now
-                    for c in range(6):
-                        total[c, lane] += part[c, lane]
+                        for lane in range(LANES):
+                            light = lamp[(14 + c) * LANES + lane] if on[lane] else _f(0.0)
+                            part[k, c * LANES + lane] += light * weight[lane]
+                            part[k, (3 + c) * LANES + lane] += light * weight[LANES + lane]
         for lane in range(lanes):
-            second[group + lane] = squares[lane]
+            squares = 0.0
+            for k in range(N_POINTS):
+                now = 0.0
+                for c in range(3):
+                    now += part[k, c * LANES + lane]
+                squares += now * now
+            second[group + lane] = squares
             for c in range(6):
-                out[group + lane, c] += total[c, lane]
+                total = 0.0
+                for k in range(N_POINTS):
+                    total += part[k, c * LANES + lane]
+                out[group + lane, c] += total
+    return cast
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

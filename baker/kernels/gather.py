@@ -19,7 +19,19 @@ from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
 from baker.kernels.surface import N_POINTS
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, trace
+from baker.trace.packets import (
+    DIR_X,
+    DIR_Y,
+    DIR_Z,
+    GEOM_ID,
+    HIT_U,
+    HIT_V,
+    LANES,
+    NO_HIT,
+    PRIM_ID,
+    TFAR,
+    trace_lanes,
+)  # fmt: skip
 
 _f = np.float32
 # Columns of `out`: indirect RGB, sky and emitted RGB, AO, sum of squares over 16 batches.
@@ -39,57 +51,59 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
     begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
     """
     n_samples = len(net)
-    width, scene, intersect = caster.width, caster.scene, caster.intersect
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    scene, intersect, width = caster.scene, caster.intersect, caster.width
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
     lamp, chance, cumulative = lamps.row, lamps.chance, lamps.cumulative
     radiance = np.zeros(4)
-    total = np.zeros((width, 7))
-    before = np.zeros(width)
-    squares = np.zeros(width)
-    pixel = np.zeros(width, np.int64)
+    # Sums of one point's samples are short: float32; those of all points are not.
+    part, missed = np.zeros(7 * LANES, np.float32), np.zeros(LANES, np.float32)
+    total, squares = np.zeros(7 * LANES), np.zeros(LANES)
+    pixel = np.zeros(LANES, np.int64)
     seeds, frame = new_lanes()
     distance = _f(limits[0])
     # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+            squares[lane] = 0.0
         total[:] = 0.0
-        before[:] = 0.0
-        squares[:] = 0.0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
-                load_frames(frame, origin, normal, group, lanes, k)
-            aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
-            trace(intersect, scene, valid, floats)
+                load_frames(rays, frame, origin, normal, group, lanes, k)
+                part[:] = _f(0.0)
+                missed[:] = _f(0.0)
+            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
+            trace_lanes(intersect, scene, width, on, rays, spare_on, spare, True)
+            for lane in range(LANES):
+                none = words[GEOM_ID * LANES + lane] == NO_HIT
+                missed[lane] += _f(1.0) if none else _f(0.0)
+                free = none or rays[TFAR * LANES + lane] > distance
+                part[OPEN * LANES + lane] += _f(1.0) if free else _f(0.0)
             # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
                 pixel[lane] = -1
-                if words[GEOM_ID * width + lane] == NO_HIT:
-                    total[lane, OPEN] += 1.0
-                    for c in range(3):
-                        total[lane, DIRECT + c] += sky[c]
+                if words[GEOM_ID * LANES + lane] == NO_HIT:
                     continue
-                far = floats[TFAR * width + lane]
-                if far > distance:
-                    total[lane, OPEN] += 1.0
-                prim = np.int64(words[PRIM_ID * width + lane])
-                dx = floats[DIR_X * width + lane]
-                dy = floats[DIR_Y * width + lane]
-                dz = floats[DIR_Z * width + lane]
-                hit_u, hit_v = floats[HIT_U * width + lane], floats[HIT_V * width + lane]
+                prim = np.int64(words[PRIM_ID * LANES + lane])
+                dx, dy, dz = (
+                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
+                )  # fmt: skip
+                hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
                 if row[prim, 12] >= _f(0.0):
                     m = np.int64(row[prim, 12])
                     i = group + lane
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,
-                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], far, limits[1], n_samples,
+                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],
+                        limits[1], n_samples,
                     )  # fmt: skip
                     if weight > 0.0:
                         for c in range(3):
@@ -97,28 +111,32 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                         if lamp[m, TEXTURED] > _f(0.0):
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
-                            total[lane, DIRECT + c] += radiance[c] * weight
+                            part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight)
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
-            for lane in range(lanes):
-                p = pixel[lane]
-                if p >= 0 and lit:
-                    total[lane, INDIRECT] += exitance[p, 0] * inverse_pi
-                    total[lane, INDIRECT + 1] += exitance[p, 1] * inverse_pi
-                    total[lane, INDIRECT + 2] += exitance[p, 2] * inverse_pi
-            if (s + 1) * N_POINTS // n_samples != k:
+            if lit:
                 for lane in range(lanes):
+                    p = pixel[lane]
+                    if p >= 0:
+                        part[lane] += exitance[p, 0] * inverse_pi
+                        part[LANES + lane] += exitance[p, 1] * inverse_pi
+                        part[2 * LANES + lane] += exitance[p, 2] * inverse_pi
+            if (s + 1) * N_POINTS // n_samples != k:
+                for lane in range(LANES):
+                    for c in range(3):
+                        part[(DIRECT + c) * LANES + lane] += missed[lane] * sky[c]
                     now = 0.0
                     for c in range(6):
-                        now += total[lane, c]
-                    squares[lane] += (now - before[lane]) ** 2
-                    before[lane] = now
+                        now += part[c * LANES + lane]
+                    squares[lane] += now * now
+                    for c in range(7):
+                        total[c * LANES + lane] += part[c * LANES + lane]
         scale = np.pi / n_samples
         for lane in range(lanes):
             i = group + lane
             for c in range(6):
-                out[i, c] = total[lane, c] * scale
-            out[i, OPEN] = total[lane, OPEN] / n_samples
+                out[i, c] = total[c * LANES + lane] * scale
+            out[i, OPEN] = total[OPEN * LANES + lane] / n_samples
             out[i, SQUARE] = squares[lane] * scale * scale
 
 
@@ -129,24 +147,24 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32
     """
     n_samples = len(net)
-    width, scene, occluded = caster.width, caster.scene, caster.occluded
-    valid, floats, words = caster.valid, caster.floats, caster.words
-    count = np.zeros(width, np.int64)
+    scene, occluded, width = caster.scene, caster.occluded, caster.width
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    count = np.zeros(LANES, np.int32)
     seeds, frame = new_lanes()
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        count[:] = 0
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+            count[lane] = 0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
-                load_frames(frame, origin, normal, group, lanes, k)
-            aim_lanes(floats, words, width, frame, seeds, net[s, 0], net[s, 1], shared, distance)
-            trace(occluded, scene, valid, floats)
-            for lane in range(lanes):
-                if floats[TFAR * width + lane] >= _f(0.0):
-                    count[lane] += 1
+                load_frames(rays, frame, origin, normal, group, lanes, k)
+            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, distance)
+            trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
+            for lane in range(LANES):
+                count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
         for lane in range(lanes):
             out[begin + group + lane] = count[lane] / n_samples

@@ -7,41 +7,40 @@ from numba import njit
 
 from baker.kernels.hits import front_facing
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PRIM_ID, trace
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, NO_HIT, PRIM_ID, trace_lanes
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def back_face_hits(origin, normal, table, caster, begin, net, rays_per_point, hits):  # type: ignore[no-untyped-def]
+def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_point, hits):  # type: ignore[no-untyped-def]
     """Count rays that hit the back of a one-sided surface.
 
     origin, normal : (m, w, 3) float32; every point casts `rays_per_point` cosine-weighted rays
     begin : number of the first of the m items, for its random numbers and its row of `hits`
-    net : (w * rays_per_point, 2) uint32; hits : (n, w) uint8, counts are added
+    net : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
+    hits : (n, w) uint8, counts are added
     """
-    width, scene, intersect = caster.width, caster.scene, caster.intersect
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    scene, intersect, width = caster.scene, caster.intersect, caster.width
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
     row = table.row
     seeds, frame = new_lanes()
-    none = np.uint32(0)
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 10, seeds)
-        for lane in range(width):
-            valid[lane] = -1 if lane < lanes else 0
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
         for sample in range(len(net)):
             point = sample // rays_per_point
             if sample % rays_per_point == 0:
-                load_frames(frame, origin, normal, group, lanes, point)
-            aim_lanes(floats, words, width, frame, seeds, net[sample, 0], net[sample, 1], none, FAR)
-            trace(intersect, scene, valid, floats)
+                load_frames(rays, frame, origin, normal, group, lanes, point)
+            aim_lanes(rays, words, frame, seeds, net[sample, 0], net[sample, 1], shared, FAR)
+            trace_lanes(intersect, scene, width, on, rays, spare_on, spare, True)
             for lane in range(lanes):
-                if words[GEOM_ID * width + lane] == NO_HIT:
+                if words[GEOM_ID * LANES + lane] == NO_HIT:
                     continue
-                prim = np.int64(words[PRIM_ID * width + lane])
+                prim = np.int64(words[PRIM_ID * LANES + lane])
                 dx, dy, dz = (
-                    floats[DIR_X * width + lane],
-                    floats[DIR_Y * width + lane],
-                    floats[DIR_Z * width + lane],
-                )
+                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
+                )  # fmt: skip
                 if row[prim, 7] == np.float32(0.0) and not front_facing(row, prim, dx, dy, dz):
                     hits[begin + group + lane, point] += 1

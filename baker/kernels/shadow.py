@@ -7,7 +7,7 @@ from numba import njit
 
 from baker.kernels.sampling import hash_u32
 from baker.kernels.surface import N_POINTS
-from baker.trace.packets import ID, TFAR, set_ray, trace
+from baker.trace.packets import DIR_X, ID, LANES, ORG_X, TFAR, trace_lanes
 
 _f = np.float32
 
@@ -20,35 +20,36 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
     weight : (n, 16) float32, irradiance for colour 1 if nothing is in the way; 0 casts no ray
     colour : (3,) float32; out : (n, 6) float32
     """
-    width, scene, occluded = caster.width, caster.scene, caster.occluded
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    scene, occluded, width = caster.scene, caster.occluded, caster.width
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
     bits = origin.view(np.uint32)
-    for group in range(0, len(origin), width):
-        lanes = min(width, len(origin) - group)
+    for group in range(0, len(origin), LANES):
+        lanes = min(LANES, len(origin) - group)
         for k in range(N_POINTS):
             any_lane = False
-            for lane in range(width):
-                valid[lane] = 0
+            for lane in range(LANES):
+                on[lane] = 0
                 if lane < lanes and weight[group + lane, k] > _f(0.0):
                     i = group + lane
-                    set_ray(
-                        floats, words, width, lane, origin[i, k, 0], origin[i, k, 1], origin[i, k, 2],
-                        ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3],
-                    )  # fmt: skip
+                    for a in range(3):
+                        rays[(ORG_X + a) * LANES + lane] = origin[i, k, a]
+                        rays[(DIR_X + a) * LANES + lane] = ray[i, k, a]
+                    rays[TFAR * LANES + lane] = ray[i, k, 3]
                     # Which texel's ray and which of its 16: `alpha_filter` lets them decide together.
                     texel = hash_u32(hash_u32(hash_u32(bits[i, 0, 0]) ^ bits[i, 0, 1]) ^ bits[i, 0, 2])
-                    words[ID * width + lane] = np.uint32((texel & np.uint32(0xFFFFFFF0)) | np.uint32(k))
-                    valid[lane] = -1
+                    words[ID * LANES + lane] = np.uint32((texel & np.uint32(0xFFFFFFF0)) | np.uint32(k))
+                    on[lane] = -1
                     any_lane = True
             if not any_lane:
                 continue
-            trace(occluded, scene, valid, floats)
+            trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
             for lane in range(lanes):
-                if valid[lane] and floats[TFAR * width + lane] >= _f(0.0):
+                if on[lane] and rays[TFAR * LANES + lane] >= _f(0.0):
                     i = group + lane
                     for c in range(3):
                         share = colour[c] * weight[i, k] / _f(N_POINTS)
                         out[i, c] += share
                         out[i, 3 + c] += share
-    for lane in range(width):
-        words[ID * width + lane] = np.uint32(0)
+    for lane in range(LANES):
+        words[ID * LANES + lane] = np.uint32(0)

@@ -184,24 +184,30 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
     size, least = surface.size, surface.least
     full = _u(0)
     same = len(wanted) == 1
+    x0 = y0 = t = first = last = np.int64(0)
+    seed_x = seed_y = _u(0)
+    total = a = b = c = d = g = h = 0.0
+    sign = 1.0
+    whole = flat = False
     for n in range(len(chosen)):
         i = chosen[n]
-        pixel = pixels[i]
-        rest = pixel % (size * size)
-        x0 = rest % size
-        y0 = rest // size
-        seed_x = hash_combine(_u(pixel), _u(11))
-        seed_y = hash_combine(_u(pixel), _u(12))
-        front = fronts[i]
-        first, last = starts[front], starts[front + 1]
-        total = 0.0
-        for e in range(first, last):
-            total += entry_area[e]
-        whole = last - first == 1 and total > 0.999999
-        t = entry[first]
-        a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
-        sign = -1.0 if back[i] else 1.0
-        flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
+        if n == 0 or i != chosen[n - 1]:
+            pixel = pixels[i]
+            rest = pixel % (size * size)
+            x0 = rest % size
+            y0 = rest // size
+            seed_x = hash_combine(_u(pixel), _u(11))
+            seed_y = hash_combine(_u(pixel), _u(12))
+            front = fronts[i]
+            first, last = starts[front], starts[front + 1]
+            total = 0.0
+            for e in range(first, last):
+                total += entry_area[e]
+            whole = last - first == 1 and total > 0.999999
+            t = entry[first]
+            a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
+            sign = -1.0 if back[i] else 1.0
+            flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
         for w in range(wanted.shape[1]):
             k = free_point(mask[i], wanted[0 if same else n, w])
             u = texel_scramble(net[k, 0], seed_x, full)

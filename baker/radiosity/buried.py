@@ -15,7 +15,7 @@ from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.hits import HitTable
 from baker.kernels.probe import back_face_hits
-from baker.kernels.sampling import sobol_reversed
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
@@ -50,10 +50,11 @@ def find_buried(
         wanted = np.arange(0, N_POINTS, stride, dtype=np.uint8)[None]
         hits = np.zeros((len(chosen), wanted.size), np.uint8)
         net = sobol_reversed(wanted.size * rays_per_point, seed, pair)
+        shared = shared_bits_mask(len(net))
 
         def work(begin: int, end: int) -> None:
             points = points_of(surface, mask, chosen[begin:end], wanted)
-            back_face_hits(*points, table, new_caster(tracer), begin, net, rays_per_point, hits)
+            back_face_hits(*points, table, new_caster(tracer), begin, net, shared, rays_per_point, hits)
 
         run_tiles(
             len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=len(net)

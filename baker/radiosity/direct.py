@@ -23,7 +23,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shadow import add_visible
 from baker.kernels.surface import N_POINTS, Surface
 from baker.lights.family import LIGHT_FAMILIES
-from baker.radiosity.points import points_of
+from baker.radiosity.points import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -45,7 +45,7 @@ class DirectLight:
     weighted : (n, 3) float32, lx, without what gather rays find at emitters
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
-    rays : int, shadow and hemisphere rays cast at most
+    rays : int, shadow rays cast at lamps; of other rays those that may be needed
     """
 
     weighted: NDArray[np.float32]
@@ -68,6 +68,7 @@ def direct_light(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
 ) -> DirectLight:
     """Light every texel entry directly.
 
@@ -77,6 +78,8 @@ def direct_light(
         Bit k is set if point k of the texel is not buried.
     n_light, n_gather : int
         Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
+    kept : KeptPoints, optional
+        Where points are left for later stages with the same tiles.
     """
     n = len(surface.pixel)
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
@@ -91,18 +94,21 @@ def direct_light(
     limits = np.array([0.0, n_light], np.float64)
     few_shared = shared_bits_mask(N_HEMISPHERE)
 
+    cast = np.zeros(-(-n // TILE), np.int64)
+
     def work(begin: int, end: int) -> None:
         caster = new_caster(tracer)
-        origin, normal = points_of(surface, mask, np.arange(begin, end))
+        origin, normal = tile_points(surface, mask, begin, end, kept)
         lamps = lamps_for(emitters, origin)
         out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
         near = widest_view(emitters, origin) > CLOSE
         if lamps.chance.any():
-            light_samples(
+            cast[begin // TILE] = light_samples(
                 origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], out, second
             )
             variance[begin:end] = batch_variance(out[:, :3].sum(axis=1), second)
         if near:
+            cast[begin // TILE] += N_HEMISPHERE * (end - begin)
             found = np.zeros((end - begin, N_COLUMNS), np.float32)
             gather(
                 origin,
@@ -129,10 +135,9 @@ def direct_light(
                     add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
         weighted[begin:end], complete[begin:end] = out[:, :3], out[:, 3:]
 
-    area_rays = (n_light + N_HEMISPHERE) * bool(len(emitters.power))
-    rays = area_rays + N_POINTS * len(families)
+    rays = n_light * bool(len(emitters.power)) + N_POINTS * len(families)
     run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    return DirectLight(weighted, complete, variance, rays * n)
+    return DirectLight(weighted, complete, variance, int(cast.sum()) + N_POINTS * len(families) * n)
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:

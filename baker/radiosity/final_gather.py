@@ -16,7 +16,7 @@ from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE, batch_variance
-from baker.radiosity.points import points_of
+from baker.radiosity.points import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -60,6 +60,7 @@ def final_gather(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
 ) -> Gathered:
     """Cast `n_samples` cosine-weighted rays from every front texel.
 
@@ -70,6 +71,7 @@ def final_gather(
         emission is found by MIS with `n_light` shadow rays.
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
+    kept : points of an earlier stage with the same tiles
     """
     indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
     opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
@@ -79,7 +81,7 @@ def final_gather(
     radiance = np.array(sky, np.float32)
 
     def work(begin: int, end: int) -> None:
-        origin, normal = points_of(surface, mask, np.arange(begin, end))
+        origin, normal = tile_points(surface, mask, begin, end, kept)
         lamps, caster = lamps_for(emitters, origin), new_caster(tracer)
         out = np.zeros((end - begin, N_COLUMNS), np.float32)
         gather(
@@ -104,6 +106,7 @@ def ambient_occlusion(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
 ) -> NDArray[np.float32]:
     """Return the open share (n_front,) float32 of the hemisphere within `distance` metres."""
     out = np.zeros(n_front, np.float32)
@@ -112,7 +115,7 @@ def ambient_occlusion(
     reach = np.float32(min(distance, 1.0e30))
 
     def work(begin: int, end: int) -> None:
-        points = points_of(surface, mask, np.arange(begin, end))
+        points = tile_points(surface, mask, begin, end, kept)
         open_share(*points, new_caster(tracer), begin, net, shared, reach, out)
 
     run_tiles(

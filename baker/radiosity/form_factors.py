@@ -12,11 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
-from baker.kernels.form_factor import cast_form_factors, count_targets, scale_symmetric, weigh_reciprocal
+from baker.kernels.form_factor import (
+    cast_form_factors,
+    count_targets,
+    scale_symmetric,
+    transpose,
+    weigh_reciprocal,
+)
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
@@ -144,14 +149,12 @@ def _balanced(
 ) -> FormFactorMatrix:
     """Merge both estimates of each pair, then restore the row sums that the rays measured."""
     n = len(area)
-    raw = csr_matrix((value, column, first), shape=(n, n))
-    other = raw.T.tocsr()
-    other.sort_indices()
+    other_first, other_column, other_value = transpose(first, column, value)
     merged_first = np.zeros(n + 1, np.int64)
     merged_column = np.zeros(2 * len(column), np.int32)
     merged = np.zeros(2 * len(column), np.float32)
     exchanged, unlike = weigh_reciprocal(
-        first, column, value, other.indptr.astype(np.int64), other.indices, other.data, area,
+        first, column, value, other_first, other_column, other_value, area,
         merged_first, merged_column, merged,
     )  # fmt: skip
     merged_column, merged = merged_column[: merged_first[-1]], merged[: merged_first[-1]]

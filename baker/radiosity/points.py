@@ -1,6 +1,11 @@
-"""Points of texels for the ray kernels, made tile by tile so that memory stays small."""
+"""Points of texels for the ray kernels, made tile by tile so that memory stays small.
+
+Small scenes keep the points from one stage to the next: making them takes a tenth of the time of their rays.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +13,8 @@ from numpy.typing import NDArray
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
 _NOWHERE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
+# Points take 384 bytes a texel: 100 MB are kept at most.
+MOST_KEPT = 262_144
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
 
@@ -28,4 +35,42 @@ def points_of(
     shape = (len(chosen), wanted.shape[1])
     origin, normal = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
     place_points(surface, mask, chosen, wanted, origin, normal, _NOWHERE, _NO_BARY)
+    return origin, normal
+
+
+@dataclass(frozen=True)
+class KeptPoints:
+    """The points of all entries, filled tile by tile by whoever needs them first.
+
+    Attributes
+    ----------
+    origin, normal : (n, 16, 3) float32
+    made : set of (int, int), spans of entries whose points are there
+    """
+
+    origin: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    made: set[tuple[int, int]]
+
+
+def keep_points(n: int) -> KeptPoints | None:
+    """Return room for the points of n entries, None if that is too much to keep."""
+    if n > MOST_KEPT:
+        return None
+    shape = (n, N_POINTS, 3)
+    return KeptPoints(np.zeros(shape, np.float32), np.zeros(shape, np.float32), set())
+
+
+def tile_points(
+    surface: Surface, mask: NDArray[np.uint16], begin: int, end: int, kept: KeptPoints | None
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return all points of entries begin to end, see `points_of`; from `kept` if they are there."""
+    if kept is None:
+        return points_of(surface, mask, np.arange(begin, end))
+    origin, normal = kept.origin[begin:end], kept.normal[begin:end]
+    if (begin, end) not in kept.made:
+        place_points(
+            surface, mask, np.arange(begin, end), _EVERY, origin, normal, _NOWHERE, _NO_BARY
+        )  # fmt: skip
+        kept.made.add((begin, end))
     return origin, normal

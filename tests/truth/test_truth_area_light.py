@@ -72,6 +72,29 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
     assert np.abs(np.mean(found, axis=0) - truth).max() < 0.08 * truth.max()
 
 
+def test_penumbra_from_its_first_to_its_last_hair():
+    """A screen hides the lamp's half with x < s: every texel sees a rectangle of it, from none to all."""
+    found = []
+    for seed in range(SEEDS):
+        builder = SceneBuilder(64)
+        floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (24, 24))
+        builder.quad((-0.5, 1, -0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 1.0), (12, 12))
+        builder.quad((-9, 0.5, -9), (9, 0, 0), (0, 0, 18), builder.material(0.0), (4, 4))
+        found.append(floor.values(builder.bake(seed=seed, denoise=False))[..., 0])
+
+    def visible(p):
+        # The screen's edge lies half way up: it hides lamp points with x < -p_x.
+        edge = np.clip(-p[..., 0], -0.5, 0.5)
+        corners = np.broadcast_to(square_over(1.0), (*p.shape[:-1], 4, 3)).copy()
+        corners[..., [0, 3], 0] = edge[..., None]
+        return polygon_irradiance(corners, p, UP)
+
+    # Rows run along x.
+    profile, expected = [f.mean(axis=1) for f in found], floor.texel_mean(visible, 8).mean(axis=1)
+    assert expected.min() == 0 < expected.max()
+    assert_unbiased(profile, expected, least=0.004)
+
+
 def test_wall_that_touches_a_lamp():
     """Perpendicular squares with a common edge: E rises to pi L / 2 at the edge, without a spark."""
     found = []

@@ -27,11 +27,11 @@ EDGES = np.float32([0.0, 2**-24, 0.25, 0.5, 0.5 + 2**-24, 0.75, 1 - 2**-24])
 def texel_numbers(net, texel, mask, salt=25):
     """Return (len(texel), n, 2) float32: the numbers that texels see, as kernels make them."""
     out = np.zeros((len(texel), len(net), 2), np.float32)
-    seeds = np.zeros((2, 16), np.uint32)
+    seeds = np.zeros(32, np.uint32)
     for i, number in enumerate(texel):
         lane_seeds(int(number), 1, salt, seeds)
         for a in range(2):
-            seed = seeds[a, 0]
+            seed = seeds[16 * a]
             out[i, :, a] = [texel_scramble(x, seed, mask) for x in net[:, a]]
     return out
 
