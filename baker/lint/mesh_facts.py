@@ -107,6 +107,12 @@ class MeshFacts:
         return self.position[self.triangle[self.good]].astype(np.float64)
 
     @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Return the lowest and highest corner of the good faces, (2, 3) float64, object space."""
+        used = self.position[self.triangle[self.good].reshape(-1)].astype(np.float64)
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @cached_property
     def area_vector(self) -> NDArray[np.float64]:
         """Return the good faces' normals as long as their area, (G, 3) float64, object space."""
         return 0.5 * face_normal(self.position, self.triangle[self.good])
@@ -126,7 +132,7 @@ class MeshFacts:
     def welded(self) -> NDArray[np.int64]:
         """Return for each corner of the good faces the number of its position, (G, 3) int64."""
         corner = self.triangle[self.good]
-        return number_positions(self.position)[corner]
+        return number_rows(self.position)[corner]
 
     @cached_property
     def single(self) -> NDArray[np.bool_]:
@@ -189,27 +195,29 @@ class MeshFacts:
         return int(self.raw.primitives[self.primitive[faces[0]]].index) if len(faces) else None
 
 
-def number_positions(position: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Number equal positions alike, (V,) int64; -0 equals 0.
+def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Number equal (V, K) rows alike, (V,) int64 from 0; -0 equals 0 and NaN equals the same NaN.
 
     Notes
     -----
-    Sorts one 64-bit hash instead of three columns: 0.2 s for a million rows instead of 0.9 s. Rows with
-    the same hash are compared; the few that only collide are numbered by value.
+    Sorts one 64-bit hash instead of K columns: 0.2 s for a million positions instead of 0.9 s. Neighbours
+    with the same hash are compared: should different rows ever collide, the columns are sorted after all.
     """
     from baker.core.topology import weld
 
-    bits = (position + np.float32(0.0)).view(np.uint32).reshape(len(position), 3).astype(np.uint64)
-    key = (bits[:, 0] << np.uint64(32)) | bits[:, 1]
-    key = (key ^ (key >> np.uint64(29))) * np.uint64(0x9E3779B97F4A7C15)
-    key ^= (bits[:, 2] + np.uint64(1)) * np.uint64(0xBF58476D1CE4E5B9)
-    key ^= key >> np.uint64(31)
+    if not len(row):
+        return np.zeros(0, np.int64)
+    bits = np.ascontiguousarray(row + np.float32(0.0)).view(np.uint32)
+    key = np.zeros(len(bits), np.uint64)
+    for k in range(bits.shape[1]):
+        key = (key ^ bits[:, k]) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
     order = np.argsort(key)
     ordered, sorted_key = bits[order], key[order]
     new = np.ones(len(order), bool)
     new[1:] = sorted_key[1:] != sorted_key[:-1]
     if (~new[1:] & (ordered[1:] != ordered[:-1]).any(axis=1)).any():
-        return weld(position).astype(np.int64)
+        return weld(row).astype(np.int64)
     number = np.zeros(len(order), np.int64)
     number[order] = np.cumsum(new) - 1
     return number

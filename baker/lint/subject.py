@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.parallel import thread_count
 from baker.core.raw import PrimitiveArrays, RawInstance, RawMesh, RawScene
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.lint.finding import Place
 from baker.lint.mesh_facts import MeshFacts
+from baker.lint.uv_facts import UvFacts
+from baker.lint.world import World
+
+if TYPE_CHECKING:
+    from baker.lint.light_levels import Levels
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
 DEFAULT_MIP = 2
@@ -36,6 +44,7 @@ class Subject:
         self.settings = settings
         self.mip = mip
         self.raw = scene.raw if scene.raw is not None else raw_of(scene)
+        self._uv: dict[int, UvFacts] = {}
         trusted = scene.raw is None
         self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.raw.meshes)
 
@@ -46,6 +55,55 @@ class Subject:
         for instance in self.raw.instances:
             found.setdefault(instance.mesh, instance)
         return found
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Return the diagonal of the bounding box of all good triangles, metres, world."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for instance in self.raw.instances:
+            facts = self.meshes[instance.mesh]
+            if not len(facts.good):
+                continue
+            # The corners of the mesh's own box reach at least as far as the mesh itself.
+            own = facts.bounds
+            box = np.array(list(product(*own.T)))
+            world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
+            low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+        return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
+
+    @cached_property
+    def world(self) -> World:
+        """Return all good triangles in the world."""
+        return World(self, thread_count(self.settings.threads))
+
+    @cached_property
+    def used_materials(self) -> list[int]:
+        """Return the materials that good triangles have."""
+        used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
+        return [int(k) for k in np.unique(np.concatenate(used))] if used else []
+
+    @property
+    def wants_light(self) -> bool:
+        """Tell whether anything else than AO is to be baked."""
+        return any(name != "ao" for name in self.settings.channels)
+
+    @cached_property
+    def levels(self) -> Levels | None:
+        """Return direct light at sample points; None without light, surface, or wish for either."""
+        from baker.lint.light_levels import emission, estimate_levels
+
+        bright = [max(light.intensity) for light in self.scene.lights]
+        glow = emission(self)[self.used_materials].max(initial=0.0) if self.used_materials else 0.0
+        lit = max([*bright, glow, *self.settings.sky_radiance], default=0.0) > 0
+        if not lit or not self.wants_light or not self.world.area.sum() > 0:
+            return None
+        return estimate_levels(self)
+
+    def uv(self, mesh: int) -> UvFacts:
+        """Return the lightmap uv of a mesh, worked out once."""
+        if mesh not in self._uv:
+            self._uv[mesh] = UvFacts(self.meshes[mesh])
+        return self._uv[mesh]
 
     def place(self, mesh: int) -> Place:
         """Return where a mesh stands first."""

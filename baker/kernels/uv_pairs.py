@@ -1,0 +1,64 @@
+"""Finds which triangles of a uv layout cover the same samples."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def cover_pairs(corner, slack, owner, pairs, counts):  # type: ignore[no-untyped-def]
+    """Mark the samples that each triangle covers; note who had them before.
+
+    Sample (r, c) lies at (c + 0.5, r + 0.5) and counts for a triangle if it is further than `slack` inside.
+
+    Parameters
+    ----------
+    corner : (T, 3, 2) float64, in samples
+    slack : float, in samples
+    owner : (H, W) int32
+        In and out: number of the last triangle that covered the sample, plus 1; 0 where free.
+    pairs : (K, 2) int64
+        Out: the first K pairs of triangles that share samples, each counted once for each later triangle.
+    counts : (4,) int64
+        Out: samples covered, samples covered again, triangles that cover another one's samples, pairs noted.
+    """
+    height, width = owner.shape
+    for t in range(len(corner)):
+        ax, ay = corner[t, 0, 0], corner[t, 0, 1]
+        bx, by = corner[t, 1, 0], corner[t, 1, 1]
+        cx, cy = corner[t, 2, 0], corner[t, 2, 1]
+        if (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0:
+            bx, by, cx, cy = cx, cy, bx, by
+        # Unit normals inwards; a side of no length gives nan, and nan covers nothing.
+        l0 = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        l1 = np.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
+        l2 = np.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
+        if l0 == 0.0 or l1 == 0.0 or l2 == 0.0:
+            continue
+        last = 0
+        for r in range(max(0, int(min(ay, by, cy) - 0.5)), min(height - 1, int(max(ay, by, cy) + 0.5)) + 1):
+            y = r + 0.5
+            for c in range(
+                max(0, int(min(ax, bx, cx) - 0.5)), min(width - 1, int(max(ax, bx, cx) + 0.5)) + 1
+            ):
+                x = c + 0.5
+                nearest = min(
+                    ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / l0,
+                    ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / l1,
+                    ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / l2,
+                )
+                if not nearest > slack:
+                    continue
+                before = owner[r, c]
+                if before == 0:
+                    counts[0] += 1
+                else:
+                    counts[1] += 1
+                    if last == 0:
+                        counts[2] += 1
+                    if before != last and counts[3] < len(pairs):
+                        pairs[counts[3], 0], pairs[counts[3], 1] = before - 1, t
+                        counts[3] += 1
+                    last = before
+                owner[r, c] = t + 1

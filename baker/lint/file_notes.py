@@ -1,0 +1,42 @@
+"""What the importer noticed while it read the file and no other check tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from baker.lint.finding import Found, Place
+from baker.lint.registry import check
+from baker.lint.subject import Subject
+
+# Importer's code: severity, what to do. Codes of the same name as a check are left to that check.
+NOTES = {
+    "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
+    "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
+    "flat-light": ("warning", "give the light's node a scale other than zero"),
+    "light-range": ("info", "expect more light far away than in engines that cut lights off"),
+    "missing-mtl": ("warning", "put the material library beside the scene"),
+    "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
+    "morphed": ("info", "bake the shape that is shown most, or leave the object out"),
+    "no-material": ("info", "name a material for these faces"),
+    "not-triangles": ("info", "nothing to do, if points and lines are not to be baked"),
+    "odd-indices": ("warning", "export the mesh again: its index buffer is cut off"),
+    "several-scenes": ("info", "export the scene wanted by itself"),
+    "skinned": ("info", "nothing to do, if the bind pose is what is to be baked"),
+    "up-and-scale-ignored": ("info", "leave --up and --scale away for glTF"),
+}
+
+
+@check("file-note", group="file", severity="info", fix="see the message")
+def file_note(subject: Subject) -> Iterator[Found]:
+    """Parts of the file that a bake passes by or reads in its own way.
+
+    The importer's own code is in `note`: unknown extensions, skins and morph targets (the base shape is
+    baked), ranges of lights, primitives of points and lines, several scenes in one file, missing texture
+    coordinates or material libraries.
+    """
+    for warning in subject.scene.warnings:
+        if warning.code in NOTES:
+            severity, advice = NOTES[warning.code]
+            node = next((i.node for i in subject.raw.instances if i.name == warning.object), None)
+            text = f"{warning.message}; {advice}"
+            yield Found(text, Place(warning.object, node), severity=severity, more={"note": warning.code})

@@ -1,0 +1,245 @@
+"""What direct light does at a few hundred points: all black, or too bright for half floats.
+
+E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each where nothing is in the way
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import PunctualLight
+from baker.lint.finding import Found, Place
+from baker.lint.light_sources import image_mean
+from baker.lint.registry import check
+from baker.lint.subject import Subject
+
+# Receivers, a multiple of 16; rays from each to emissive surfaces, and into the sky.
+POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
+# Rays from emissive surfaces that look for anything to light.
+FACING_RAYS = 64
+HALF_MAX = 65504.0
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Rays start this share of the scene's diagonal off the surface.
+_OFFSET = 1e-5
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Direct irradiance at sample points.
+
+    Attributes
+    ----------
+    position : (n, 3) float64, metres, world
+    irradiance : (n,) float64, lx, brightest of RGB
+    triangle : (n,) int64, the triangle of `World` each point lies on
+    """
+
+    position: NDArray[np.float64]
+    irradiance: NDArray[np.float64]
+    triangle: NDArray[np.int64]
+
+
+def estimate_levels(subject: Subject) -> Levels:
+    """Estimate direct light at points spread over all front sides by area."""
+    world = subject.world
+    random = np.random.default_rng(subject.settings.seed)
+    position, normal, triangle = _spread(subject, POINTS, random)
+    total = np.zeros((len(position), 3))
+    origin = position + _OFFSET * subject.diagonal * normal
+    for light in subject.scene.lights:
+        if max(light.intensity) > 0:
+            total += _punctual(subject, light, origin, normal)
+    total += _emissive(subject, origin, normal, random)
+    sky = np.array(subject.settings.sky_radiance)
+    if sky.any():
+        way = _cosine(normal, SKY_RAYS, random)
+        far = np.full(len(way), 1e30)
+        hit, _ = world.first_hits(np.repeat(origin, SKY_RAYS, axis=0), way, np.zeros(len(way)), far)
+        total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
+    return Levels(position, total.max(axis=1), triangle)
+
+
+def _spread(
+    subject: Subject, n: int, random: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return n points, stratified by area, with the normal of their face and its number."""
+    world = subject.world
+    share = np.cumsum(world.area)
+    pick = (np.arange(n) + random.random(n)) / n * share[-1]
+    triangle = np.minimum(np.searchsorted(share, pick), len(share) - 1)
+    return _inside(subject, triangle, random), world.normal[triangle], triangle
+
+
+def _inside(
+    subject: Subject, triangle: NDArray[np.int64], random: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return a random point of each triangle."""
+    world = subject.world
+    u, v = random.random((2, len(triangle)))
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    corner = world.position[world.triangle[triangle]].astype(np.float64)
+    point: NDArray[np.float64] = (
+        corner[:, 0] + u[:, None] * (corner[:, 1] - corner[:, 0]) + v[:, None] * (corner[:, 2] - corner[:, 0])
+    )
+    return point
+
+
+def _punctual(
+    subject: Subject, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    from baker.lights.family import LIGHT_FAMILIES
+
+    family = LIGHT_FAMILIES.get(light.kind)
+    if family is None:
+        return np.zeros((len(origin), 3))
+    # A family fills rows of 16 points.
+    shape = (len(origin) // 16, 16)
+    ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
+    at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
+    family(light, at, up, ray, weight)
+    rows = ray.reshape(-1, 4)
+    hit, _ = subject.world.first_hits(origin, rows[:, :3], np.zeros(len(rows)), rows[:, 3])
+    seen = np.where(hit < 0, weight.reshape(-1), 0.0)
+    return np.asarray(seen[:, None] * np.array(light.intensity), np.float64)
+
+
+def _emissive(
+    subject: Subject, origin: NDArray[np.float64], normal: NDArray[np.float64], random: np.random.Generator
+) -> NDArray[np.float64]:
+    """Light from emissive triangles, by points chosen by power, (n, 3) float64."""
+    world = subject.world
+    radiance = emission(subject)[world.material]
+    power = world.area * (radiance @ _LUMINANCE)
+    total = np.zeros((len(origin), 3))
+    if not power.sum() > 0:
+        return total
+    share = np.cumsum(power) / power.sum()
+    for _ in range(EMITTER_RAYS):
+        chosen = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
+        way = _inside(subject, chosen, random) - origin
+        square = np.maximum(np.einsum("nx,nx->n", way, way), 1e-20)
+        here = np.einsum("nx,nx->n", way, normal)
+        there = -np.einsum("nx,nx->n", way, world.normal[chosen])
+        there = np.where(world.double_sided[chosen], np.abs(there), there)
+        hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 0.9999))
+        geometry = np.maximum(here, 0) * np.maximum(there, 0) / square**2 * (hit < 0)
+        density = power[chosen] / power.sum() / np.maximum(world.area[chosen], 1e-300)
+        total += radiance[chosen] * (geometry / density)[:, None] / EMITTER_RAYS
+    return total
+
+
+def emission(subject: Subject) -> NDArray[np.float64]:
+    """Return each material's mean radiance, (M, 3) float64, cd/m2."""
+    out = np.array([m.emission for m in subject.scene.materials], np.float64).reshape(-1, 3)
+    for k, material in enumerate(subject.scene.materials):
+        if material.emission_texture is not None and out[k].any():
+            out[k] *= image_mean(material.emission_texture.image)
+    return out
+
+
+def _cosine(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
+    """Return n cosine-weighted directions around each normal, (N n, 3) float64."""
+    way = random.normal(size=(len(normal) * n, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    out: NDArray[np.float64] = way * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)
+    return out
+
+
+@check(
+    "all-black",
+    group="light",
+    severity="warning",
+    fix="look where the lights are and what is between them and the surfaces",
+)
+def all_black(subject: Subject) -> Iterator[Found]:
+    """A scene with light of which nothing arrives at any of 512 points on its surfaces."""
+    levels = subject.levels
+    if levels is not None and not levels.irradiance.any():
+        yield Found(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
+
+
+@check(
+    "clips-half",
+    group="light",
+    severity="warning",
+    fix="lower the lights, move them away from surfaces, or bake with --dtype float",
+)
+def clips_half(subject: Subject) -> Iterator[Found]:
+    """Direct light over 65504 lx, the largest half float, at some of 512 points on the surfaces.
+
+    The map stores that number instead. With `--dtype float` nothing is clipped.
+    """
+    levels = subject.levels
+    if levels is None or subject.settings.dtype == "float":
+        return
+    over = np.flatnonzero(levels.irradiance > HALF_MAX)
+    if len(over):
+        worst = over[levels.irradiance[over].argmax()]
+        share = 100.0 * len(over) / len(levels.irradiance)
+        x, y, z = (float(v) for v in levels.position[worst])
+        most = levels.irradiance[worst]
+        text = f"about {share:.2g}% of the surface gets more than 65504 lx, up to {most:.3g}"
+        at = subject.raw.instances[subject.world.instance[levels.triangle[worst]]]
+        yield Found(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
+
+
+@check(
+    "light-levels",
+    group="light",
+    severity="info",
+    fix="nothing to do: this is what direct light will look like",
+)
+def light_levels(subject: Subject) -> Iterator[Found]:
+    """Brightest and darkest direct irradiance at 512 points on the surfaces, before any bounce."""
+    levels = subject.levels
+    if levels is not None and levels.irradiance.any():
+        low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
+        dark = 100.0 * float((levels.irradiance == 0).mean())
+        text = f"direct light is {low:.3g} to {high:.3g} lx, median {middle:.3g}; {dark:.2g}% gets none"
+        more = {"darkest": float(low), "median": float(middle), "brightest": float(high)}
+        yield Found(text, count=len(levels.position), percent=dark, more=more)
+
+
+@check(
+    "emitter-unseen",
+    group="light",
+    severity="warning",
+    fix="turn the emitting faces towards the scene, or make their material double-sided",
+)
+def emitter_unseen(subject: Subject) -> Iterator[Found]:
+    """An emissive object that faces away from everything.
+
+    Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
+    their front only.
+    """
+    radiance = emission(subject).max(axis=1) if subject.scene.materials else np.zeros(0)
+    if not radiance.any() or len(subject.raw.instances) < 2:
+        return
+    world = subject.world
+    random = np.random.default_rng(subject.settings.seed)
+    glows = radiance[world.material] > 0
+    for k in np.unique(world.instance[glows]):
+        own = np.flatnonzero(glows & (world.instance == k) & (world.area > 0))
+        if not len(own):
+            continue
+        share = np.cumsum(world.area[own])
+        pick = (np.arange(FACING_RAYS) + 0.5) / FACING_RAYS * share[-1]
+        chosen = own[np.minimum(np.searchsorted(share, pick), len(own) - 1)]
+        sides = (1.0, -1.0) if world.double_sided[own].any() else (1.0,)
+        met = False
+        for side in sides:
+            normal = side * world.normal[chosen]
+            origin = _inside(subject, chosen, random) + _OFFSET * subject.diagonal * normal
+            way = _cosine(normal, 1, random)
+            hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
+            met = met or bool((hit >= 0).any())
+        if not met:
+            instance = subject.raw.instances[k]
+            x, y, z = (float(v) for v in world.position[world.triangle[own[0]]].mean(axis=0))
+            place = Place(instance.name, instance.node)
+            yield Found("its emitting faces face away from everything", place, len(own), position=(x, y, z))
