@@ -68,7 +68,7 @@ def picture_pass(
             height,
         ]
     )
-    total = np.zeros((n, 3))
+    seen, splatted = np.zeros((n, 3)), np.zeros((n, 3))
     rays = 0
     for block in range(0, n, _BLOCK):
         span = min(_BLOCK, n - block)
@@ -78,15 +78,14 @@ def picture_pass(
             pixel = np.arange(block + begin, block + end)
             way = camera_rays(camera, width, height, pixel, samples, seed, number)
             origin = np.broadcast_to(eye, way.shape).copy()
-            out = np.zeros((len(pixel), 3))
             most = len(pixel) * samples * (MOST_FROM_LAMP - 1)
             splat_pixel, splat = np.zeros(most, np.int64), np.zeros((most, 3))
+            span = slice(block + begin, block + end)
             cast, shadows, splats = trace_both_ways(
                 origin, way, way, block + begin, lens, float(n), reference.surfaces, reference.lamps,
-                reference.shading, reference.sphere, new_caster(reference.rays.tracer), net, setting, out,
-                splat_pixel, splat,
+                reference.shading, reference.sphere, new_caster(reference.rays.tracer), net, setting,
+                seen[span], splat_pixel, splat,
             )  # fmt: skip
-            total[pixel] += out
             found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast + shadows)
 
         def told(stage: str, fraction: float, detail: str = "", block: int = block, span: int = span) -> Any:
@@ -96,8 +95,8 @@ def picture_pass(
         # The order of tiles, not that of threads.
         for splat_pixel, splat, cast in found:
             for c in range(3):
-                total[:, c] += np.bincount(splat_pixel, splat[:, c], n)
+                splatted[:, c] += np.bincount(splat_pixel, splat[:, c], n)
             rays += int(cast)
-    add_pass(estimate, np.arange(n), total / samples)
+    add_pass(estimate, np.arange(n), (seen + splatted) / samples)
     estimate.rounds += 1
     estimate.rays += rays

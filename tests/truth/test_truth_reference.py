@@ -17,7 +17,7 @@ from baker.reference.irradiance import irradiance_pass, new_estimate, openness_p
 from baker.reference.view import build_reference
 
 UP = (0.0, 0.0, 1.0)
-ESTIMATORS = ["uniform", "cosine", "stratified", "light", "bsdf", "mis", "mis-power"]
+ESTIMATORS = ["uniform", "cosine", "stratified", "light", "bsdf", "mis", "mis-power", "bdpt"]
 
 
 def traced(scene, points, *, normal=UP, passes=16, estimator="mis", sky=(0, 0, 0), samples=64, **how):
@@ -47,6 +47,7 @@ def agree(mean, error, truth, *, within=0.002):
     [
         *(("uniform", 0.2, 16), ("uniform", 0.5, 24), ("cosine", 0.5, 16), ("cosine", 0.8, 48)),
         *(("mis", 0.2, 16), ("mis", 0.5, 16), ("mis", 0.8, 48), ("mis", 0.95, 64)),
+        *(("bdpt", 0.2, 12), ("bdpt", 0.8, 20)),
     ],
 )
 def test_furnace(estimator, albedo, passes):
@@ -129,7 +130,7 @@ def test_integrating_sphere_with_a_point_light():
         (PunctualLight("directional", "d", 0, (5.0, 5.0, 5.0), direction=(0.6, 0, -0.8)), (4, 4, 4)),
     ],
 )
-@pytest.mark.parametrize("estimator", ["bsdf", "mis"])
+@pytest.mark.parametrize("estimator", ["bsdf", "mis", "bdpt"])
 def test_lights_without_area_are_exact(light, truth, estimator):
     floor = Quad((-5, -5, 0), (10, 0, 0), (0, 10, 0), grey(0.5))
     scene = replace(quad_scene([floor]), lights=(light,))
@@ -137,17 +138,21 @@ def test_lights_without_area_are_exact(light, truth, estimator):
     np.testing.assert_allclose(mean[0], truth, rtol=1e-4)
 
 
-def test_half_hidden_sky():
+@pytest.mark.parametrize("estimator", ["mis", "bdpt"])
+def test_half_hidden_sky(estimator):
     wall = Quad((0, -500, 0), (0, 1000, 0), (0, 0, 1000), grey(0.0, double_sided=True))
-    mean, error = traced(quad_scene([wall]), [(1e-3, 0, 0)], sky=(1, 2, 3), passes=64, samples=256)
+    mean, error = traced(
+        quad_scene([wall]), [(1e-3, 0, 0)], sky=(1, 2, 3), passes=64, samples=256, estimator=estimator
+    )
     agree(mean, error, np.pi / 2 * np.array([[1, 2, 3]]))
 
 
-def test_bounces_are_terms_of_a_series():
+@pytest.mark.parametrize("estimator", ["mis", "bdpt"])
+def test_bounces_are_terms_of_a_series(estimator):
     walls = box_quads((0, 0, 0), (1, 1, 1), inward=True, material=grey(0.5, 1 / math.pi))
     for bounces in range(3):
         points = np.full((256, 3), (0.4, 0.3, 0))
-        mean, error = traced(quad_scene(walls), points, max_bounces=bounces, passes=32)
+        mean, error = traced(quad_scene(walls), points, max_bounces=bounces, passes=32, estimator=estimator)
         agree(mean, error, sum(0.5**k for k in range(bounces + 1)))
 
 
