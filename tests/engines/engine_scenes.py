@@ -39,6 +39,13 @@ def probe_page() -> np.ndarray:
     return np.repeat(page[:, :, None], 3, axis=2).astype(np.float32)
 
 
+def srgb_page() -> np.ndarray:
+    """Return the probe's page with the sRGB curve on it, which is wrong."""
+    share = probe_page() / probe_page().max()
+    curve = np.where(share > 0.0031308, 1.055 * share ** (1 / 2.4) - 0.055, 12.92 * share)
+    return (curve * probe_page().max()).astype(np.float32)
+
+
 def probe_expected(albedo: tuple[float, float, float] = ALBEDO) -> np.ndarray:
     """Return (4, 3): what the quadrants' middles show, in the order of `MIDDLE`."""
     return QUADRANT.ravel()[:, None] * np.array(albedo)
