@@ -17,6 +17,7 @@ COMMANDS = {
     "bake": "Bake a scene: unwrap, trace, solve, write lightmaps and scene.glb.",
     "ao": "Bake ambient occlusion only.",
     "check": "Find what would spoil a bake, before any ray is cast.",
+    "batch": "Bake many scenes, and only what changed.",
     "verify": "Say how wrong a bake is, against path tracing.",
     "render": "Path-trace a scene through a camera.",
     "inspect": "Tell what is in a scene, a bake or an EXR.",

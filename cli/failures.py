@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import sys
 from typing import Any, TextIO
 
-from baker.core.errors import BakerError, Cancelled, ResourceError, SettingsError
+from baker.core import failure
+from baker.core.errors import BakerError, SettingsError
 
 # Exit code of a check that the user asked for and that failed.
 FAILED_CHECK = 1
-# What the operating system says when something ran out or is not ours to use.
-_RESOURCE_ERRNO = {
-    errno.ENOSPC: "the disk is full; free some space, or write elsewhere with -o",
-    errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with -o",
-    errno.EACCES: "no permission; change it, or write elsewhere with -o",
-    errno.EPERM: "no permission; change it, or write elsewhere with -o",
-    errno.EROFS: "the file system is read-only; write elsewhere with -o",
-    errno.ENOMEM: "out of memory; try a smaller --resolution or fewer --threads",
-    errno.EMFILE: "too many open files; raise the limit (ulimit -n)",
-}
 
 
 def explain(error: BaseException) -> BakerError | None:
@@ -32,17 +22,9 @@ def explain(error: BaseException) -> BakerError | None:
     error : BaseException
         Anything that a command raised.
     """
-    if isinstance(error, BakerError):
-        return error
-    if isinstance(error, KeyboardInterrupt):
-        return Cancelled("interrupted")
-    if isinstance(error, MemoryError):
-        return ResourceError(
-            "out of memory; try a smaller --resolution, a lower --density or fewer --threads"
-        )
-    if isinstance(error, OSError):
-        reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))
-        return ResourceError(reason, file=None if error.filename is None else str(error.filename))
+    known = failure.explain(error)
+    if known is not None:
+        return known
     try:
         import typer
     except ImportError:
@@ -73,9 +55,7 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
         tb.print_exception(error, file=sys.stderr)
     known = explain(error)
     if known is None:
-        what = f"{type(error).__name__}: {error}".splitlines()[0]
-        # 4, not 1: a script that reads 1 as "the check failed" must not take a bug for it.
-        known = ResourceError(f"internal error ({what}); run with -vv to see where, and please report it")
+        known = failure.bug(error)
         kind = "internal"
     else:
         kind = known.kind

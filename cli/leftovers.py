@@ -10,6 +10,8 @@ import json
 import shutil
 from pathlib import Path
 
+from baker.batch.lock import OutputLock
+
 
 def survey(out: str) -> bytes:
     """Return what there is before a bake, for `remove_leftovers` to know what is new.
@@ -46,6 +48,9 @@ def remove_leftovers(note: bytes) -> None:
             _put_back(path, target)
     for path in ours:
         shutil.rmtree(path, ignore_errors=True)
+    lock = OutputLock(target)
+    if lock.path.exists() and lock.acquire():
+        lock.release()
     for parent in map(Path, before["missing"]):
         try:
             parent.rmdir()

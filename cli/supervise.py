@@ -13,6 +13,7 @@ import contextlib
 import os
 import signal
 import sys
+import tempfile
 from types import FrameType
 
 # Seconds that the child gets to stop by itself. The promise is one second for everything.
@@ -63,7 +64,8 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     stop : StopFlag
         Set by a stopping signal in the working process.
     notes : int or None
-        File descriptor for `announce`; None where there is no `fork` and this process does the work.
+        File for `announce`, shared with the parent; None where there is no `fork` and this process does
+        the work.
     """
     stop = StopFlag()
     if not hasattr(os, "fork"):
@@ -71,20 +73,20 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
         return stop, None
     sys.stdout.flush()
     sys.stderr.flush()
-    inlet, outlet = os.pipe()
+    # Not a pipe: a batch announces more folders than one holds, and the parent reads at the end only.
+    with tempfile.TemporaryFile() as file:
+        notes = os.dup(file.fileno())
     blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
     # No signal may fall between the fork and the handlers.
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     parent = os.getpid()
     child = os.fork()
     if child == 0:
-        os.close(inlet)
         _settle_child(parent)
         stop.install()
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
-        return stop, outlet
-    os.close(outlet)
-    watch = _Watch(child, inlet, "--json" in argv)
+        return stop, notes
+    watch = _Watch(child, notes, "--json" in argv)
     watch.install()
     signal.pthread_sigmask(signal.SIG_SETMASK, previous)
     os._exit(watch.wait())
@@ -175,15 +177,12 @@ class _Watch:
         return self._tell("resource", f"{why}; {hint}", RESOURCE)
 
     def _tidy(self) -> None:
-        os.set_blocking(self.notes, False)
-        try:
-            lines = os.read(self.notes, 1 << 16).splitlines()
-        except BlockingIOError:
-            return
         from baker.cli.leftovers import remove_leftovers
 
+        lines = os.pread(self.notes, os.fstat(self.notes).st_size, 0).splitlines(keepends=True)
         for line in lines:
-            remove_leftovers(line)
+            if line.endswith(b"\n"):
+                remove_leftovers(line)
 
     def _tell(self, kind: str, message: str, code: int) -> int:
         sys.stderr.write(f"baker: {message}\n")

@@ -5,7 +5,6 @@ Whatever judges or shows a bake starts here; it sees the files as they are, not 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene, SceneWarning
 from baker.io.load import load_scene
-from baker.io.output_folder import MANIFEST_NAME, own_files
+from baker.io.output_folder import AS_BAKED, MANIFEST_NAME, file_state, own_files
 from baker.io.png import decode_palette_png
 
 SCENE_NAME = "scene.glb"
@@ -105,11 +104,7 @@ def _present(folder: Path, name: str) -> Path:
 
 
 def _differs(folder: Path, entry: dict[str, Any]) -> bool:
-    path = folder / entry["file"]
-    if not path.is_file():
-        return True
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest() != str(entry["sha256"])
+    return file_state(folder / entry["file"], str(entry["sha256"])) != AS_BAKED
 
 
 def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:

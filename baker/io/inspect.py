@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene
-from baker.io.output_folder import MANIFEST_NAME, own_files
+from baker.io.output_folder import MANIFEST_NAME, file_state, own_files
 
 
 def inspect_path(path: Path | str) -> dict[str, Any]:
@@ -54,7 +53,7 @@ def _bake(folder: Path) -> dict[str, Any]:
         raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
     manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
     files = [
-        {**entry, "state": _state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
+        {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
     ]
     settings = manifest.get("settings", {})
     return {
@@ -74,14 +73,6 @@ def _bake(folder: Path) -> dict[str, Any]:
         "seconds": sum(v for v in manifest.get("timings", {}).values() if isinstance(v, int | float)),
         "settings": settings,
     }
-
-
-def _state(path: Path, sha256: str) -> str:
-    if not path.is_file():
-        return "missing"
-    with path.open("rb") as file:
-        same = hashlib.file_digest(file, "sha256").hexdigest() == sha256
-    return "as baked" if same else "changed"
 
 
 def _image(path: Path, image: Any) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def load_scene(
         raise SettingsError(f"up axis '{up}' is neither y nor z", object="up")
     if not (math.isfinite(scale) and scale > 0):
         raise SettingsError(f"scale {scale} is not a positive number of metres per unit", object="scale")
-    data = _read(path)
+    data = read_scene_file(path)
     importer = importers.get(path.suffix.lower())
     if importer is None:
         known = ", ".join(importers.names())
@@ -113,7 +113,14 @@ def load_scene(
         raise ResourceError("the scene does not fit into memory", file=str(path)) from None
 
 
-def _read(path: Path) -> bytes:
+def read_scene_file(path: Path) -> bytes:
+    """Return the content of a scene file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it cannot be read.
+    """
     try:
         return path.read_bytes()
     except FileNotFoundError:

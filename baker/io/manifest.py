@@ -18,6 +18,7 @@ import numpy as np
 
 from baker.core.lightmap import BakeResult
 from baker.core.scene import SceneWarning
+from baker.core.settings import BakeSettings
 
 # The layout of the manifest; it changes when a key changes its name or meaning.
 VERSION = 1
@@ -66,7 +67,7 @@ def make_manifest(
     manifest = {
         "version": VERSION,
         "settings": _settings(result),
-        "versions": _versions(),
+        "versions": library_versions(),
         "input": {"path": _relative(scene.path, out), "sha256": scene.sha256 or None},
         "created": moment.isoformat(timespec="seconds").replace("+00:00", "Z"),
         "pages": pages,
@@ -102,16 +103,19 @@ def manifest_schema() -> dict[str, Any]:
     return schema
 
 
-def _settings(result: BakeResult) -> dict[str, Any]:
+def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
     """Return every setting with its default filled in, but the number of threads: it changes nothing."""
-    settings = result.settings
     values = settings.model_dump(mode="json", exclude={"threads"})
     samples = settings.hemisphere_samples
     values["samples"] = samples
     values["light_samples"] = settings.light_samples or samples
     values["ao_samples"] = settings.ao_samples or samples
-    values["ao_distance_metres"] = settings.ao_reach(_diagonal(result))
     return values
+
+
+def _settings(result: BakeResult) -> dict[str, Any]:
+    reach = result.settings.ao_reach(_diagonal(result))
+    return {**resolved_settings(result.settings), "ao_distance_metres": reach}
 
 
 def _diagonal(result: BakeResult) -> float:
@@ -127,7 +131,8 @@ def _diagonal(result: BakeResult) -> float:
     return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
 
 
-def _versions() -> dict[str, str | None]:
+def library_versions() -> dict[str, str | None]:
+    """Return the versions of baker, Python and the libraries that can change the numbers of a bake."""
     versions: dict[str, str | None] = {}
     for name, distribution in _LIBRARIES.items():
         try:

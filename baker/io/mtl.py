@@ -35,7 +35,14 @@ _OPTION_VALUES = {
 _VECTOR_OPTIONS = ("-o", "-s", "-t")
 
 
-def read_mtl(text: str, *, file: str, folder: Path, read_file: Callable[[Path], bytes]) -> list[Material]:
+def read_mtl(
+    text: str,
+    *,
+    file: str,
+    folder: Path,
+    read_file: Callable[[Path], bytes],
+    decode: Callable[..., NDArray[np.uint8]] = decode_image,
+) -> list[Material]:
     """Return the materials of one library, in its order.
 
     Parameters
@@ -48,6 +55,8 @@ def read_mtl(text: str, *, file: str, folder: Path, read_file: Callable[[Path], 
         Where its image names begin.
     read_file : callable
         Returns the content of a file; raises OSError or ValueError if it cannot.
+    decode : callable
+        Makes pixels of an image file's content; see `decode_image`.
 
     Raises
     ------
@@ -78,7 +87,7 @@ def read_mtl(text: str, *, file: str, folder: Path, read_file: Callable[[Path], 
                 raise InputError(
                     f"the image '{name}' cannot be read: {why}", file=file, object=material
                 ) from None
-            images[name] = decode_image(data, file=file, object=name)
+            images[name] = decode(data, file=file, object=name)
             return images[name]
         message = f"the image '{' '.join(words)}' is missing; put it beside the scene"
         raise InputError(message, file=file, object=material)

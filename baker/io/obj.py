@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from baker.core.colour import linear_from_srgb
 from baker.core.errors import IndexRangeError, InputError
 from baker.core.raw import PrimitiveArrays
 from baker.core.scene import Material, Scene, SceneWarning
+from baker.io.images import decode_image
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_scene import scene_of_meshes, to_world
 from baker.io.mtl import read_mtl
@@ -70,6 +72,20 @@ def import_obj(source: SceneFile) -> Scene:
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
 
 
+def obj_sha256(path: Path, data: bytes) -> str:
+    """Return the hash that `import_obj` would find, without looking at geometry or pixels.
+
+    Raises
+    ------
+    InputError
+        If a material library is malformed or an image is missing.
+    """
+    digest = hashlib.sha256(data)
+    nothing = np.zeros((1, 1, 4), np.uint8)
+    _read_libraries(_decode(data), path, digest, [], lambda content, **where: nothing)
+    return digest.hexdigest()
+
+
 def _decode(data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
@@ -78,7 +94,11 @@ def _decode(data: bytes) -> str:
 
 
 def _read_libraries(
-    text: str, path: Path, digest: hashlib._Hash, warnings: list[SceneWarning]
+    text: str,
+    path: Path,
+    digest: hashlib._Hash,
+    warnings: list[SceneWarning],
+    decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
     def read_file(file: Path) -> bytes:
         data = file.read_bytes()
@@ -98,7 +118,9 @@ def _read_libraries(
                 message = f"the material library '{name}' is missing or unreadable; its surfaces are grey"
                 warnings.append(SceneWarning("missing-mtl", message, path.name))
                 continue
-            materials += read_mtl(content, file=str(file), folder=file.parent, read_file=read_file)
+            materials += read_mtl(
+                content, file=str(file), folder=file.parent, read_file=read_file, decode=decode
+            )
     return materials
 
 

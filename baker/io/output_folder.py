@@ -8,6 +8,7 @@ be renamed (a mount point, the current folder) the files are exchanged one by on
 from __future__ import annotations
 
 import glob
+import hashlib
 import json
 import os
 import secrets
@@ -18,6 +19,7 @@ from types import TracebackType
 from baker.core.errors import ResourceError, SettingsError
 
 MANIFEST_NAME = "bake.json"
+AS_BAKED = "as baked"
 
 
 def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
@@ -71,6 +73,14 @@ def own_files(folder: Path) -> set[str] | None:
         return {MANIFEST_NAME, *(str(entry["file"]) for entry in manifest["files"])}
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def file_state(path: Path, sha256: str) -> str:
+    """Compare a file of a bake with the hash in its manifest: "as baked", "changed" or "missing"."""
+    if not path.is_file():
+        return "missing"
+    with path.open("rb") as file:
+        return AS_BAKED if hashlib.file_digest(file, "sha256").hexdigest() == sha256 else "changed"
 
 
 class OutputFolder:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import subprocess
-import sys
 import threading
 from collections.abc import Sequence
 
 import numpy as np
 
+from baker.core.child import start_module
 from baker.core.progress import Progress, report
 from baker.unwrap.worker import receive_charts, send_job
 from baker.unwrap.xatlas_charts import ChartJob, FlatCharts, cut_charts
@@ -94,15 +93,7 @@ class _Pool:
         with self.lock:
             if self.stopped:
                 return None
-            # The worker must find this very package, however the caller found it.
-            path = os.pathsep.join(entry for entry in sys.path if entry)
-            process = subprocess.Popen(
-                [sys.executable, "-m", "baker.unwrap.worker"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": path},
-            )
+            process = start_module("baker.unwrap.worker")
             self.processes.append(process)
             return process
 

@@ -1,0 +1,222 @@
+"""Reads JOBS.toml: which scenes are baked into which folders, with which settings.
+
+    [defaults]             any setting of a bake, and `out`
+    [[job]]                `scene` or `glob`, `out`, any setting
+
+Paths begin at the folder of the file, so that the whole tree can be moved.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from baker.core.errors import InputError, SettingsError
+from baker.core.settings import BakeSettings, make_settings
+from baker.io.output_folder import own_files
+
+_TABLES = ("defaults", "job")
+_PLACEHOLDERS = ("stem", "parent")
+_WILD = re.compile(r"[*?\[]")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One scene to be baked into one folder.
+
+    Attributes
+    ----------
+    scene : Path
+        The scene file; the pattern itself where a glob found nothing.
+    out : Path or None
+        The output folder; None where a glob found nothing.
+    settings : BakeSettings
+    problem : str
+        Why the job cannot even be tried; empty for most.
+    """
+
+    scene: Path
+    out: Path | None
+    settings: BakeSettings
+    problem: str = ""
+
+
+def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
+    """Return the jobs of a file, in its order; a glob's scenes are sorted by name.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file.
+    overrides : dict
+        Settings from the command line, which win over those of every job.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or unreadable.
+    SettingsError
+        If it is not TOML, names an unknown key, or gives two jobs one output folder.
+    """
+    document = _parse(path)
+    defaults = document.get("defaults", {})
+    tables = document.get("job", [])
+    for name in document:
+        if name not in _TABLES:
+            raise _error(path, name, f"there is no table '{name}'{_nearest(name, _TABLES)}")
+    if not isinstance(defaults, dict):
+        raise _error(path, "defaults", "it must be a table, written [defaults]")
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise _error(path, "job", "jobs must be tables, each written [[job]]")
+    if not tables:
+        raise _error(path, "job", "there are no jobs; write [[job]] with scene and out for each")
+    _check_keys(path, "defaults", defaults, ("out",))
+    jobs: list[Job] = []
+    for number, table in enumerate(tables, 1):
+        where = f"job {number}"
+        _check_keys(path, where, table, ("scene", "glob", "out"))
+        jobs += _expand(path, where, {**defaults, **table}, overrides)
+    _check_outputs(path, jobs)
+    return jobs
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    import tomllib
+
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        why = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror
+        raise InputError(f"the list of jobs cannot be read: {why}", file=str(path)) from None
+    except UnicodeDecodeError:
+        raise SettingsError("the list of jobs is not UTF-8 text; save it as UTF-8", file=str(path)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"the list of jobs is not valid TOML: {error}", file=str(path)) from None
+
+
+def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, ...]) -> None:
+    known = [*own, *BakeSettings.model_fields]
+    seen: set[str] = set()
+    for key in table:
+        name = key.replace("-", "_")
+        if name not in known:
+            raise _error(path, where, f"there is no setting '{key}'{_nearest(name, known)}")
+        if name in seen:
+            raise _error(path, where, f"'{key}' is given twice")
+        seen.add(name)
+
+
+def _expand(path: Path, where: str, table: dict[str, Any], overrides: dict[str, Any]) -> list[Job]:
+    """Return the jobs of one table."""
+    values = {key.replace("-", "_"): value for key, value in table.items()}
+    given = {key: _words(path, where, key, values.pop(key)) for key in ("scene", "glob") if key in values}
+    if len(given) != 1:
+        raise _error(path, where, "name either a scene or a glob" + (", not both" if given else ""))
+    pattern = values.pop("out", None)
+    if not isinstance(pattern, str) or not pattern:
+        raise _error(path, where, 'out is missing; write out = "baked/{stem}", here or in [defaults]')
+    try:
+        settings = make_settings(values)
+        settings = make_settings({**values, **overrides})
+    except SettingsError as error:
+        raise _error(path, where, error.message) from None
+    jobs = []
+    for word in next(iter(given.values())):
+        if "scene" in given and (not _WILD.search(word) or (path.parent / word).is_file()):
+            scenes = [path.parent / word]
+        else:
+            scenes = _find(path, where, word)
+        for scene in scenes:
+            jobs.append(Job(scene, _output(path, where, pattern, scene), settings))
+        if not scenes:
+            problem = "no scene file matches; check the pattern, which begins at the folder of the job file"
+            jobs.append(Job(path.parent / word, None, settings, problem))
+    return jobs
+
+
+def _words(path: Path, where: str, key: str, value: Any) -> list[str]:
+    words = value if isinstance(value, list) else [value]
+    if not words or not all(isinstance(word, str) and word for word in words):
+        raise _error(path, where, f"{key} must be a path in quotes, or a list of them")
+    return words
+
+
+def _find(path: Path, where: str, pattern: str) -> list[Path]:
+    """Return the scene files that a pattern finds, without hidden files and without what bakes wrote."""
+    import glob
+
+    from baker.io.load import importers
+
+    base = path.parent
+    found = []
+    # Not Path.glob: it takes no absolute pattern and finds hidden files.
+    for name in sorted(glob.glob(pattern, root_dir=base, recursive=True)):  # noqa: PTH207
+        scene = base / name
+        if not scene.is_file() or scene.suffix.lower() not in importers.names():
+            continue
+        if not _written_by_a_bake(scene, base):
+            found.append(scene)
+    return found
+
+
+def _written_by_a_bake(scene: Path, base: Path) -> bool:
+    # `**/*.glb` must not find the `scene.glb` of yesterday's bakes.
+    for folder in scene.parents:
+        if (folder / "bake.json").is_file():
+            own = own_files(folder)
+            if own is not None and scene.relative_to(folder).as_posix() in own:
+                return True
+        if folder == base:
+            break
+    return False
+
+
+def _output(path: Path, where: str, pattern: str, scene: Path) -> Path:
+    """Return the output folder of a scene: `{stem}` is its name, `{parent}` the name of its folder."""
+    words = {"stem": scene.stem, "parent": scene.resolve().parent.name}
+
+    def put(match: re.Match[str]) -> str:
+        name = match.group(1)
+        if name not in words:
+            hint = _nearest(name, _PLACEHOLDERS) or "; it knows {stem} and {parent}"
+            raise _error(path, where, f"out knows no {{{name}}}{hint}")
+        return words[name]
+
+    return path.parent / re.sub(r"\{([^{}]*)\}", put, pattern)
+
+
+def _check_outputs(path: Path, jobs: list[Job]) -> None:
+    """Refuse two jobs with one output folder, and an output folder inside another."""
+    owner: dict[str, Job] = {}
+    for job in jobs:
+        if job.out is None:
+            continue
+        place = os.path.normcase(job.out.resolve())
+        if place in owner:
+            raise SettingsError(
+                f"'{owner[place].scene}' and '{job.scene}' would both be baked into '{job.out}'; "
+                "give them different folders, for example with {parent} or {stem} in out",
+                file=str(path),
+            )
+        owner[place] = job
+    for place, job in owner.items():
+        for parent in Path(place).parents:
+            other = owner.get(str(parent))
+            if other is not None:
+                raise SettingsError(
+                    f"the output '{job.out}' lies inside '{other.out}', which is an output too; move one",
+                    file=str(path),
+                )
+
+
+def _nearest(name: str, known: Any) -> str:
+    near = get_close_matches(name, list(known), n=1)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def _error(path: Path, where: str, message: str) -> SettingsError:
+    return SettingsError(message, file=str(path), object=where)

@@ -1,0 +1,102 @@
+"""Bakes one job after the other in a process of its own, so that libraries and kernels load once.
+
+Protocol: a line of JSON for each job on stdin, lines of JSON on stdout. A job is
+{"scene", "out", "settings", "force"}; while it runs come {"stage", "fraction"}, at its end {"done": true}
+or {"error": {"kind", "message", "file", "object", "code"}}. When stdin ends, so does the process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from typing import Any, TextIO
+
+from baker.core.errors import BakerError
+from baker.core.failure import bug, explain
+
+# Seconds between two lines about progress.
+_INTERVAL = 0.1
+# Seconds that a running bake gets to stop by itself when the other side is gone.
+_GRACE = 0.6
+
+
+def main() -> None:
+    """Answer jobs until stdin ends."""
+    # Ctrl-C reaches the whole process group; the parent decides what happens to this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Native libraries print to descriptor 1 as they please.
+    sink = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    jobs: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
+    stop = threading.Event()
+    threading.Thread(target=_listen, args=(jobs, stop), daemon=True).start()
+    # Before the first job arrives, or while it does.
+    import baker.pipeline  # noqa: F401
+
+    while (job := jobs.get()) is not None:
+        _answer(sink, _run(job, sink, stop))
+    os._exit(0)
+
+
+def _listen(jobs: queue.SimpleQueue[dict[str, Any] | None], stop: threading.Event) -> None:
+    for line in sys.stdin:
+        jobs.put(json.loads(line))
+    stop.set()
+    jobs.put(None)
+    time.sleep(_GRACE)
+    os._exit(0)
+
+
+def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, Any]:
+    """Bake one job and return what to answer."""
+    from baker.core.settings import make_settings
+    from baker.pipeline import bake
+
+    told = 0.0
+
+    def progress(stage: str, fraction: float, detail: str = "", /) -> object:
+        nonlocal told
+        now = time.monotonic()
+        if now - told >= _INTERVAL:
+            told = now
+            _answer(sink, {"stage": stage, "fraction": fraction})
+        return stop.is_set()
+
+    try:
+        settings = make_settings(job["settings"])
+        bake(job["scene"], settings=settings, out=job["out"], progress=progress, force=job["force"])
+    except Exception as error:
+        return {"error": describe(error)}
+    return {"done": True}
+
+
+def describe(error: BaseException) -> dict[str, Any]:
+    """Return an error as plain values, with the exit code it stands for."""
+    known = explain(error)
+    kind = "internal" if known is None else known.kind
+    told: BakerError = bug(error) if known is None else known
+    return {
+        "kind": kind,
+        "message": told.message,
+        "file": told.file,
+        "object": told.object,
+        "code": told.exit_code,
+    }
+
+
+def _answer(sink: TextIO, message: dict[str, Any]) -> None:
+    try:
+        sink.write(json.dumps(message) + "\n")
+        sink.flush()
+    except OSError:
+        # Nobody listens any more; the end of stdin stops the work.
+        return
+
+
+if __name__ == "__main__":
+    main()

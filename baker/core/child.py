@@ -1,0 +1,25 @@
+"""Starts a module of this package in a Python process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+
+def start_module(module: str) -> subprocess.Popen[bytes]:
+    """Start `python -m module` with pipes at its standard input and output.
+
+    Parameters
+    ----------
+    module : str
+        Dotted name; the process finds this very package, however the caller found it.
+    """
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    return subprocess.Popen(
+        [sys.executable, "-m", module],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": path},
+    )
