@@ -34,6 +34,7 @@ from baker.kernels.emitters import Emitters
 from baker.kernels.hits import HitTable
 from baker.kernels.surface import Surface
 from baker.lights.emissive import build_emitters
+from baker.lint.in_bake import bake_warnings
 from baker.radiosity.buried import find_buried
 from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
@@ -126,7 +127,7 @@ def bake(
         with record.stage("load"):
             if not isinstance(scene, Scene):
                 scene = load_scene(scene, up=settings.up, scale=settings.scale)
-        record.warnings.extend(scene.warnings)
+        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings)])
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend(atlas.warnings)

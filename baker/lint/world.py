@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from baker.lint.subject import Subject
-    from baker.trace.embree import RayScene
+    from baker.trace.embree import RayScene, Tracer
 
 # Rays that one call of the kernel takes; also what a thread works on at a time.
 _TILE = 1 << 16
@@ -78,19 +78,29 @@ class World:
         far: NDArray[np.floating],
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return the triangle (-1 for none) and distance that (n, 3) rays hit between `near` and `far`."""
-        from baker.core.parallel import run_tiles
-        from baker.core.progress import silent
-        from baker.kernels.cast import first_hits
-        from baker.trace.packets import new_caster
+        return cast(self.rays.tracer, self.threads, origin, way, near, far)
 
-        n = len(origin)
-        triangle, distance = np.full(n, -1, np.int32), np.zeros(n, np.float32)
-        tracer = self.rays.tracer
-        rows = [np.ascontiguousarray(value, np.float32) for value in (origin, way, near, far)]
 
-        def work(begin: int, end: int) -> None:
-            part = [row[begin:end] for row in rows]
-            first_hits(new_caster(tracer), *part, triangle[begin:end], distance[begin:end])
+def cast(
+    tracer: Tracer,
+    threads: int,
+    origin: NDArray[np.floating],
+    way: NDArray[np.floating],
+    near: NDArray[np.floating],
+    far: NDArray[np.floating],
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the triangle (-1 for none) and distance of the first hit of (n, 3) rays."""
+    from baker.core.parallel import run_tiles
+    from baker.core.progress import silent
+    from baker.kernels.cast import first_hits
+    from baker.trace.packets import new_caster
 
-        run_tiles(n, _TILE, work, threads=self.threads, stage="rays", progress=silent)
-        return triangle, distance
+    n = len(origin)
+    triangle, distance = np.full(n, -1, np.int32), np.zeros(n, np.float32)
+    a, b, c, d = (np.ascontiguousarray(value, np.float32) for value in (origin, way, near, far))
+
+    def work(i: int, j: int) -> None:
+        first_hits(new_caster(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
+
+    run_tiles(n, _TILE, work, threads=threads, stage="rays", progress=silent)
+    return triangle, distance

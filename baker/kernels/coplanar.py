@@ -1,0 +1,57 @@
+"""Finds triangles of different objects that overlap within one plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def coplanar_partners(corner, low, high, first, owner, slack, partner):  # type: ignore[no-untyped-def]
+    """Write for each triangle one of another owner that it overlaps in its plane.
+
+    Two triangles overlap if no direction perpendicular to a side keeps them apart (separating axes).
+
+    Parameters
+    ----------
+    corner : (T, 3, 2) float64
+        In the coordinates of the plane; triangles of one plane stand together, sorted by `low` along x.
+    low, high : (T, 2) float64
+        Bounds of each triangle.
+    first : (P + 1,) int64
+        Where each plane's triangles start.
+    owner : (T,) int64
+    slack : float
+        Triangles that overlap by no more than this along some axis only touch.
+    partner : (T,) int64
+        In and out: -1 where none is known.
+    """
+    for p in range(len(first) - 1):
+        for i in range(first[p], first[p + 1]):
+            for j in range(i + 1, first[p + 1]):
+                if low[j, 0] >= high[i, 0] - slack:
+                    break
+                if owner[i] == owner[j] or (partner[i] >= 0 and partner[j] >= 0):
+                    continue
+                if low[j, 1] >= high[i, 1] - slack or low[i, 1] >= high[j, 1] - slack:
+                    continue
+                if not _apart(corner[i], corner[j], slack) and not _apart(corner[j], corner[i], slack):
+                    partner[i] = j
+                    partner[j] = i
+
+
+@njit(cache=True, nogil=True)
+def _apart(a, b, slack):  # type: ignore[no-untyped-def]
+    """Tell whether a side of `a` has all of `b` on its far side, but for `slack`."""
+    turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
+    sign = 1.0 if turn > 0.0 else -1.0
+    for k in range(3):
+        m = (k + 1) % 3
+        dx, dy = sign * (a[m, 0] - a[k, 0]), sign * (a[m, 1] - a[k, 1])
+        length = np.sqrt(dx * dx + dy * dy)
+        inside = -1.0e300
+        for c in range(3):
+            inside = max(inside, dx * (b[c, 1] - a[k, 1]) - dy * (b[c, 0] - a[k, 0]))
+        if inside <= slack * length:
+            return True
+    return False

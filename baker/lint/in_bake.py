@@ -1,0 +1,22 @@
+"""The checks that a bake runs by itself: errors of geometry that its importer and unwrapper do not tell."""
+
+from __future__ import annotations
+
+from baker.core.scene import Scene, SceneWarning
+from baker.core.settings import BakeSettings
+
+
+def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
+    """Return what is wrong with a scene that is about to be baked.
+
+    Faces that cannot be used are told by the importer, lightmap uv that cannot be kept by the unwrapper, both
+    under the codes that `baker check` has for them; here comes the rest.
+    """
+    # Not through the register, which would import every check.
+    from baker.lint.inside_out import inside_out
+    from baker.lint.subject import Subject
+
+    return [
+        SceneWarning("inside-out", f"{found.message}; it will be black", found.place.object)
+        for found in inside_out(Subject(scene, settings))
+    ]
