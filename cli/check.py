@@ -49,6 +49,7 @@ def work(
     ignore: list[str] | None,
     config: Path | None,
     fix: bool,
+    repair: bool,
     out: Path | None,
     force: bool,
     as_json: bool,
@@ -62,7 +63,7 @@ def work(
     session: Session = ctx.obj
     as_json = as_json or session.as_json
     resolved = resolve(given(settings), config)
-    request = asked(scenes, fix=fix, out=out, force=force)
+    request = asked(scenes, fix=fix, repair=repair, out=out, force=force)
     mended = None
     with session.reporter(quiet=quiet) as progress:
         progress("start", 0.0)

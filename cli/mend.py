@@ -15,6 +15,7 @@ from baker.core.errors import SettingsError
 if TYPE_CHECKING:
     from baker.core.progress import Progress
     from baker.core.settings import BakeSettings
+    from baker.mend.mesh import Change
     from baker.mending import Mended
 
 
@@ -25,12 +26,15 @@ class MendRequest:
     Attributes
     ----------
     scene, out : Path
+    repair : bool
+        Also mend what changes the shape a little.
     force : bool
         Replace `out` if it exists.
     """
 
     scene: Path
     out: Path
+    repair: bool
     force: bool
 
 
@@ -44,13 +48,25 @@ def mend_flags() -> list[inspect.Parameter]:
             False,
         ),
         flag(
-            "out", Path | None, typer.Option("--out", "-o", metavar="FIXED.glb", help="Where --fix writes.")
+            "repair",
+            bool,
+            typer.Option(
+                "--repair", help="--fix, and mend the shape of meshes (needs pip install 'baker[repair]')."
+            ),
+            False,
+        ),
+        flag(
+            "out",
+            Path | None,
+            typer.Option("--out", "-o", metavar="FIXED.glb", help="Where --fix and --repair write."),
         ),
         flag("force", bool, typer.Option("--force", help="Let -o replace a file that exists."), False),
     ]
 
 
-def asked(scenes: list[Path], *, fix: bool, out: Path | None, force: bool) -> MendRequest | None:
+def asked(
+    scenes: list[Path], *, fix: bool, repair: bool, out: Path | None, force: bool
+) -> MendRequest | None:
     """Return what is to be mended, or None for a check alone.
 
     Raises
@@ -58,18 +74,19 @@ def asked(scenes: list[Path], *, fix: bool, out: Path | None, force: bool) -> Me
     SettingsError
         If the flags do not go together or `out` cannot be written.
     """
-    if not fix:
+    if not (fix or repair):
         if out is not None:
             raise SettingsError("-o says where --fix writes; add --fix", object="out")
         return None
+    name = "--repair" if repair else "--fix"
     if out is None:
-        raise SettingsError("--fix writes a new file; name it with -o FIXED.glb", object="out")
+        raise SettingsError(f"{name} writes a new file; name it with -o FIXED.glb", object="out")
     if len(scenes) != 1:
-        raise SettingsError(f"--fix takes one scene at a time; {len(scenes)} are named", object="scene")
+        raise SettingsError(f"{name} takes one scene at a time; {len(scenes)} are named", object="scene")
     from baker.mending import check_fixed
 
     check_fixed(out, scenes[0], force=force)
-    return MendRequest(scenes[0], out, force)
+    return MendRequest(scenes[0], out, repair, force)
 
 
 def mend(request: MendRequest, settings: BakeSettings, progress: Progress) -> Mended:
@@ -81,6 +98,7 @@ def mend(request: MendRequest, settings: BakeSettings, progress: Progress) -> Me
         up=settings.up,
         scale=settings.scale,
         threads=settings.threads,
+        repair=request.repair,
     )
     mended = mend_file(request.scene, wanted, progress)
     write_fixed(request.out, mended.data)
@@ -93,7 +111,7 @@ def write_mended_text(mended: Mended, request: MendRequest, stream: TextIO) -> N
         change = fix.change
         stream.write(
             f"{request.scene}: mended: {change.change}: '{fix.object}' (node {fix.node})"
-            f" {change.counted}: {change.before} -> {change.after}\n"
+            f" {change.counted}: {change.before} -> {change.after}{_more(change)}\n"
         )
     for left in mended.left_alone:
         stream.write(f"{request.scene}: left alone: '{left.object}' (node {left.node}) {left.reason}\n")
@@ -104,3 +122,9 @@ def write_mended_text(mended: Mended, request: MendRequest, stream: TextIO) -> N
 def mended_json(mended: Mended, request: MendRequest) -> dict[str, Any]:
     """Return the keys that mending adds to `--json`."""
     return {**mended.json(), "out": str(request.out)}
+
+
+def _more(change: Change) -> str:
+    """Return what a repair did to the surface and to attributes, in words."""
+    moved = "" if change.distance is None else f"; the surface moved by up to {change.distance:.3g} m"
+    return moved + (f"; {', '.join(change.lost)} could not be kept" if change.lost else "")

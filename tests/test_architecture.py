@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
 # Libraries that are slow to import or that a file should hide behind an interface.
-HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic")
+HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic", "pymeshlab")
 NOT_SOURCE = {
     ".git",
     ".venv",

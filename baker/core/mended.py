@@ -1,4 +1,4 @@
-"""What mending makes of a primitive: which old vertices its new triangles use, and what of them is new."""
+"""What mending makes of a primitive: old vertices in new order, or a surface made anew."""
 
 from __future__ import annotations
 
@@ -30,3 +30,21 @@ class MendedPrimitive:
     normal: NDArray[np.float32] | None
     turned: NDArray[np.bool_]
     uv: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True)
+class RemadePrimitive:
+    """A primitive whose vertices are all new. It has no other attributes than these.
+
+    Attributes
+    ----------
+    position : (V, 3) float32, object space
+    triangle : (T, 3) int64
+    normal : (V, 3) float32, unit, or None
+    colour : (V, 4) float32, linear, or None
+    """
+
+    position: NDArray[np.float32]
+    triangle: NDArray[np.int64]
+    normal: NDArray[np.float32] | None = None
+    colour: NDArray[np.float32] | None = None

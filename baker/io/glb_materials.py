@@ -66,6 +66,15 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
     return False
 
 
+def reads_texture(document: Json, primitive: Json) -> bool:
+    """Say whether a material of the primitive has any texture."""
+    return any(
+        next(_texture_infos(document["materials"][holder["material"]], occlusion=True), None) is not None
+        for holder in material_holders(primitive)
+        if "material" in holder
+    )
+
+
 def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int, int]) -> None:
     """Give every baked primitive the AO of its page, cloning materials where needed.
 

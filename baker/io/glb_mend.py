@@ -8,21 +8,23 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.mended import MendedPrimitive
+from baker.core.mended import MendedPrimitive, RemadePrimitive
 from baker.core.scene import SourceDocument
 from baker.io.glb_pack import COMPONENT, Json, Packer, primitive_accessors
 from baker.io.glb_rows import gather_rows
 from baker.io.gltf_write import embed_images
 
 
-def write_mended(source: SourceDocument, mended: Mapping[tuple[int, int], MendedPrimitive]) -> bytes:
+def write_mended(
+    source: SourceDocument, mended: Mapping[tuple[int, int], MendedPrimitive | RemadePrimitive]
+) -> bytes:
     """Return the document as GLB.
 
     Parameters
     ----------
     source : SourceDocument
         Not changed.
-    mended : mapping of (mesh, primitive) to MendedPrimitive
+    mended : mapping of (mesh, primitive) to MendedPrimitive or RemadePrimitive
         The primitives that are made anew, by their places in the file.
 
     Raises
@@ -41,8 +43,15 @@ def write_mended(source: SourceDocument, mended: Mapping[tuple[int, int], Mended
             primitive.pop(key, None)
     packer = Packer(document, source.buffers, frozenset(replaced))
     for (mesh, number), new in mended.items():
-        old = source.json["meshes"][mesh]["primitives"][number]
-        _rewrite(packer, source, old, document["meshes"][mesh]["primitives"][number], new)
+        primitive = document["meshes"][mesh]["primitives"][number]
+        if isinstance(new, RemadePrimitive):
+            _remake(packer, primitive, new)
+        else:
+            _rewrite(packer, source, source.json["meshes"][mesh]["primitives"][number], primitive, new)
+        primitive["indices"] = packer.add_indices(new.triangle)
+        # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
+        if primitive.get("mode", 4) != 4:
+            del primitive["mode"]
     embed_images(packer, source)
     return packer.glb()
 
@@ -50,7 +59,7 @@ def write_mended(source: SourceDocument, mended: Mapping[tuple[int, int], Mended
 def _rewrite(
     packer: Packer, source: SourceDocument, old: Json, primitive: Json, new: MendedPrimitive
 ) -> None:
-    """Write the vertices and triangles of one primitive."""
+    """Write the vertices of one primitive."""
     own: dict[str, NDArray[np.float32]] = {}
     if new.normal is not None:
         own["NORMAL"] = new.normal
@@ -71,10 +80,16 @@ def _rewrite(
         attributes[name] = packer.add_rows(data, accessor, bounds=name == "POSITION")
     attributes.update({name: packer.add_floats(values) for name, values in own.items()})
     primitive["attributes"] = attributes
-    primitive["indices"] = packer.add_indices(new.triangle)
-    # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
-    if primitive.get("mode", 4) != 4:
-        del primitive["mode"]
+
+
+def _remake(packer: Packer, primitive: Json, new: RemadePrimitive) -> None:
+    """Write the vertices of one primitive, none of which is an old one."""
+    attributes = {"POSITION": packer.add_floats(new.position, bounds=True)}
+    if new.normal is not None:
+        attributes["NORMAL"] = packer.add_floats(new.normal)
+    if new.colour is not None:
+        attributes["COLOR_0"] = packer.add_floats(new.colour)
+    primitive["attributes"] = attributes
 
 
 def _turn_handedness(data: NDArray[np.uint8], accessor: Json, turned: NDArray[np.bool_]) -> NDArray[np.uint8]:

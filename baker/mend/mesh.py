@@ -31,12 +31,18 @@ class Change:
     counted : str
         What the numbers count.
     before, after : int
+    distance : float or None
+        Of a repair: the furthest that the surface moved, metres by the first node's scale (Hausdorff).
+    lost : tuple of str
+        Vertex attributes that could not be kept.
     """
 
     change: str
     counted: str
     before: int
     after: int
+    distance: float | None = None
+    lost: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,13 +77,15 @@ class MeshPlan:
     left: tuple[str, ...]
 
 
-def plan_mesh(parts: Sequence[Part]) -> MeshPlan:
+def plan_mesh(parts: Sequence[Part], *, make_normals: bool = True) -> MeshPlan:
     """Decide what stays of a mesh.
 
     Parameters
     ----------
     parts : sequence of Part
         All its primitives of triangles.
+    make_normals : bool
+        Make normals where there are none. Not before a repair, which would take them for the file's own.
     """
     left: list[str] = []
     choices = [choose_faces(part) for part in parts]
@@ -93,7 +101,7 @@ def plan_mesh(parts: Sequence[Part]) -> MeshPlan:
     for part, choice, kept, flip in zip(parts, choices, triangles, flips, strict=True):
         turned_faces = np.where(flip[:, None], kept[:, [0, 2, 1]], kept)
         good = part.arrays.triangle[choice.keep] if part.locked else turned_faces
-        normals = _normals(part, good)
+        normals = _normals(part, good, make=make_normals)
         n_doubles = _count_doubles(part, good, normals)
         wanted = bool(choice.n_dropped or flip.any() or normals.n_made or n_doubles)
         if part.locked:
@@ -104,7 +112,7 @@ def plan_mesh(parts: Sequence[Part]) -> MeshPlan:
             continue
         if choice.n_unlike:
             left.append(_unlike_sentence(part, choice.n_unlike))
-        plans.append(_part_plan(part, wanted, turned_faces, flip, normals))
+        plans.append(turn_faces(part, turned_faces, flip, touched=wanted, normals=normals))
         totals.add(choice, len(np.unique(kept)), n_doubles, int(flip.sum()), normals)
     return MeshPlan(tuple(plans), totals.changes(), tuple(left))
 
@@ -146,6 +154,43 @@ def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> Mended
         turned=plan.turned.reshape(-1)[corner],
         uv=None if uv is None else uv.reshape(-1, 2)[corner],
     )
+
+
+def turn_faces(
+    part: Part,
+    triangle: NDArray[np.int64],
+    flip: NDArray[np.bool_],
+    *,
+    touched: bool,
+    normals: NormalChoice | None = None,
+) -> PartPlan:
+    """Put together what a primitive becomes: the normals of turned faces follow them.
+
+    Parameters
+    ----------
+    part : Part
+    triangle : (T, 3) int64
+        The faces that stay, turned where `flip` says so.
+    flip : (T,) bool
+    touched : bool
+        Something about the primitive is mended.
+    normals : NormalChoice or None
+        New normals of the corners before that.
+    """
+    normals = normals or NormalChoice(None)
+    turned = np.zeros(triangle.shape, bool)
+    corner = normals.corner
+    given = part.arrays.normal
+    if flip.any() and given is not None:
+        corner = given[triangle] if corner is None else corner
+        front = face_normal(part.arrays.position, triangle)
+        against = np.einsum("tkx,tx->t", np.nan_to_num(corner).astype(np.float64), front) < 0
+        turned[flip & against] = True
+        if turned.any():
+            corner = np.where(turned[..., None], -corner, corner)
+        else:
+            corner = normals.corner
+    return PartPlan(part, touched, triangle, corner, turned)
 
 
 def _lock_empty(part: Part, choice: FaceChoice) -> Part:
@@ -197,8 +242,8 @@ def _face_mean(part: Part, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
     return np.asarray(np.nan_to_num(mean, nan=0.0, posinf=0.0, neginf=0.0), np.float32)
 
 
-def _normals(part: Part, triangle: NDArray[np.int64]) -> NormalChoice:
-    if not len(triangle):
+def _normals(part: Part, triangle: NDArray[np.int64], *, make: bool) -> NormalChoice:
+    if not len(triangle) or (part.arrays.normal is None and not make):
         return NormalChoice(None)
     exact = part.arrays.normal is not None and part.column["NORMAL"].shape[1] == 12
     return choose_normals(part.arrays.position, triangle, part.arrays.normal, exact=exact)
@@ -214,29 +259,6 @@ def _count_doubles(part: Part, triangle: NDArray[np.int64], normals: NormalChoic
         return max(0, len(used) - len(made.row)) if made is not None else 0
     first = first_equal([data[used] for data in part.column.values()], len(used))
     return int((first != np.arange(len(used))).sum())
-
-
-def _part_plan(
-    part: Part,
-    touched: bool,
-    triangle: NDArray[np.int64],
-    flip: NDArray[np.bool_],
-    normals: NormalChoice,
-) -> PartPlan:
-    """Put together what a free primitive becomes; normals follow their faces."""
-    turned = np.zeros(triangle.shape, bool)
-    corner = normals.corner
-    given = part.arrays.normal
-    if flip.any() and given is not None:
-        corner = given[triangle] if corner is None else corner
-        front = face_normal(part.arrays.position, triangle)
-        against = np.einsum("tkx,tx->t", np.nan_to_num(corner).astype(np.float64), front) < 0
-        turned[flip & against] = True
-        if turned.any():
-            corner = np.where(turned[..., None], -corner, corner)
-        else:
-            corner = normals.corner
-    return PartPlan(part, touched, triangle, corner, turned)
 
 
 class _Totals:

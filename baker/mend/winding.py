@@ -41,7 +41,11 @@ class Winding:
 
 
 def judge_winding(
-    position: NDArray[np.float32], corner: NDArray[np.int64], normal: NDArray[np.float32] | None
+    position: NDArray[np.float32],
+    corner: NDArray[np.int64],
+    normal: NDArray[np.float32] | None,
+    *,
+    open_too: bool = False,
 ) -> Winding:
     """Find the faces of closed pieces that look the wrong way.
 
@@ -53,6 +57,8 @@ def judge_winding(
         Places of each face's corners, all different.
     normal : (T, 3) float32 or None
         Mean of the vertex normals of each face, zero where the file has none.
+    open_too : bool
+        Judge open pieces as well, of which no edge belongs to more than two faces.
 
     Returns
     -------
@@ -61,7 +67,7 @@ def judge_winding(
     n = len(corner)
     nothing = np.zeros(n, bool)
     edge = _Edges(corner)
-    piece, closed = edge.pieces(n)
+    piece, closed = edge.pieces(n, open_too=open_too)
     closed_face = closed[piece]
     if not closed_face.any():
         return Winding(nothing, 0, 0, nothing)
@@ -97,6 +103,11 @@ def judge_winding(
     return Winding(flip, int(turned.sum()), int((closed & faulty).sum()), inward)
 
 
+def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many of the faces (T, 3) each of their edges belongs to, (E,) int64."""
+    return _Edges(corner).count
+
+
 class _Edges:
     """The edges of triangles, sorted so that equal ones are neighbours."""
 
@@ -115,11 +126,12 @@ class _Edges:
         # Rows where an edge is the same as in the row before.
         self.second = np.flatnonzero(~new)
 
-    def pieces(self, n_faces: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the piece of each face, and which pieces are closed."""
+    def pieces(self, n_faces: int, *, open_too: bool) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the piece of each face, and which pieces are closed (or at least have no crowded edge)."""
         a, b = self.face[self.second - 1], self.face[self.second]
         piece = _components(a, b, n_faces)
-        open_face = self.face[self.count[self.number] != 2]
+        good = self.count <= 2 if open_too else self.count == 2
+        open_face = self.face[~good[self.number]]
         closed = np.ones(int(piece.max(initial=-1)) + 1, bool)
         closed[piece[open_face]] = False
         return piece, closed

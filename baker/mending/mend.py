@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,19 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.mended import MendedPrimitive
+from baker.core.mended import MendedPrimitive, RemadePrimitive
 from baker.core.progress import Progress, report, silent
-from baker.core.raw import PrimitiveArrays, RawMesh, RawScene
+from baker.core.raw import PrimitiveArrays, RawInstance, RawMesh, RawScene
 from baker.core.scene import Scene, SourceDocument
 from baker.core.triangle_check import face_normal, in_range
-from baker.io.glb_materials import material_holders, reads_texcoord_1
+from baker.io.glb_materials import material_holders, reads_texcoord_1, reads_texture
 from baker.io.glb_mend import write_mended
 from baker.io.glb_parts import read_columns, why_locked
 from baker.io.gltf_raw import raw_glb
 from baker.io.load import SceneFile, importers, load_scene
 from baker.mend.mesh import Change, finish_part, plan_mesh
+from baker.mend.meshlab import require_meshlab
 from baker.mend.part import Part
 from baker.mending.lightmap_uv import new_lightmap_uv
+from baker.mending.repair import repair_mesh
 
 STAGE = "mend"
 
@@ -37,12 +40,15 @@ class MendSettings:
     up, scale : str, float
         Up axis and metres per unit of formats that do not say.
     threads : int or None
+    repair : bool
+        Also mend the shape of meshes, with pymeshlab: non-manifold edges, holes, orientation, needles.
     """
 
     resolution: int = 1024
     up: str = "y"
     scale: float = 1.0
     threads: int | None = None
+    repair: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,20 +96,26 @@ class Mended:
         """Return the keys `fixed` and `left_alone` of `--json`."""
         return {
             "fixed": [
-                {
-                    "object": fix.object,
-                    "node": fix.node,
-                    "change": fix.change.change,
-                    "counted": fix.change.counted,
-                    "before": fix.change.before,
-                    "after": fix.change.after,
-                }
-                for fix in self.fixed
+                {"object": fix.object, "node": fix.node, **_change_json(fix.change)} for fix in self.fixed
             ],
             "left_alone": [
                 {"object": left.object, "node": left.node, "reason": left.reason} for left in self.left_alone
             ],
         }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "change": change.change,
+        "counted": change.counted,
+        "before": change.before,
+        "after": change.after,
+    }
+    if change.distance is not None:
+        told["distance"] = change.distance
+    if change.lost:
+        told["lost"] = list(change.lost)
+    return told
 
 
 def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Progress = silent) -> Mended:
@@ -125,9 +137,13 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     ------
     InputError
         If the file cannot be read.
+    ResourceError
+        If a repair is asked for and pymeshlab is not installed.
     Cancelled
         If `progress` asks for it.
     """
+    if settings.repair:
+        require_meshlab()
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True)
     data: bytes | None = None
     if scene.source is None:
@@ -138,21 +154,35 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     elif not _names_files(scene.source):
         written = path.read_bytes()
         data = written if written[:4] == b"glTF" else None
-    source, raw = scene.source, scene.raw
-    assert source is not None
-    assert raw is not None
+    first = _mend(scene, data, settings, progress, make_normals=not settings.repair)
+    if not settings.repair:
+        return first
+    repaired = _repair(_read_glb(path, first.data), first, progress)
+    # What was repaired may now have double vertices, or need other lightmap uv.
+    second = _mend(_read_glb(path, repaired.data), repaired.data, settings, progress)
+    left = dict.fromkeys((*repaired.left_alone, *second.left_alone))
+    return Mended(second.data, (*repaired.fixed, *second.fixed), tuple(left))
+
+
+def _mend(
+    scene: Scene,
+    data: bytes | None,
+    settings: MendSettings,
+    progress: Progress,
+    *,
+    make_normals: bool = True,
+) -> Mended:
+    """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
+    source, raw = _parsed(scene)
     area = _area_shares(raw)
     mended: dict[tuple[int, int], MendedPrimitive] = {}
     fixed: list[Fix] = []
     left: list[LeftAlone] = []
-    for number, mesh in enumerate(raw.meshes):
-        if not mesh.primitives:
-            continue
+    for number, mesh, shown in _shown_meshes(raw):
         report(progress, STAGE, number / len(raw.meshes), mesh.name)
-        shown = [instance for instance in raw.instances if instance.mesh == number]
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
-        plan = plan_mesh(_parts(source, index, mesh))
+        plan = plan_mesh(_parts(source, index, mesh), make_normals=make_normals)
         plan, uv = new_lightmap_uv(
             plan,
             shown,
@@ -171,6 +201,38 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     if mended or data is None:
         data = write_mended(source, mended)
     return Mended(data, tuple(fixed), tuple(left))
+
+
+def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
+    """Repair the shapes of a scene that is mended otherwise; what was done so far is told first."""
+    source, raw = _parsed(scene)
+    made: dict[tuple[int, int], MendedPrimitive | RemadePrimitive] = {}
+    fixed, left = list(first.fixed), []
+    for number, mesh, shown in _shown_meshes(raw):
+        report(progress, "repair", number / len(raw.meshes), mesh.name)
+        name, node = shown[0].name, shown[0].node
+        index = source.json["nodes"][node]["mesh"]
+        primitives = source.json["meshes"][index]["primitives"]
+        textured = any(reads_texture(source.json, primitives[arrays.index]) for arrays in mesh.primitives)
+        repair = repair_mesh(_parts(source, index, mesh), textured, shown[0])
+        made |= {(index, primitive): new for primitive, new in repair.made.items()}
+        fixed += [Fix(name, node, change) for change in repair.changes]
+        left += [LeftAlone(name, node, reason) for reason in repair.left]
+    report(progress, "repair", 1.0)
+    return Mended(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
+
+
+def _parsed(scene: Scene) -> tuple[SourceDocument, RawScene]:
+    assert scene.source is not None
+    assert scene.raw is not None
+    return scene.source, scene.raw
+
+
+def _shown_meshes(raw: RawScene) -> Iterator[tuple[int, RawMesh, list[RawInstance]]]:
+    """List the meshes that have triangles, with their number and the nodes that show them."""
+    for number, mesh in enumerate(raw.meshes):
+        if mesh.primitives:
+            yield number, mesh, [instance for instance in raw.instances if instance.mesh == number]
 
 
 def _names_files(source: SourceDocument) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,34 @@ def test_the_input_and_other_files_are_safe(room, tmp_path, capsys):
     assert room.read_bytes() == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["room.glb", "there.glb"]
     assert check(room, "--fix", "-o", tmp_path / "there.glb", "--force", "-q")[0] == 0
+
+
+def test_repair_tells_how_far_the_surface_moved(tmp_path):
+    b = GltfBuilder()
+    angle = np.arange(301) * np.pi / 300
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    position = np.concatenate([arc, arc + np.array([0, 0, 1])]).astype(np.float32)
+    k = np.arange(300)
+    halves = [np.stack(t, axis=1) for t in ((k, k + 1, k + 302), (k, k + 302, k + 301))]
+    uv = position[:, :2].copy()
+    b.node(
+        name="scan",
+        mesh=b.mesh(b.primitive(position, np.concatenate(halves).astype(np.uint16), TEXCOORD_0=uv)),
+    )
+    scene = write(tmp_path / "scan.glb", b)
+    code, text = check(scene, "--repair", "-o", tmp_path / "fixed.glb")
+    assert code == 0
+    line = next(line for line in text.splitlines() if "mended: remeshed" in line)
+    assert "'scan' (node 0) faces: 600 -> " in line
+    assert "the surface moved by up to 0.00" in line
+    assert line.endswith("TEXCOORD_0 could not be kept")
+
+
+def test_repair_without_its_library_is_one_sentence(room, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    assert check(room, "--repair", "-o", tmp_path / "fixed.glb")[0] == 4
+    assert "pip install 'baker[repair]'" in capsys.readouterr().err
+    assert not (tmp_path / "fixed.glb").exists()
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
