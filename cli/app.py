@@ -20,6 +20,7 @@ COMMANDS = {
     "batch": "Bake many scenes, and only what changed.",
     "verify": "Say how wrong a bake is, against path tracing.",
     "render": "Path-trace a scene through a camera.",
+    "view": "Show a bake in a local web page.",
     "inspect": "Tell what is in a scene, a bake or an EXR.",
 }
 

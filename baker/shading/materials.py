@@ -76,7 +76,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]
     reflection_texture = np.array([number(texture, linear=True) for texture in glossy], np.int32)
     pack = pack_textures(images)
-    base_uv = _corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
+    base_uv = corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
         pack=pack,
         base=np.array([m.base_colour[:3] for m in scene.materials], np.float32).reshape(-1, 3),
@@ -84,19 +84,19 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
         base_texture=base_texture,
         emission_texture=emission_texture,
         base_uv=base_uv,
-        emission_uv=_corner_uv(scene, geometry, [m.emission_texture for m in scene.materials]),
-        colour=_vertex_colour(scene, geometry),
+        emission_uv=corner_uv(scene, geometry, [m.emission_texture for m in scene.materials]),
+        colour=np.ascontiguousarray(vertex_colour(scene, geometry)[:, :3]),
         triangle=geometry.triangle,
         material=geometry.material,
         alpha=build_alpha(scene, geometry, pack, base_texture, base_uv),
         metallic=np.array([m.metallic for m in scene.materials], np.float32),
         roughness=np.array([m.roughness for m in scene.materials], np.float32),
         reflection_texture=reflection_texture,
-        reflection_uv=_corner_uv(scene, geometry, glossy),
+        reflection_uv=corner_uv(scene, geometry, glossy),
     )
 
 
-def _corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) -> NDArray[np.float32]:
+def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) -> NDArray[np.float32]:
     """Return (V, 2) float32: image uv of each lightmap vertex; (0, 0) rows where nothing is textured."""
     if all(texture is None for texture in textures):
         return np.zeros((1, 2), np.float32)
@@ -118,15 +118,15 @@ def _corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None])
     return uv
 
 
-def _vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
-    """Return (V, 3) float32 linear vertex colours, or (1, 3) ones if no mesh has any."""
+def vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
+    """Return (V, 4) float32 linear vertex colours with alpha, or (1, 4) ones if no mesh has any."""
     if all(scene.meshes[i.mesh].colour is None for i in scene.instances):
-        return np.ones((1, 3), np.float32)
-    colour = np.ones((len(geometry.position), 3), np.float32)
+        return np.ones((1, 4), np.float32)
+    colour = np.ones((len(geometry.position), 4), np.float32)
     bound = np.searchsorted(geometry.instance, np.arange(len(scene.instances) + 1))
     for index, instance in enumerate(scene.instances):
         source = scene.meshes[instance.mesh].colour
         if source is not None:
             vertex = np.unique(geometry.triangle[bound[index] : bound[index + 1]])
-            colour[vertex] = source[geometry.vertex_source[vertex], :3]
+            colour[vertex] = source[geometry.vertex_source[vertex]]
     return colour

@@ -1,0 +1,95 @@
+"""Finds three.js on this machine: the page must work without a network.
+
+The package `jupyter-threejs-sage` carries the library as one file, so pip brings it along. A copy that npm
+installed works as well; both kinds of file are known, a script that sets `THREE` and an ES module.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from baker.core.errors import InputError, ResourceError
+
+# Where a folder may hold the library, the best first: npm's package, a folder with node_modules, bare files.
+_PLACES = (
+    "build/three.module.min.js",
+    "build/three.module.js",
+    "node_modules/three/build/three.module.min.js",
+    "node_modules/three/build/three.module.js",
+    "three.module.min.js",
+    "three.module.js",
+    "build/three.min.js",
+    "three.min.js",
+)
+_HELP = "`pip install jupyter-threejs-sage`, or `npm install three` and name its folder with --three"
+
+
+@dataclass(frozen=True)
+class ThreeScript:
+    """A copy of three.js.
+
+    Attributes
+    ----------
+    path : Path
+        The file that the page loads.
+    module : bool
+        True for an ES module, False for a script that sets the global `THREE`.
+    """
+
+    path: Path
+    module: bool
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Return the files the page may ask for, by name: a module imports its neighbours."""
+        if not self.module:
+            return {self.path.name: self.path}
+        return {path.name: path for path in sorted(self.path.parent.glob("*.js"))}
+
+
+def find_three(place: Path | None) -> ThreeScript:
+    """Return the copy of three.js in `place`, or the installed one.
+
+    Parameters
+    ----------
+    place : Path or None
+        A file, or a folder with npm's package in it; None for the installed package.
+
+    Returns
+    -------
+    ThreeScript
+
+    Raises
+    ------
+    InputError
+        If there is no three.js in `place`.
+    ResourceError
+        If none is installed.
+    """
+    if place is not None:
+        return _named(place)
+    package = find_spec("jupyter_threejs_sage")
+    for folder in (package.submodule_search_locations or ()) if package is not None else ():
+        # One folder a release of the library, r122, r130 ...: the newest of them.
+        found = sorted(
+            Path(folder).glob("static/r*/three.min.js"), key=lambda path: int(path.parent.name[1:])
+        )
+        if found:
+            return ThreeScript(found[-1], module=False)
+    raise ResourceError(f"three.js is not installed, which the page is drawn with; {_HELP}")
+
+
+def _named(place: Path) -> ThreeScript:
+    tried = [place] if place.is_file() else [place / name for name in _PLACES]
+    for path in tried:
+        if path.is_file() and path.suffix in (".js", ".mjs"):
+            return ThreeScript(path.resolve(), module=path.suffix == ".mjs" or ".module." in path.name)
+    message = "there is no three.js here; name its file (three.module.min.js) or the folder where npm put it"
+    raise InputError(message, file=str(place))
+
+
+def _release(path: Path) -> int:
+    number = path.parent.name.removeprefix("r")
+    return int(number) if number.isdecimal() else 0

@@ -1,0 +1,172 @@
+"""Hands the page and the bake to a browser on this machine.
+
+Every address is made before the first request and looked up in a table, so nothing else of the disk can be
+reached, whatever a request spells. Only requests that name this machine are answered: a foreign site cannot
+read the bake through a name of its own that points here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+
+from baker.core.errors import ResourceError
+from baker.io.bake_folder import StoredBake
+from baker.io.output_folder import own_files
+from baker.viewer.page_data import page_numbers
+from baker.viewer.scene_data import scene_data
+from baker.viewer.script import ThreeScript
+
+HOST = "127.0.0.1"
+STATIC = Path(__file__).resolve().parent / "static"
+_MIME = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".glb": "model/gltf-binary",
+}
+_BYTES = "application/octet-stream"
+# The page is all its own: no script, style or request from elsewhere.
+_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'"
+
+# What an address answers: the type of its content, and the bytes, made when they are asked for.
+Answer = tuple[str, Callable[[], bytes]]
+
+
+class ViewServer(ThreadingHTTPServer):
+    """Answers from a table of addresses."""
+
+    daemon_threads = True
+
+    def __init__(self, port: int, answers: dict[str, Answer]) -> None:
+        super().__init__((HOST, port), _Handler)
+        self.answers = answers
+
+    @property
+    def url(self) -> str:
+        """Return the address of the page."""
+        return f"http://{HOST}:{self.server_port}/"
+
+    @property
+    def names(self) -> set[str]:
+        """Return what a request may call this machine."""
+        return {f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"}
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Keep quiet about browsers that went away."""
+
+
+def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewServer:
+    """Return a server for a bake, bound to its port and not yet answering.
+
+    Parameters
+    ----------
+    bake : StoredBake
+    three : ThreeScript
+    port : int
+        0 for any free one.
+
+    Raises
+    ------
+    ResourceError
+        If the port is taken.
+    """
+    answers = _answers(bake, three)
+    try:
+        return ViewServer(port, answers)
+    except OSError as error:
+        if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+            raise
+        message = f"port {port} is taken or not ours to use; name another with --port, or leave it out"
+        raise ResourceError(message) from None
+
+
+def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
+    data = scene_data(bake)
+    header = {**data.header, "three": {"file": f"three/{three.path.name}", "module": three.module}}
+    text = json.dumps(header, allow_nan=False).encode()
+    answers: dict[str, Answer] = {
+        "/": _file(STATIC / "index.html"),
+        "/scene.json": (_MIME[".json"], lambda: text),
+        "/geometry": (_BYTES, lambda: data.geometry),
+    }
+    for path in STATIC.iterdir():
+        answers[f"/static/{path.name}"] = _file(path)
+    for name, path in three.files.items():
+        answers[f"/three/{name}"] = _file(path)
+    for number, image in enumerate(data.images):
+        answers[f"/image/{number}"] = (_BYTES, lambda image=image: np.ascontiguousarray(image).tobytes())
+    for page in range(bake.atlas.n_pages):
+        answers[f"/status/{page}"] = (_BYTES, lambda page=page: bake.status[page].tobytes())
+        for name, value in bake.maps.items():
+            if page < len(value):
+                answers[f"/page/{name}/{page}"] = (
+                    _BYTES,
+                    lambda value=value, page=page: page_numbers(value[page]).tobytes(),
+                )
+    folder = bake.folder.resolve()
+    for name in own_files(folder) or ():
+        # A manifest is only text: a file that it names may lie anywhere.
+        path = (folder / name).resolve()
+        if path.is_relative_to(folder) and path.is_file():
+            answers[f"/out/{name}"] = _file(path)
+    return answers
+
+
+def _file(path: Path) -> Answer:
+    return _MIME.get(path.suffix.lower(), _BYTES), path.read_bytes
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    server: ViewServer
+
+    def do_GET(self) -> None:
+        self._answer(body=True)
+
+    def do_HEAD(self) -> None:
+        self._answer(body=False)
+
+    def _answer(self, *, body: bool) -> None:
+        if self.headers.get("Host", "") not in self.server.names:
+            self._send(HTTPStatus.FORBIDDEN, "text/plain", b"127.0.0.1 only\n", body=body)
+            return
+        found = self.server.answers.get(unquote(urlsplit(self.path).path))
+        if found is None:
+            self._send(HTTPStatus.NOT_FOUND, "text/plain", b"there is nothing here\n", body=body)
+            return
+        kind, make = found
+        try:
+            content = make()
+        except OSError:
+            self._send(HTTPStatus.GONE, "text/plain", b"the file is not there any more\n", body=body)
+            return
+        self._send(HTTPStatus.OK, kind, content, body=body)
+
+    def _send(self, status: HTTPStatus, kind: str, content: bytes, *, body: bool) -> None:
+        with contextlib.suppress(ConnectionError):
+            self.send_response(status)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Cache-Control", "no-store")
+            self.send_header("Content-Security-Policy", _POLICY)
+            self.send_header("X-Content-Type-Options", "nosniff")
+            self.end_headers()
+            if body:
+                self.wfile.write(content)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: the terminal shows the address and stays as it is."""

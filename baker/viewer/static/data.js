@@ -1,0 +1,58 @@
+// What the server hands out, decoded: the scene, its arrays, and pages of numbers.
+
+const TYPES = { float: Float32Array, uint: Uint32Array };
+
+/** Fetches the description of the bake and its arrays; rows of array `name` are `width` numbers long. */
+export async function loadScene() {
+  const scene = await (await ask("scene.json")).json();
+  const bytes = await (await ask("geometry")).arrayBuffer();
+  scene.arrays = {};
+  for (const [name, { offset, rows, width, type }] of Object.entries(scene.sections)) {
+    scene.arrays[name] = new TYPES[type](bytes, offset, rows * width);
+  }
+  return scene;
+}
+
+/** Fetches a lightmap page: {numbers, width (numbers a texel), half}. Halves stay halves. */
+export async function loadPage(scene, channel, page) {
+  const bytes = await (await ask(`page/${encodeURIComponent(channel.name)}/${page}`)).arrayBuffer();
+  const width = channel.width === 1 ? 1 : 4;
+  const half = bytes.byteLength === 2 * width * scene.resolution ** 2;
+  return { numbers: half ? new Uint16Array(bytes) : new Float32Array(bytes), width, half };
+}
+
+/** Fetches what the texels of a page are, one byte each. */
+export async function loadStatus(page) {
+  return new Uint8Array(await (await ask(`status/${page}`)).arrayBuffer());
+}
+
+/** Fetches a texture: {numbers, width, height, srgb}. */
+export async function loadImage(scene, number) {
+  const bytes = await (await ask(`image/${number}`)).arrayBuffer();
+  const image = scene.images[number];
+  return { ...image, numbers: image.srgb ? new Uint8Array(bytes) : new Float32Array(bytes) };
+}
+
+/** Returns the numbers of one texel, exactly as they are stored. */
+export function texelValue(loaded, channel, resolution, row, column) {
+  const first = (row * resolution + column) * loaded.width;
+  const stored = loaded.numbers.subarray(first, first + channel.width);
+  return Array.from(stored, (number) => (loaded.half ? fromHalf(number) : number));
+}
+
+/** Returns the number that 16 bits of IEEE 754 mean. */
+export function fromHalf(bits) {
+  const sign = bits & 0x8000 ? -1 : 1;
+  const exponent = (bits >> 10) & 31;
+  const fraction = bits & 1023;
+  if (exponent === 31) return fraction ? NaN : sign * Infinity;
+  if (exponent === 0) return sign * fraction * 2 ** -24;
+  return sign * (1024 + fraction) * 2 ** (exponent - 25);
+}
+
+async function ask(address) {
+  const answer = await fetch(address).catch(() => null);
+  if (!answer) throw new Error("baker view is not running any more; start it again and reload this page");
+  if (!answer.ok) throw new Error(`the server has no ${address} (${answer.status})`);
+  return answer;
+}
