@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
+import struct
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -96,3 +98,62 @@ def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, st
     lines = [f"# {title}", "", *steps, ""]
     lines += [f"- Scale: {scale}", f"- UV set: {uv}", f"- Row order: {rows}"]
     write_text(target / "README.md", "\n".join(lines) + "\n")
+
+
+def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
+    """Write scene.glb with a name of its own for every node, for engines that know nodes by name only.
+
+    The name of node i is the old one, with what engines take out or read as a hint replaced, and `_n<i>` at
+    its end. Its mesh has the same name, and `extras.baker_node` says i.
+
+    Returns
+    -------
+    dict
+        The description of the bake with the new names.
+    """
+    description = describe(read_manifest(bake))
+    document, binary = _read_glb(bake / SCENE_NAME)
+    nodes = document.get("nodes", [])
+    for index, node in enumerate(nodes):
+        node["name"] = unique_name(str(node.get("name", "node")), index)
+        extras = node.setdefault("extras", {})
+        if isinstance(extras, dict):
+            extras["baker_node"] = index
+    for entry in description["objects"]:
+        node = nodes[entry["node"]]
+        entry["name"] = node["name"]
+        if "mesh" in node:
+            document["meshes"][node["mesh"]]["name"] = node["name"]
+    (target / SCENE_NAME).write_bytes(_glb(document, binary))
+    return description
+
+
+def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
+    """Put pages, description and the scene with names of its own into `target`; return the description."""
+    description = place_named_scene(bake, target)
+    for page in description["pages"]:
+        place(bake / page["file"], target / page["file"])
+    write_json(target / DESCRIPTION_NAME, description)
+    return description
+
+
+def unique_name(name: str, node: int) -> str:
+    """Return a name that engines leave as it is and that no other node has."""
+    safe = re.sub(r"[^0-9A-Za-z_]+", "_", name).strip("_") or "node"
+    # Blender cuts names at 63 bytes.
+    return f"{safe[:48]}_n{node}"
+
+
+def _read_glb(path: Path) -> tuple[dict[str, Any], bytes]:
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    document: dict[str, Any] = json.loads(data[20 : 20 + length])
+    return document, data[20 + length :]
+
+
+def _glb(document: dict[str, Any], binary: bytes) -> bytes:
+    """Return a GLB of a document and its binary chunk with the chunk's head."""
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text) + len(binary), len(text), 0x4E4F534A)
+    return head + text + binary

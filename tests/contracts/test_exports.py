@@ -1,0 +1,269 @@
+"""What every export promises, and the formulas of the engines that no test can run."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import math
+import re
+import struct
+
+import numpy as np
+import pytest
+from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.errors import SettingsError
+from baker.core.export import EXPORTS, check_exports
+from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.settings import make_settings
+from baker.encodings.exr import decode_exr
+from baker.export.common import template, unique_name
+from baker.export.unity import scale_offset
+from baker.io.load import load_scene
+from baker.io.output import write_bake
+
+NAMES = EXPORTS.names()
+# Names that one or the other engine changes or reads as a hint, one of them twice.
+NODES = ["a.b c", "a.b c", "wall-col", "Ünï/cødé: %@", "x" * 80, ""]
+SIZE = 16
+
+
+def strip(number):
+    return np.float32((QUAD[:, :2] + [number // 2, 0.0]) * [0.25, 1.0])
+
+
+def result(folder, **settings):
+    """Return a bake of six squares on two pages with made-up light."""
+    folder.mkdir(exist_ok=True)
+    builder = GltfBuilder()
+    for number, name in enumerate(NODES):
+        material = {"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.5, 0.25, 1.0]}}
+        uv = np.float32(QUAD[:, :2])
+        primitive = builder.primitive(
+            QUAD,
+            QUAD_TRIANGLE,
+            NORMAL=QUAD_NORMAL,
+            TEXCOORD_0=uv,
+            material=builder.add("materials", material),
+        )
+        mesh = builder.mesh(primitive, name=name)
+        named = {"name": name} if name else {}
+        builder.node(mesh=mesh, translation=[2.0 * number, 0.0, 0.0], **named)
+    scene = load_scene(write(folder / "level.glb", builder))
+    row = np.arange(4, dtype=np.int32)
+    # Three squares a page, each in a strip of four columns; the last strip is empty.
+    layouts = tuple(
+        InstanceLayout(i, i % 2, row, strip(i), np.int32(QUAD_TRIANGLE), np.full(2, i, np.int32), False, 16.0)
+        for i in range(len(NODES))
+    )
+    rng = np.random.default_rng(1)
+    maps = {
+        "irradiance": Lightmap("irradiance", "lx", rng.random((2, SIZE, SIZE, 3), np.float32) * 40),
+        "ao": Lightmap("ao", "1", rng.random((2, SIZE, SIZE, 1), np.float32)),
+    }
+    return BakeResult(
+        scene=scene,
+        atlas=Atlas(SIZE, 2, layouts, len(NODES), 0),
+        settings=make_settings({"resolution": SIZE, **settings}),
+        lightmaps=maps,
+        status=np.ones((2, SIZE, SIZE), np.uint8),
+        texel_count=np.full(len(NODES), SIZE * SIZE),
+    )
+
+
+@pytest.fixture(scope="module")
+def bake(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bake")
+    manifest = write_bake(result(folder / "in", export=NAMES), folder / "out")
+    return folder / "out", manifest
+
+
+def document(path):
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    assert struct.unpack_from("<I", data, 8) == (len(data),)
+    return json.loads(data[20 : 20 + length])
+
+
+def test_the_exports_of_the_contract_are_there():
+    assert {"gltf", "unity", "unreal", "godot", "three", "bevy", "babylon", "blender", "unlit"} <= set(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_readme_of_ten_lines_says_scale_uv_and_rows(bake, name):
+    text = (bake[0] / name / "README.md").read_text("utf-8")
+    assert 6 <= len(text.splitlines()) <= 12
+    for key in ("- Scale: ", "- UV set: ", "- Row order: "):
+        assert text.count(key) == 1
+    assert "TEXCOORD_" in text
+    assert "v = 0 is the" in text or name == "blender"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_file_is_in_the_manifest(bake, name):
+    out, manifest = bake
+    listed = {e["file"]: e["sha256"] for e in manifest["files"] if e["file"].startswith(f"{name}/")}
+    found = {p.relative_to(out).as_posix(): p for p in (out / name).rglob("*") if p.is_file()}
+    assert set(listed) == set(found)
+    for file, path in found.items():
+        assert hashlib.sha256(path.read_bytes()).hexdigest() == listed[file]
+    assert json.loads((out / "bake.json").read_text("utf-8"))["files"] == manifest["files"]
+
+
+def test_the_same_bake_gives_the_same_bytes(bake, tmp_path):
+    write_bake(result(tmp_path / "in", export=NAMES), tmp_path / "again")
+    for name in NAMES:
+        for path in sorted(p for p in (bake[0] / name).rglob("*") if p.is_file()):
+            again = tmp_path / "again" / path.relative_to(bake[0])
+            assert path.read_bytes() == again.read_bytes(), path.name
+
+
+def test_a_bake_without_exports_takes_the_old_ones_away(tmp_path):
+    write_bake(result(tmp_path / "in", export=["three"]), tmp_path / "out")
+    assert (tmp_path / "out" / "three").is_dir()
+    write_bake(result(tmp_path / "in"), tmp_path / "out")
+    assert not (tmp_path / "out" / "three").exists()
+
+
+def test_what_cannot_be_exported_is_refused():
+    check_exports(("gltf",), ("ao",))
+    with pytest.raises(SettingsError, match="known are babylon, bevy"):
+        check_exports(("cryengine",), ("irradiance",))
+    with pytest.raises(SettingsError, match="needs the channel irradiance; add it to --channels"):
+        check_exports(("three",), ("ao",))
+
+
+@pytest.mark.parametrize("name", ["three", "babylon"])
+def test_web_exports_keep_scene_and_pages(bake, name):
+    out, _ = bake
+    for file in ("scene.glb", "irradiance_0.exr", "irradiance_1.exr"):
+        assert (out / name / file).read_bytes() == (out / file).read_bytes()
+    found = json.loads((out / name / "lightmap.json").read_text("utf-8"))
+    assert [(o["node"], o["page"]) for o in found["objects"]] == [(i, i % 2) for i in range(len(NODES))]
+
+
+@pytest.mark.parametrize("name", ["blender", "godot", "unity", "unreal", "bevy"])
+def test_engines_that_go_by_names_get_a_name_for_each_node(bake, name):
+    out, _ = bake
+    new, old = document(out / name / "scene.glb"), document(out / "scene.glb")
+    names = [node["name"] for node in new["nodes"]]
+    assert len(set(names)) == len(names)
+    for index, node in enumerate(new["nodes"]):
+        # Letters, digits, underscores: nothing to strip, no hint like -col, and no longer than 63 bytes.
+        assert re.fullmatch(r"\w{1,63}", node["name"], re.ASCII)
+        assert node["name"].endswith(f"_n{index}")
+        assert node["extras"]["baker_node"] == index
+        assert new["meshes"][node["mesh"]]["name"] == node["name"]
+    found = json.loads((out / name / "lightmap.json").read_text("utf-8"))["objects"]
+    assert [entry["name"] for entry in found] == names
+    for key in ("accessors", "bufferViews", "materials"):
+        assert new[key] == old[key]
+
+
+def test_a_name_in_an_engine():
+    assert unique_name("a.b c", 3) == "a_b_c_n3"
+    assert unique_name("", 0) == "node_n0"
+    assert unique_name("...", 1) == "node_n1"
+
+
+def test_unity_pages_hold_what_a_white_surface_sends_out(bake):
+    """Unity shows albedo x page, without 1 / pi, so a page must be E / pi."""
+    for page in range(2):
+        light = decode_exr(bake[0] / f"irradiance_{page}.exr").pixels
+        image = decode_exr(bake[0] / "unity" / f"irradiance_{page}.exr")
+        assert image.pixels == pytest.approx(light / math.pi, rel=2**-10)
+        assert image.header["unit"] == "cd/m2"
+        assert image.dtype == "half"
+
+
+def test_unity_scale_and_offset_are_for_v_upwards():
+    """A texel looked up Unity's way, with v' = 1 - v in mesh and image, is the texel looked up glTF's way."""
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        scale, offset, uv = rng.random(2), rng.random(2), rng.random(2)
+        su, sv, ou, ov = scale_offset(scale.tolist(), offset.tolist())
+        u, v = uv[0] * su + ou, (1.0 - uv[1]) * sv + ov
+        assert [u, 1.0 - v] == pytest.approx((uv * scale + offset).tolist())
+    assert scale_offset([1.0, 1.0], [0.0, 0.0]) == [1.0, 1.0, 0.0, 0.0]
+
+
+def test_unity_json_has_the_fields_of_the_script(bake):
+    found = json.loads((bake[0] / "unity" / "lightmap.json").read_text("utf-8"))
+    source = template("unity", "BakerLightmapImporter.cs")
+    for kind, entry in (("Page", found["pages"][0]), ("BakedObject", found["objects"][0])):
+        body = re.search(rf"class {kind}\n    {{(.*?)\n    }}", source, re.DOTALL).group(1)
+        assert set(re.findall(r"public \S+ (\w+);", body)) == set(entry)
+
+
+@pytest.mark.parametrize("name", ["unreal", "blender"])
+def test_python_scripts_compile(name):
+    source = template(name, "import_lightmaps.py")
+    tree = ast.parse(source)
+    assert "math.pi" in source
+    assert ast.get_docstring(tree)
+
+
+def test_unreal_reads_uv_1_and_divides_by_pi():
+    source = template("unreal", "import_lightmaps.py")
+    assert "coordinate_index=1" in source
+    assert "const_b=1.0 / math.pi" in source
+    assert 'set_editor_property("srgb", False)' in source
+    assert "TC_HDR" in source
+
+
+def test_bevy_rectangles_are_offset_and_offset_plus_scale(bake):
+    source = (bake[0] / "bevy" / "baker_lightmaps.rs").read_text("utf-8")
+    rows = re.findall(r'Baked \{ name: "(\w+)", page: (\d), min: \[(.*?)\], max: \[(.*?)\] \}', source)
+    assert [(name, int(page)) for name, page, _, _ in rows] == [
+        (unique_name(name or "node", i) if name else f"node_n{i}", i % 2) for i, name in enumerate(NODES)
+    ]
+    assert {(low, high) for _, _, low, high in rows} == {("0.0, 0.0", "1.0, 1.0")}
+    assert source.count('    "irradiance_') == 2
+    assert "FRAC_1_PI" in source
+    assert "/*" not in source
+
+
+def test_godot_shaders_read_uv2_and_divide_by_pi():
+    for name, pi in (("lightmap.gdshader", "PI"), ("godot3/lightmap.shader", "3.14159265359")):
+        source = template("godot", name)
+        assert "texture(page, UV2 * uv_scale + uv_offset).rgb" in source
+        assert f"base * irradiance / {pi} + glow" in source
+        # No hint that would decode sRGB on the page.
+        assert not re.search(r"sampler2D page\s*:.*(source_color|hint_albedo)", source)
+
+
+def test_unlit_holds_light_times_albedo(bake, tmp_path):
+    """Every texel is sRGB of albedo x E / pi x exposure, on TEXCOORD_0, and nothing else is left."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    out, _ = bake
+    path = out / "unlit" / "scene.glb"
+    data, glb = path.read_bytes(), document(path)
+    (length,) = struct.unpack_from("<I", data, 12)
+    exposure = json.loads((out / "unlit" / "lightmap.json").read_text("utf-8"))["exposure"]
+    assert glb["asset"]["extras"]["baker"]["exposure"] == exposure
+    assert glb["extensionsUsed"] == ["KHR_materials_unlit"]
+    for primitive in (p for mesh in glb["meshes"] for p in mesh["primitives"]):
+        assert "TEXCOORD_0" in primitive["attributes"]
+        assert "TEXCOORD_1" not in primitive["attributes"]
+        assert "KHR_materials_unlit" in glb["materials"][primitive["material"]]["extensions"]
+    pages = [glb["meshes"][node["mesh"]]["primitives"][0]["material"] for node in glb["nodes"]]
+    textures = [m["pbrMetallicRoughness"]["baseColorTexture"]["index"] for m in glb["materials"]]
+    assert [textures[material] for material in pages] == [i % 2 for i in range(len(NODES))]
+    clipped = 0
+    for page in range(2):
+        view = glb["bufferViews"][glb["images"][page]["bufferView"]]
+        start = 28 + length + view["byteOffset"]
+        stored = np.asarray(Image.open(BytesIO(data[start : start + view["byteLength"]]))) / 255.0
+        assert stored.shape == (SIZE, SIZE, 3)
+        stored = stored[:, :12]
+        light = decode_exr(out / f"irradiance_{page}.exr").pixels[:, :12].astype(np.float64)
+        linear = np.array([0.8, 0.5, 0.25]) * light / math.pi * exposure
+        curve = np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
+        assert np.abs(stored - np.minimum(curve, 1.0)).max() <= 0.5 / 255 + 1e-6
+        clipped += int((linear.max(axis=2) > 1.0).sum())
+    assert clipped <= 0.01 * 2 * SIZE * 12 + 1
