@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -15,10 +16,12 @@ from baker.cli.options import build, common_flags, flag, given, setting_flags
 if TYPE_CHECKING:
     from baker.cli.session import Session
 
+    from baker.checking import CheckReport, CheckSettings
+
 
 def command() -> Any:
     """Return the subcommand."""
-    scenes = Annotated[list[Path], typer.Argument(metavar="SCENE...", help="Scene files.")]
+    scenes = Annotated[list[Path], typer.Argument(metavar="SCENE...", help="Scene files, folders, patterns.")]
     keyword = inspect.Parameter.KEYWORD_ONLY
     flags = [
         inspect.Parameter("ctx", keyword, annotation=typer.Context),
@@ -34,6 +37,26 @@ def command() -> Any:
             typer.Option("--ignore", metavar="CODE[@OBJECT]", help="Findings that do not count; repeatable."),
         ),
         flag("config", Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")),
+        flag(
+            "sarif",
+            Path | None,
+            typer.Option("--sarif", metavar="FILE", help="Write SARIF 2.1.0."),
+        ),
+        flag(
+            "junit",
+            Path | None,
+            typer.Option("--junit", metavar="FILE", help="Write JUnit XML."),
+        ),
+        flag(
+            "mip",
+            int | None,
+            typer.Option("--mip", metavar="N", help="Mip level at which charts must not mix (default 2)."),
+        ),
+        flag(
+            "rates",
+            Path | None,
+            typer.Option("--rates", metavar="OUT", help="Reckon time with the speed of this earlier bake."),
+        ),
         *mend_flags(),
         *setting_flags(),
         *common_flags(),
@@ -48,6 +71,10 @@ def work(
     fail_on: str | None,
     ignore: list[str] | None,
     config: Path | None,
+    sarif: Path | None,
+    junit: Path | None,
+    mip: int | None,
+    rates: Path | None,
     fix: bool,
     repair: bool,
     out: Path | None,
@@ -67,16 +94,17 @@ def work(
     mended = None
     with session.reporter(quiet=quiet) as progress:
         progress("start", 0.0)
-        from baker.checking import CheckSettings, check_scene, report_json
-        from baker.checking.report import write_text
+        from baker.checking.report import report_json, write_text
+        from baker.checking.scenes import check_scenes, find_scenes
 
-        wanted = CheckSettings(fail_on=fail_on or "error", ignore=tuple(ignore or ()))
+        wanted = check_settings(config, fail_on=fail_on, ignore=ignore, mip=mip, rates=rates)
         if request is not None:
             session.will_write(str(request.out))
             mended = mend(request, resolved, progress)
             # What is left is judged as it was written: in metres, +Y up.
             scenes, resolved = [request.out], resolved.model_copy(update={"up": "y", "scale": 1.0})
-        reports = [check_scene(scene, wanted, resolved, progress) for scene in scenes]
+        reports, unreadable = check_scenes(find_scenes(scenes), wanted, resolved, progress)
+        _write_files(reports, sarif=sarif, junit=junit)
     if not quiet:
         if request is not None and mended is not None:
             write_mended_text(mended, request, session.text_stream(as_json=as_json))
@@ -84,6 +112,46 @@ def work(
             write_text(report, session.text_stream(as_json=as_json), verbose=verbose)
     if as_json:
         more = mended_json(mended, request) if request is not None and mended is not None else {}
-        session.write_json({**report_json(reports), **more})
+        session.write_json({**report_json(reports, unreadable), **more})
+    for each in unreadable:
+        sys.stderr.write(f"baker: {each.error}\n")
+    if unreadable:
+        raise typer.Exit(unreadable[0].error.exit_code)
     if not all(report.passed for report in reports):
         raise typer.Exit(FAILED_CHECK)
+
+
+def check_settings(config: Path | None, **command_line: Any) -> CheckSettings:
+    """Return the settings of a check: the file's table `[check]`, then the command line; `ignore` adds up.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown key or a wrong value.
+    """
+    from baker.cli.config import read_check_config
+
+    from baker.checking.settings import make_check_settings
+
+    table = {} if config is None else read_check_config(config)
+    from_file = make_check_settings(table, where=str(config))
+    said = {key: value for key, value in command_line.items() if value is not None}
+    if "rates" in said:
+        said["rates"] = str(said["rates"])
+    said["ignore"] = [*from_file.ignore, *said.get("ignore", [])]
+    return make_check_settings({**vars(from_file), **said})
+
+
+def _write_files(reports: list[CheckReport], *, sarif: Path | None, junit: Path | None) -> None:
+    from baker.judge.junit import write_text
+
+    if sarif is not None:
+        import json
+
+        from baker.checking.sarif import sarif_log
+
+        write_text(sarif, json.dumps(sarif_log(reports, Path.cwd()), indent=1, allow_nan=False) + "\n")
+    if junit is not None:
+        from baker.checking.cases import check_junit
+
+        write_text(junit, check_junit(reports))

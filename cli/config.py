@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from baker.core.settings import BakeSettings
 
 TABLE = "bake"
+# Tables of other commands in the same file.
+CHECK_TABLE = "check"
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -19,23 +21,15 @@ def read_config(path: Path) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        TOML file; its keys stand at the top or in a table `[bake]`.
+        TOML file; its keys stand at the top or in a table `[bake]`. A table `[check]` is passed by.
 
     Raises
     ------
     SettingsError
         If the file cannot be read, is not TOML, or mixes both places.
     """
-    import tomllib
-
-    try:
-        document = tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise SettingsError(f"the configuration cannot be read: {error.strerror}", file=str(path)) from None
-    except UnicodeDecodeError:
-        raise SettingsError("the configuration is not UTF-8 text; save it as UTF-8", file=str(path)) from None
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"the configuration is not valid TOML: {error}", file=str(path)) from None
+    document = _read_toml(path)
+    document.pop(CHECK_TABLE, None)
     if TABLE not in document:
         return document
     table = document.pop(TABLE)
@@ -48,6 +42,34 @@ def read_config(path: Path) -> dict[str, Any]:
         why = f"'{stray}' stands outside [{TABLE}]; move every setting into it, or drop the table"
         raise SettingsError(why, file=str(path), object=stray)
     return table
+
+
+def read_check_config(path: Path) -> dict[str, Any]:
+    """Return the keys of the table `[check]` of a configuration file, none if it is not there.
+
+    Raises
+    ------
+    SettingsError
+        If the file cannot be read or is not TOML, or `check` is no table.
+    """
+    table = _read_toml(path).get(CHECK_TABLE, {})
+    if not isinstance(table, dict):
+        why = f"'{CHECK_TABLE}' must be a table of settings, written [{CHECK_TABLE}]"
+        raise SettingsError(why, file=str(path), object=CHECK_TABLE)
+    return table
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    import tomllib
+
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise SettingsError(f"the configuration cannot be read: {error.strerror}", file=str(path)) from None
+    except UnicodeDecodeError:
+        raise SettingsError("the configuration is not UTF-8 text; save it as UTF-8", file=str(path)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"the configuration is not valid TOML: {error}", file=str(path)) from None
 
 
 def resolve(command_line: dict[str, Any], config: Path | None) -> BakeSettings:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from baker.checking.ignore import Ignore, parse_ignore
+from baker.checking.settings import CheckSettings, with_extras
 from baker.core.errors import IndexRangeError
 from baker.core.progress import Progress, silent
 from baker.core.progress import report as tell_progress
@@ -15,26 +16,7 @@ from baker.core.settings import BakeSettings
 from baker.io.load import load_scene
 from baker.lint.finding import SEVERITIES, Finding, Found, Place
 from baker.lint.registry import CHECKS, all_checks, run_check
-from baker.lint.subject import DEFAULT_MIP, Subject
-
-
-@dataclass(frozen=True)
-class CheckSettings:
-    """How a check judges.
-
-    Attributes
-    ----------
-    fail_on : str
-        "warning" or "error": the least severity that fails the check.
-    ignore : tuple of str
-        Findings that do not count: CODE or CODE@OBJECT; both may hold `*`.
-    mip : int
-        Mip level of the lightmap down to which charts must not bleed into each other.
-    """
-
-    fail_on: str = "error"
-    ignore: tuple[str, ...] = ()
-    mip: int = DEFAULT_MIP
+from baker.lint.subject import Subject
 
 
 @dataclass(frozen=True)
@@ -86,11 +68,11 @@ def check_scene(
     InputError
         If the file cannot be read at all.
     SettingsError
-        For an unknown code among `ignore`.
+        For an unknown code among `ignore`, or wrong values in the scene's extras.
     """
     start = time.perf_counter()
     path = Path(path)
-    ignore = parse_ignore(settings.ignore)
+    parse_ignore(settings.ignore)
     timings: dict[str, float] = {}
     try:
         scene = load_scene(path, up=bake_settings.up, scale=bake_settings.scale, lenient=True)
@@ -98,11 +80,14 @@ def check_scene(
         found = [_index_range(error)]
     else:
         timings["load"] = time.perf_counter() - start
+        settings = with_extras(settings, scene)
         found = _run(scene, settings, bake_settings, progress, timings)
     found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
+    ignore = parse_ignore(settings.ignore)
     counted = tuple(finding for finding in found if not _ignored(ignore, finding))
     ignored = tuple(finding for finding in found if _ignored(ignore, finding))
-    return CheckReport(path, counted, ignored, settings.fail_on, time.perf_counter() - start, timings)
+    limit = settings.fail_on or "error"
+    return CheckReport(path, counted, ignored, limit, time.perf_counter() - start, timings)
 
 
 def _run(

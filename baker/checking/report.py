@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any, TextIO
 
 from baker.checking.check import CheckReport
+from baker.checking.scenes import Unreadable
 from baker.lint.finding import SEVERITIES, finding_json
 
 
-def report_json(reports: Sequence[CheckReport]) -> dict[str, Any]:
+def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable] = ()) -> dict[str, Any]:
     """Return the object of `--json`, for one scene or several."""
-    scenes = [
+    scenes: list[dict[str, Any]] = [
         {
             "scene": str(report.path),
             "passed": report.passed,
@@ -21,13 +22,17 @@ def report_json(reports: Sequence[CheckReport]) -> dict[str, Any]:
         }
         for report in reports
     ]
+    scenes += [
+        {"scene": str(x.path), "passed": False, "error": {"kind": x.error.kind, "message": x.error.message}}
+        for x in unreadable
+    ]
     findings = [
         {**finding_json(finding), "scene": str(report.path)}
         for report in reports
         for finding in report.findings
     ]
     return {
-        "passed": all(report.passed for report in reports),
+        "passed": not unreadable and all(report.passed for report in reports),
         "fail_on": reports[0].fail_on if reports else "error",
         "findings": findings,
         "scenes": scenes,
