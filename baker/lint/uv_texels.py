@@ -227,7 +227,11 @@ def palette(subject: Subject) -> Iterator[Found]:
         # Less than a texel of a texture of 1024, counted as if the object filled the texture.
         point = np.abs(uv.signed_area) * 1024.0**2 < 1.0
         share = float(uv.area[point].sum()) / max(float(uv.area.sum()), 1e-300)
-        colours = len(np.unique(np.round(uv.uv[point].reshape(-1, 2) * 256.0), axis=0)) if point.any() else 0
-        if share > PALETTE_SHARE and len(uv.rows) >= 2 * colours:
+        if share <= PALETTE_SHARE:
+            continue
+        # To the nearest 1/256; one number for both, which sorts ten times faster than rows.
+        step = np.clip(np.round(uv.uv[point].reshape(-1, 2) * 256.0), -(2.0**20), 2.0**20).astype(np.int64)
+        colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
+        if len(uv.rows) >= 2 * colours:
             text = f"its TEXCOORD_0 looks up {colours} colours for {100 * share:.3g}% of the surface"
             yield Found(text, subject.place(m), int(point.sum()), percent=100.0 * share)
