@@ -6,10 +6,10 @@ Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from baker import __version__
 from baker.checking.check import CheckReport
 from baker.lint.finding import Finding, finding_json
 from baker.lint.registry import Check, all_checks
@@ -31,7 +31,7 @@ def sarif_log(reports: Sequence[CheckReport], folder: Path) -> dict[str, Any]:
     index = {entry.code: k for k, entry in enumerate(checks)}
     driver = {
         "name": "baker",
-        "semanticVersion": __version__,
+        "semanticVersion": version("baker"),
         "rules": [_rule(entry) for entry in checks],
     }
     results = [
