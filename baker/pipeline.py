@@ -21,9 +21,10 @@ from baker.channels.channel import CHANNELS, Channel, Transport
 from baker.core.atlas import Atlas
 from baker.core.errors import ResourceError, SettingsError
 from baker.core.export import check_exports
+from baker.core.farm import Farm, LocalFarm
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
-from baker.core.parallel import thread_count
+from baker.core.parallel import TileRunner, thread_count
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
@@ -36,7 +37,7 @@ from baker.kernels.surface import Surface
 from baker.lights.emissive import build_emitters
 from baker.lint.in_bake import bake_warnings
 from baker.radiosity.buried import find_buried
-from baker.radiosity.direct import direct_light
+from baker.radiosity.direct import DirectLight, direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.hit_table import build_hit_table
@@ -96,6 +97,7 @@ def bake(
     out: Path | str | None = None,
     progress: Progress = silent,
     force: bool = False,
+    farm: Farm | None = None,
 ) -> BakeResult:
     """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
 
@@ -108,6 +110,8 @@ def bake(
     progress : Progress
     force : bool
         Replace an `out` that baker did not write.
+    farm : Farm, optional
+        Works on the tiles of the ray stages; None is this process.
 
     Raises
     ------
@@ -121,7 +125,7 @@ def bake(
         check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
         check_exports(settings.export, settings.channels)
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
-    record = Record(progress)
+    record, farm = Record(progress), farm or LocalFarm()
     compiling = warm.start()
     try:
         with record.stage("load"):
@@ -131,8 +135,9 @@ def bake(
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend(atlas.warnings)
+        farm.open(scene, atlas, settings)
         world = prepare(scene, atlas, settings, record)
-        transport = trace_transport(scene, world, channels, settings, record)
+        transport = trace_transport(scene, world, channels, settings, record, farm)
         world.rays.close()
         # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
         texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
@@ -163,8 +168,14 @@ def _channels(settings: BakeSettings) -> dict[str, Channel]:
     return found
 
 
-def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) -> World:
-    """Build texels, ray tree and tables, and find the buried points."""
+def prepare(
+    scene: Scene,
+    atlas: Atlas,
+    settings: BakeSettings,
+    record: Record,
+    mask: NDArray[np.uint16] | None = None,
+) -> World:
+    """Build texels, ray tree and tables, and find the buried points unless `mask` says them already."""
     threads = thread_count(settings.threads)
     with record.stage("texels"):
         geometry = world_geometry(scene, atlas)
@@ -178,104 +189,142 @@ def prepare(scene: Scene, atlas: Atlas, settings: BakeSettings, record: Record) 
         )
         emitters = build_emitters(geometry, shading)
         table = build_hit_table(geometry, texels, emitters)
-    with record.stage("buried texels"):
-        mask, cast = find_buried(
-            texels, surface, table, rays.tracer, seed=settings.seed, threads=threads, progress=record.progress
-        )
-        record.rays["buried texels"] = cast
+    if mask is None:
+        with record.stage("buried texels"):
+            mask, cast = find_buried(
+                texels,
+                surface,
+                table,
+                rays.tracer,
+                seed=settings.seed,
+                threads=threads,
+                progress=record.progress,
+            )
+            record.rays["buried texels"] = cast
     return World(geometry, shading, texels, surface, rays, emitters, table, mask, keep_points(texels.n))
 
 
 def trace_transport(
-    scene: Scene, world: World, channels: dict[str, Channel], settings: BakeSettings, record: Record
+    scene: Scene,
+    world: World,
+    channels: dict[str, Channel],
+    settings: BakeSettings,
+    record: Record,
+    farm: Farm | None = None,
 ) -> Transport:
     """Cast the rays of all stages that the channels need."""
+    farm = farm or LocalFarm()
     transport = Transport()
     n_samples = settings.hemisphere_samples
     ao_samples = settings.ao_samples or n_samples
-    distance = settings.ao_reach(world.geometry.diagonal)
     if any(channel.needs_light for channel in channels.values()):
-        transport = _light(scene, world, settings, distance, record)
+        transport = _light(scene, world, settings, record, farm)
     if any(channel.needs_open for channel in channels.values()):
         share = transport.gathered
         if share is not None and ao_samples == n_samples:
             return replace(transport, open=share.open, ao_samples=ao_samples)
         with record.stage("ambient occlusion"):
-            n_front = world.texels.n_front
-            opened = ambient_occlusion(
-                n_front,
-                world.surface,
-                world.mask,
-                world.rays.tracer,
-                n_samples=ao_samples,
-                distance=distance,
-                seed=settings.seed,
-                threads=thread_count(settings.threads),
-                progress=record.progress,
-                kept=world.kept,
-            )
-            record.rays["ambient occlusion"] = n_front * ao_samples
+            run = farm.runner("ambient occlusion", {"mask": world.mask})
+            opened = open_sky(world, settings, record.progress, run)
+            record.rays["ambient occlusion"] = world.texels.n_front * ao_samples
         transport = replace(transport, open=opened, ao_samples=ao_samples)
     return transport
 
 
-def _light(
-    scene: Scene, world: World, settings: BakeSettings, ao_distance: float, record: Record
-) -> Transport:
+def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, farm: Farm) -> Transport:
     """Direct light, radiosity and final gather."""
-    threads, seed, progress = thread_count(settings.threads), settings.seed, record.progress
-    n_samples = settings.hemisphere_samples
-    n_light = settings.light_samples or n_samples
     texels, sky = world.texels, np.array(settings.sky_radiance)
     if not scene.lights and not len(world.emitters.power) and not sky.any():
         record.warnings.append(
             SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use --sky")
         )
     with record.stage("direct light"):
-        direct = direct_light(
-            world.surface,
-            world.mask,
-            world.table,
-            scene.lights,
-            world.emitters,
-            world.shading,
-            world.rays.tracer,
-            n_light=n_light,
-            n_gather=n_samples,
-            seed=seed,
-            threads=threads,
-            progress=progress,
-            kept=world.kept,
-        )
+        run = farm.runner("direct light", {"mask": world.mask})
+        direct = light_directly(scene, world, settings, record.progress, run)
         record.rays["direct light"] = direct.rays
     exitance = np.zeros((texels.n, 4), np.float32)
     if settings.bounces != 0:
-        exitance[:, :3] = _reflected(world, direct.complete, sky, settings, record)
+        exitance[:, :3] = _reflected(world, direct.complete, sky, settings, record, farm)
     # It has done its part.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
+        run = farm.runner("final gather", {"mask": world.mask, "exitance": exitance})
         seen = texels.hit_image(exitance)
         del exitance
-        gathered: Gathered = final_gather(
-            texels.n_front,
-            world.surface,
-            world.mask,
-            world.table,
-            seen,
-            world.emitters,
-            world.shading,
-            world.rays.tracer,
-            n_samples=n_samples,
-            n_light=n_light,
-            sky=settings.sky_radiance,
-            ao_distance=ao_distance,
-            seed=seed,
-            threads=threads,
-            progress=progress,
-            kept=world.kept,
-        )
+        gathered = gather_light(world, seen, settings, record.progress, run)
         record.rays["final gather"] = gathered.rays
     return Transport(direct=direct, gathered=gathered)
+
+
+def light_directly(
+    scene: Scene, world: World, settings: BakeSettings, progress: Progress, run: TileRunner
+) -> DirectLight:
+    """Direct light of all texels, or of the tiles that `run` works on."""
+    return direct_light(
+        world.surface,
+        world.mask,
+        world.table,
+        scene.lights,
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_light=settings.light_samples or settings.hemisphere_samples,
+        n_gather=settings.hemisphere_samples,
+        seed=settings.seed,
+        threads=thread_count(settings.threads),
+        progress=progress,
+        kept=world.kept,
+        run=run,
+    )
+
+
+def gather_light(
+    world: World, seen: NDArray[np.float32], settings: BakeSettings, progress: Progress, run: TileRunner
+) -> Gathered:
+    """Final gather of all texels, or of the tiles that `run` works on; `seen` is what hits send back."""
+    return final_gather(
+        world.texels.n_front,
+        world.surface,
+        world.mask,
+        world.table,
+        seen,
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_samples=settings.hemisphere_samples,
+        n_light=settings.light_samples or settings.hemisphere_samples,
+        sky=settings.sky_radiance,
+        ao_distance=settings.ao_reach(world.geometry.diagonal),
+        seed=settings.seed,
+        threads=thread_count(settings.threads),
+        progress=progress,
+        kept=world.kept,
+        run=run,
+    )
+
+
+def open_sky(
+    world: World, settings: BakeSettings, progress: Progress, run: TileRunner
+) -> NDArray[np.float32]:
+    """Ambient occlusion of all texels, or of the tiles that `run` works on."""
+    return ambient_occlusion(
+        world.texels.n_front,
+        world.surface,
+        world.mask,
+        world.rays.tracer,
+        n_samples=settings.ao_samples or settings.hemisphere_samples,
+        distance=settings.ao_reach(world.geometry.diagonal),
+        seed=settings.seed,
+        threads=thread_count(settings.threads),
+        progress=progress,
+        kept=world.kept,
+        run=run,
+    )
+
+
+def patch_rays(settings: BakeSettings) -> int:
+    """Count the rays from each patch for its form factors."""
+    return min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS)
 
 
 def _reflected(
@@ -284,6 +333,7 @@ def _reflected(
     sky: NDArray[np.float64],
     settings: BakeSettings,
     record: Record,
+    farm: Farm,
 ) -> NDArray[np.float32]:
     """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own."""
     texels = world.texels
@@ -296,10 +346,11 @@ def _reflected(
             world.mask,
             world.table,
             world.rays.tracer,
-            n_rays=min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS),
+            n_rays=patch_rays(settings),
             seed=settings.seed,
             threads=thread_count(settings.threads),
             progress=record.progress,
+            run=farm.runner("form factors", {"mask": world.mask}),
         )
         record.rays["form factors"] = matrix.rays
     with record.stage("solve"):

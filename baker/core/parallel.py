@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
+from typing import Any, Protocol
 
 from baker.core.progress import Progress, report
 
@@ -27,11 +28,34 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
+# What a tile gives: arrays, and numbers that are summed up.
+Part = tuple[Any, ...]
+
+
+class TileRunner(Protocol):
+    """Works on all tiles of a stage: in this process (`run_tiles`), or elsewhere."""
+
+    def __call__(
+        self,
+        n: int,
+        tile: int,
+        work: Callable[[int, int], Part],
+        *,
+        keep: Callable[[int, int, Part], object],
+        threads: int,
+        stage: str,
+        progress: Progress,
+        rays_per_item: float = 0.0,
+    ) -> None:
+        """Call `keep(begin, end, work(begin, end))` for each tile; see `run_tiles`."""
+
+
 def run_tiles(
     n: int,
     tile: int,
-    work: Callable[[int, int], object],
+    work: Callable[[int, int], Any],
     *,
+    keep: Callable[[int, int, Any], object] | None = None,
     threads: int,
     stage: str,
     progress: Progress,
@@ -41,6 +65,8 @@ def run_tiles(
 
     Parameters
     ----------
+    keep : callable or None
+        Takes what a tile gave to where it belongs: `keep(begin, end, part)`. None if `work` does that itself.
     stage : str
         Name shown by `progress`.
     rays_per_item : float
@@ -58,11 +84,17 @@ def run_tiles(
     done = 0
     start = time.perf_counter()
     waiting = iter(spans)
+
+    def do(begin: int, end: int) -> None:
+        part = work(begin, end)
+        if keep is not None:
+            keep(begin, end, part)
+
     pool = ThreadPoolExecutor(max_workers=threads)
     running: dict[Future[object], int] = {}
     try:
         for begin, end in islice(waiting, 2 * threads):
-            running[pool.submit(work, begin, end)] = end - begin
+            running[pool.submit(do, begin, end)] = end - begin
         while running:
             finished, _ = wait(running, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in finished:
@@ -70,7 +102,7 @@ def run_tiles(
                 future.result()
                 span = next(waiting, None)
                 if span is not None:
-                    running[pool.submit(work, *span)] = span[1] - span[0]
+                    running[pool.submit(do, *span)] = span[1] - span[0]
             elapsed = max(time.perf_counter() - start, 1e-9)
             rate = f"{done * rays_per_item / elapsed / 1e6:.1f} Mrays/s" if rays_per_item else ""
             report(progress, stage, done / n, rate)

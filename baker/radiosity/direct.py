@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import run_tiles
+from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
 from baker.kernels.area_light import light_samples
@@ -69,6 +69,7 @@ def direct_light(
     threads: int,
     progress: Progress,
     kept: KeptPoints | None = None,
+    run: TileRunner = run_tiles,
 ) -> DirectLight:
     """Light every texel entry directly.
 
@@ -80,6 +81,8 @@ def direct_light(
         Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
     kept : KeptPoints, optional
         Where points are left for later stages with the same tiles.
+    run : TileRunner
+        Works on the tiles.
     """
     n = len(surface.pixel)
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
@@ -96,19 +99,20 @@ def direct_light(
 
     cast = np.zeros(-(-n // TILE), np.int64)
 
-    def work(begin: int, end: int) -> None:
+    def work(begin: int, end: int) -> Part:
         caster = new_caster(tracer)
         origin, normal = tile_points(surface, mask, begin, end, kept)
         lamps = lamps_for(emitters, origin)
         out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
-        near = widest_view(emitters, origin) > CLOSE
+        spread = np.zeros(end - begin, np.float32)
+        near, n_cast = widest_view(emitters, origin) > CLOSE, 0
         if lamps.chance.any():
-            cast[begin // TILE] = light_samples(
+            n_cast = light_samples(
                 origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], out, second
             )
-            variance[begin:end] = batch_variance(out[:, :3].sum(axis=1), second)
+            spread = batch_variance(out[:, :3].sum(axis=1), second)
         if near:
-            cast[begin // TILE] += N_HEMISPHERE * (end - begin)
+            n_cast += N_HEMISPHERE * (end - begin)
             found = np.zeros((end - begin, N_COLUMNS), np.float32)
             gather(
                 origin,
@@ -133,10 +137,13 @@ def direct_light(
                 if family is not None:
                     family(light, origin, normal, ray, weight)
                     add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
-        weighted[begin:end], complete[begin:end] = out[:, :3], out[:, 3:]
+        return out[:, :3], out[:, 3:], spread, n_cast
+
+    def keep(begin: int, end: int, part: Part) -> None:
+        weighted[begin:end], complete[begin:end], variance[begin:end], cast[begin // TILE] = part
 
     rays = n_light * bool(len(emitters.power)) + N_POINTS * len(families)
-    run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
+    run(n, TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
     return DirectLight(weighted, complete, variance, int(cast.sum()) + N_POINTS * len(families) * n)
 
 

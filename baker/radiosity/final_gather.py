@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import run_tiles
+from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.emitters import Emitters, lamps_for
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
@@ -61,6 +61,7 @@ def final_gather(
     threads: int,
     progress: Progress,
     kept: KeptPoints | None = None,
+    run: TileRunner = run_tiles,
 ) -> Gathered:
     """Cast `n_samples` cosine-weighted rays from every front texel.
 
@@ -72,6 +73,7 @@ def final_gather(
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
     kept : points of an earlier stage with the same tiles
+    run : works on the tiles
     """
     indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
     opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
@@ -80,18 +82,29 @@ def final_gather(
     limits = np.array([ao_distance, n_light], np.float64)
     radiance = np.array(sky, np.float32)
 
-    def work(begin: int, end: int) -> None:
+    def work(begin: int, end: int) -> Part:
         origin, normal = tile_points(surface, mask, begin, end, kept)
         lamps, caster = lamps_for(emitters, origin), new_caster(tracer)
         out = np.zeros((end - begin, N_COLUMNS), np.float32)
         gather(
             origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, radiance, limits, out
         )
-        indirect[begin:end], direct[begin:end] = out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3]
-        opened[begin:end] = out[:, OPEN]
-        variance[begin:end] = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
+        spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
+        return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread
 
-    run_tiles(n_front, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_samples)
+    def keep(begin: int, end: int, part: Part) -> None:
+        indirect[begin:end], direct[begin:end], opened[begin:end], variance[begin:end] = part
+
+    run(
+        n_front,
+        TILE,
+        work,
+        keep=keep,
+        threads=threads,
+        stage=STAGE,
+        progress=progress,
+        rays_per_item=n_samples,
+    )
     return Gathered(indirect, direct, opened, variance, n_front * n_samples)
 
 
@@ -107,6 +120,7 @@ def ambient_occlusion(
     threads: int,
     progress: Progress,
     kept: KeptPoints | None = None,
+    run: TileRunner = run_tiles,
 ) -> NDArray[np.float32]:
     """Return the open share (n_front,) float32 of the hemisphere within `distance` metres."""
     out = np.zeros(n_front, np.float32)
@@ -114,11 +128,22 @@ def ambient_occlusion(
     shared = shared_bits_mask(n_samples)
     reach = np.float32(min(distance, 1.0e30))
 
-    def work(begin: int, end: int) -> None:
+    def work(begin: int, end: int) -> Part:
         points = tile_points(surface, mask, begin, end, kept)
         open_share(*points, new_caster(tracer), begin, net, shared, reach, out)
+        return (out[begin:end],)
 
-    run_tiles(
-        n_front, TILE, work, threads=threads, stage=AO_STAGE, progress=progress, rays_per_item=n_samples
+    def keep(begin: int, end: int, part: Part) -> None:
+        out[begin:end] = part[0]
+
+    run(
+        n_front,
+        TILE,
+        work,
+        keep=keep,
+        threads=threads,
+        stage=AO_STAGE,
+        progress=progress,
+        rays_per_item=n_samples,
     )
     return out

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import run_tiles
+from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.form_factor import (
     cast_form_factors,
@@ -84,6 +84,7 @@ def build_form_factors(
     seed: int,
     threads: int,
     progress: Progress,
+    run: TileRunner = run_tiles,
 ) -> FormFactorMatrix:
     """Cast `n_rays` from every patch and build the matrix.
 
@@ -91,12 +92,63 @@ def build_form_factors(
     ----------
     hit_patch : (sides * P * H * W,) int32
         Patch at each pixel, `TexelBuffer.hit_image` of `patches.patch` with -1 where nothing is.
+    run : TileRunner
+        Works on tiles of patches.
+    """
+    n = patches.n
+    rows = cast_rows(
+        patches,
+        hit_patch,
+        surface,
+        mask,
+        table,
+        tracer,
+        n_rays=n_rays,
+        seed=seed,
+        threads=threads,
+        progress=progress,
+        run=run,
+    )
+    ordered = [rows[begin] for begin in sorted(rows)]
+    if ordered:
+        column, count, length, tally = (np.concatenate([row[k] for row in ordered]) for k in range(4))
+    else:
+        column, count, length = (np.zeros(0, np.int32) for _ in range(3))
+        tally = np.zeros((0, 2), np.int32)
+    first = np.zeros(n + 1, np.int64)
+    np.cumsum(length, out=first[1:])
+    value = (count / np.float32(n_rays)).astype(np.float32)
+    sky, lost = (np.asarray(count / n_rays, np.float32) for count in tally.T)
+    return _balanced(first, column, value, patches.area, sky, lost, n * n_rays)
+
+
+def cast_rows(
+    patches: PatchSet,
+    hit_patch: NDArray[np.int32],
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    table: HitTable,
+    tracer: Tracer,
+    *,
+    n_rays: int,
+    seed: int,
+    threads: int,
+    progress: Progress,
+    run: TileRunner = run_tiles,
+) -> dict[int, Part]:
+    """Cast the rays; see `build_form_factors`.
+
+    Returns
+    -------
+    dict of int to tuple
+        For the tile that begins at each patch: column, count (k,) int32 of all its rows; length (m,) int32 of
+        each; tally (m, 2) int32 of the rays that left the scene and those that were lost.
     """
     n = patches.n
     net = sobol_reversed(n_rays, seed, 5)
     shared = shared_bits_mask(n_rays)
     tally = np.zeros((n, 2), np.int32)
-    rows: dict[int, tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]] = {}
+    rows: dict[int, Part] = {}
 
     # Each ray starts from the texel where its share of the patch's area lies, at a point of its own.
     owner = np.repeat(np.arange(n), np.diff(patches.first))
@@ -106,7 +158,7 @@ def build_form_factors(
         np.resize(np.arange(N_POINTS, dtype=np.uint8), (64, n_rays)), axis=1
     )
 
-    def work(begin: int, end: int) -> None:
+    def work(begin: int, end: int) -> Part:
         row = np.arange(begin, end)
         at = np.minimum(np.searchsorted(where, row[:, None] + share), patches.first[row + 1, None] - 1)
         wanted = shuffle[row % len(shuffle)]
@@ -123,19 +175,13 @@ def build_form_factors(
         length = np.zeros(end - begin, np.int32)
         count_targets(target, column, count, length)
         used = np.arange(n_rays) < length[:, None]
-        rows[begin] = column[used], count[used], length
+        return column[used], count[used], length, tally[begin:end]
 
-    run_tiles(n, _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_rays)
-    ordered = [rows[begin] for begin in sorted(rows)]
-    if ordered:
-        column, count, length = (np.concatenate([row[k] for row in ordered]) for k in range(3))
-    else:
-        column, count, length = (np.zeros(0, np.int32) for _ in range(3))
-    first = np.zeros(n + 1, np.int64)
-    np.cumsum(length, out=first[1:])
-    value = (count / np.float32(n_rays)).astype(np.float32)
-    sky, lost = (np.asarray(count / n_rays, np.float32) for count in tally.T)
-    return _balanced(first, column, value, patches.area, sky, lost, n * n_rays)
+    def keep(begin: int, end: int, part: Part) -> None:
+        rows[begin] = part
+
+    run(n, _TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_rays)
+    return rows
 
 
 def _balanced(
