@@ -66,7 +66,7 @@ def _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, cor
 
 
 @njit(cache=True, nogil=True)
-def _made(function, hits, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
+def _made(function, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
     """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
     width, scene = caster.width, caster.scene
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
@@ -80,7 +80,7 @@ def _made(function, hits, caster, origin, normal, begin, net, shared, far):  # t
             on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
-            trace_lanes(function, scene, width, on, rays, spare_on, spare, hits)
+            trace_lanes(function, scene, width, on, rays, spare_on, spare)
             mixed ^= words[TFAR * LANES]
     return mixed
 
@@ -174,7 +174,6 @@ class BareRays:
     ) -> None:
         self._tracer = world.rays.tracer
         self._function = self._tracer.occluded if occlusion else self._tracer.intersect
-        self._hits = not occlusion
         self._threads = threads
         self._net = sobol_reversed(n_samples, seed, 6)
         self._shared = shared_bits_mask(n_samples)
@@ -225,7 +224,7 @@ class BareRays:
                     _ready(self._function, local.caster, tile.bank, tile.lanes_on)
                 else:
                     _made(
-                        self._function, self._hits, local.caster, tile.origin, tile.normal, tile.begin,
+                        self._function, local.caster, tile.origin, tile.normal, tile.begin,
                         self._net, self._shared, self._far,
                     )  # fmt: skip
 

@@ -196,7 +196,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     if asked == 0:
                         continue
                     if not clear:
-                        trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
+                        trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
                         cast += asked
                         looked += asked
                         for lane in range(LANES):

@@ -51,7 +51,7 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
         for r in range(len(net)):
             load_frames(rays, frame, origin, normal, group, lanes, r)
             aim_lanes(rays, words, frame, seeds, net[r, 0], net[r, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare, True)
+            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
             for lane in range(lanes):
                 p = group + lane
                 target[p, r] = -1

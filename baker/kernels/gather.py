@@ -81,7 +81,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                 part[:] = _f(0.0)
                 missed[:] = _f(0.0)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare, True)
+            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
             for lane in range(LANES):
                 none = words[GEOM_ID * LANES + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)
@@ -163,7 +163,7 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, distance)
-            trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
+            trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
             for lane in range(LANES):
                 count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
         for lane in range(lanes):

@@ -34,7 +34,7 @@ def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_p
             if sample % rays_per_point == 0:
                 load_frames(rays, frame, origin, normal, group, lanes, point)
             aim_lanes(rays, words, frame, seeds, net[sample, 0], net[sample, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare, True)
+            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
             for lane in range(lanes):
                 if words[GEOM_ID * LANES + lane] == NO_HIT:
                     continue

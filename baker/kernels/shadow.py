@@ -43,7 +43,7 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
                     any_lane = True
             if not any_lane:
                 continue
-            trace_lanes(occluded, scene, width, on, rays, spare_on, spare, False)
+            trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
             for lane in range(lanes):
                 if on[lane] and rays[TFAR * LANES + lane] >= _f(0.0):
                     i = group + lane

@@ -46,7 +46,7 @@ def open_rays(  # type: ignore[no-untyped-def]
                         facing[lane, 0, a] = normal[i, k, a]
                 load_frames(rays, frame, place, facing, 0, lanes, 0)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, reach)
-            trace_lanes(occluded, scene, width, on, rays, caster.valid, caster.floats, False)
+            trace_lanes(occluded, scene, width, on, rays, caster.valid, caster.floats)
             for lane in range(lanes):
                 # Directions below the facet of a smooth surface are closed by the surface itself.
                 i = group + lane

@@ -109,40 +109,31 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats, hits):  # type: ignore[no-untyped-def]
+def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
-    function, scene, width and the four arrays are a caster's; without `hits` only the reach is read back
-    (-inf where a shadow ray is blocked)
+    function, scene, width and the four arrays are a caster's
     """
     if width == LANES:
         trace(function, scene, lane_valid, lane_floats)
         return
     for first in range(0, LANES, width):
-        # A literal width, so that the copies become vector moves.
-        if width == 8:
-            _trace_part(function, scene, first, 8, lane_valid, lane_floats, valid, floats, hits)
-        else:
-            _trace_part(function, scene, first, width, lane_valid, lane_floats, valid, floats, hits)
-
-
-@njit(cache=True, nogil=True)
-def _trace_part(function, scene, first, width, lane_valid, lane_floats, valid, floats, hits):  # type: ignore[no-untyped-def]
-    some = np.int32(0)
-    for lane in range(width):
-        valid[lane] = lane_valid[first + lane]
-        some |= valid[lane]
-    if some == 0:
-        return
-    for row in range(12):
+        some = np.int32(0)
         for lane in range(width):
-            floats[row * width + lane] = lane_floats[row * LANES + first + lane]
-    for lane in range(width):
-        floats[GEOM_ID * width + lane] = lane_floats[GEOM_ID * LANES + first + lane]
-    trace(function, scene, valid, floats)
-    for lane in range(width):
-        lane_floats[TFAR * LANES + first + lane] = floats[TFAR * width + lane]
-    if hits:
+            valid[lane] = lane_valid[first + lane]
+            some |= valid[lane]
+        if some == 0:
+            continue
+        for row in range(DIR_Z + 1):
+            for lane in range(width):
+                floats[row * width + lane] = lane_floats[row * LANES + first + lane]
+        for lane in range(width):
+            floats[TFAR * width + lane] = lane_floats[TFAR * LANES + first + lane]
+            floats[ID * width + lane] = lane_floats[ID * LANES + first + lane]
+            floats[GEOM_ID * width + lane] = lane_floats[GEOM_ID * LANES + first + lane]
+        trace(function, scene, valid, floats)
+        for lane in range(width):
+            lane_floats[TFAR * LANES + first + lane] = floats[TFAR * width + lane]
         for row in range(HIT_U, GEOM_ID + 1):
             for lane in range(width):
                 lane_floats[row * LANES + first + lane] = floats[row * width + lane]
