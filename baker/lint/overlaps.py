@@ -42,23 +42,24 @@ def self_intersection(subject: Subject) -> Iterator[Found]:
     counted.
     """
     for m, facts in enumerate(subject.meshes):
-        pierced = _crossings(facts, thread_count(subject.settings.threads))
-        if len(pierced):
+        pierced, n = _crossings(facts, thread_count(subject.settings.threads))
+        if n:
             both = facts.good[pierced]
-            n = len(both)
-            some = "1 pair of faces pierces" if n == 1 else f"{n} pairs of faces pierce"
-            found = faces_found(subject, m, np.unique(both), f"{some} each other")
+            some = "1 edge pierces" if n == 1 else f"{n} edges pierce"
+            found = faces_found(subject, m, np.unique(both), f"{some} another face of the mesh")
             pairs = tuple((int(a), int(b)) for a, b in facts.local[both[:MOST_FACES]])
             yield replace(found, count=n, pairs=pairs)
 
 
-def _crossings(facts: MeshFacts, threads: int) -> NDArray[np.int64]:
-    """Return (n, 2) pairs of rows of `good`: a face with an edge that pierces another face, and that one."""
+def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
+    """Return (n, 2) pairs of rows of `good`, a face with an edge that pierces another face and that one, and
+    the number of such edges.
+    """
     from baker.trace.embree import RayScene
 
     edges = facts.edges
     if len(facts.sheet) < 2:
-        return np.zeros((0, 2), np.int64)
+        return np.zeros((0, 2), np.int64), 0
     face, corner = facts.sheet[edges.face[edges.first]], edges.corner[edges.first]
     begin = facts.corner[face, corner]
     end = facts.corner[face, (corner + 1) % 3]
@@ -68,7 +69,7 @@ def _crossings(facts: MeshFacts, threads: int) -> NDArray[np.int64]:
     depth = _DEPTH * float(np.linalg.norm(high_corner - low_corner))
     tree = RayScene(facts.position, facts.triangle[facts.good].astype(np.uint32), threads=threads)
     out = [np.zeros((0, 2), np.int64)]
-    rows = np.arange(len(face))
+    rows, piercing = np.arange(len(face)), np.zeros(len(face), bool)
     for _ in range(_ROUNDS):
         if not len(rows):
             break
@@ -80,12 +81,13 @@ def _crossings(facts: MeshFacts, threads: int) -> NDArray[np.int64]:
         ends = facts.welded[other]
         neighbour = ((ends == low[rows, None]) | (ends == high[rows, None])).any(axis=1)
         through = ~neighbour & _pierces(facts, begin[rows], end[rows], other, depth)
+        piercing[rows[through]] = True
         out.append(np.stack([face[rows[through]], other[through]], axis=1))
         near[rows] = distance + _ENDS
         rows = rows[near[rows] < 1.0 - _ENDS]
     tree.close()
     pairs = np.sort(np.concatenate(out), axis=1)
-    return np.unique(pairs, axis=0)
+    return np.unique(pairs, axis=0), int(piercing.sum())
 
 
 def _pierces(
