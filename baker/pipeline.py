@@ -37,6 +37,7 @@ from baker.kernels.surface import Surface
 from baker.lights.emissive import build_emitters
 from baker.lint.in_bake import bake_warnings
 from baker.radiosity.buried import find_buried
+from baker.radiosity.crevices import gap_depth
 from baker.radiosity.direct import DirectLight, direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
@@ -338,7 +339,16 @@ def _reflected(
     """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own."""
     texels = world.texels
     with record.stage("form factors"):
-        patches = build_patches(texels)
+        depth, cast = gap_depth(
+            texels,
+            world.surface,
+            world.mask,
+            world.rays.tracer,
+            seed=settings.seed,
+            threads=thread_count(settings.threads),
+            progress=record.progress,
+        )
+        patches = build_patches(texels, depth)
         matrix = build_form_factors(
             patches,
             texels.hit_image(patches.patch, fill=-1),
@@ -350,9 +360,9 @@ def _reflected(
             seed=settings.seed,
             threads=thread_count(settings.threads),
             progress=record.progress,
-            run=farm.runner("form factors", {"mask": world.mask}),
+            run=farm.runner("form factors", {"mask": world.mask, "depth": depth}),
         )
-        record.rays["form factors"] = matrix.rays
+        record.rays["form factors"] = matrix.rays + cast
     with record.stage("solve"):
         weight = np.maximum(texels.area, 1e-12)
         albedo = patches.mean(texels.albedo, weight)

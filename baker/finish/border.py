@@ -1,10 +1,12 @@
 """Moves the values of partly covered texels from where they were measured to the texel centre.
 
 A texel on a chart's border holds the mean over its covered part, that is the value at that part's centroid,
-up to 0.7 texels away from the centre that a bilinear lookup takes it to stand for.
-Best done before denoising, which then meets a picture without steps along slanted borders. *Measured* within
-half a texel of the border, contact shadow of 6 texels: RMS error 5.0 to 1.1 % with 1 % noise; with 5 % noise
-and denoising 5.7 to 2.5 %; where there is no steep slope it neither gains nor costs.
+up to 0.7 texels away from the centre that a bilinear lookup takes it to stand for. A plane fitted to the
+texels around moves it first; then each is set so that a lookup at its centroid, between it and its moved
+neighbours, finds what was measured there: at the mouth of a gap light falls off faster than any plane.
+*Measured* within half a texel of the border, RMS error without, with the plane, with both. Contact shadow
+of 6 texels: 5.0, 0.9, 0.9 %; with 1 % noise 5.1, 1.2, 1.1 %; light that falls off within one texel: 7.3, 4.9,
+4.2 %. Where there is no steep slope it neither gains nor costs.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 
 from baker.finish.page import check_page
 from baker.finish.tiles import over_rows
-from baker.kernels.page_slope import move_to_centre
+from baker.kernels.page_slope import match_lookups, move_to_centre
 
 # Sub-positions place a fully covered texel's centroid only so well; below this nothing is gained.
 SMALLEST_OFFSET = 0.02
@@ -28,10 +30,10 @@ def recentre(
     valid: NDArray[np.bool_] | None = None,
     threads: int = 1,
 ) -> NDArray[np.float32]:
-    """Correct each covered texel to first order: value - slope . (centroid - centre).
+    """Correct each covered texel: what a lookup at its centroid finds is what was measured there.
 
-    The slope is fitted inside the chart. The result stays within the range of the 5 x 5 texels around it,
-    widened by half, and light never turns negative.
+    Slopes and neighbours are those of its own chart. The result stays within the range of the 5 x 5 texels
+    around it, widened by half, and light never turns negative.
 
     Parameters
     ----------
@@ -57,10 +59,18 @@ def recentre(
     """
     used = chart >= 0 if valid is None else valid & (chart >= 0)
     check_page(value, chart, centroid_offset=centroid_offset, valid=used)
-    out = np.array(value)
+    moved = np.array(value)
     over_rows(
         lambda first, end: move_to_centre(
-            value, chart, used, centroid_offset, SMALLEST_OFFSET, out, first, end
+            value, chart, used, centroid_offset, SMALLEST_OFFSET, moved, first, end
+        ),
+        len(value),
+        threads,
+    )
+    out = np.array(moved)
+    over_rows(
+        lambda first, end: match_lookups(
+            value, chart, used, centroid_offset, SMALLEST_OFFSET, moved, out, first, end
         ),
         len(value),
         threads,

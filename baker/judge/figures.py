@@ -2,7 +2,7 @@
 
 For each place the mean over colours v of the value and r of the reference:
 
-    relative error   |v - r| / max(r, floor)          floor = 0.1 median(r)
+    relative error   |v - r| / max(r, floor)          floor = max(0.1 median(r), 0.01 mean(r))
     bias             mean(v - r) / mean(r)
     rmse             sqrt(mean (v_c - r_c)^2)         over colours c, in the channel's unit
     nrmse            rmse / mean(r)
@@ -10,9 +10,10 @@ For each place the mean over colours v of the value and r of the reference:
     z                (v_c - r_c) / standard error of r_c
 
 `median`, `p95`, `p99`, `max` are of the relative error, whose floor keeps places in the dark from deciding:
-an error there counts against a tenth of what is usual. `noise_floor` is the median relative error that the
-reference alone would show: two independent halves of it are compared, and their difference is halved, since
-the mean of both halves is nearer to the truth than either by that much.
+an error there counts against a tenth of the median light, or a hundredth of the mean, if that is more.
+`noise_floor` is the median relative error that the reference alone would show, `noise_p95` its 95th
+percentile: two independent halves of it are compared, and their difference is halved, since the mean of both
+halves is nearer to the truth than either by that much.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
 2011 (relMSE).
@@ -26,30 +27,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 FIGURES = (
-    "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "z_rms",
+    "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "noise_p95",
+    "z_rms",
 )  # fmt: skip
-# Values below this share of the usual count as dark.
-DARK = 0.1
+# Values below this share of the median, or of the mean, count as dark.
+_DARK_MEDIAN, _DARK_MEAN = 0.1, 0.01
 _EPSILON = 0.01
 
 
 def relative_error(
-    value: NDArray[np.float64], reference: NDArray[np.float64], usual: float
+    value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> NDArray[np.float64]:
-    """Return |v - r| / max(r, 0.1 usual) of colour means (n,); value, reference : (n, C)."""
+    """Return |v - r| / max(r, floor) of colour means (n,); value, reference : (n, C)."""
     v, r = value.mean(axis=1), reference.mean(axis=1)
-    error: NDArray[np.float64] = np.abs(v - r) / np.maximum(np.maximum(r, DARK * usual), 1e-12)
+    error: NDArray[np.float64] = np.abs(v - r) / np.maximum(r, max(floor, 1e-12))
     return error
 
 
-def usual_value(reference: NDArray[np.float64]) -> float:
-    """Return the median of the colour means of (n, C), of those that are not black if most are."""
+def dark_floor(reference: NDArray[np.float64]) -> float:
+    """Return what values of (n, C) below which count as dark; 0 if all are black."""
     mean = reference.mean(axis=1)
-    lit = mean[mean > 0]
-    if not len(lit):
+    if not len(mean):
         return 0.0
-    middle = float(np.median(mean))
-    return middle if middle > 0 else float(np.median(lit))
+    return max(_DARK_MEDIAN * float(np.median(mean)), _DARK_MEAN * float(mean.mean()))
 
 
 def figures(
@@ -58,7 +58,7 @@ def figures(
     *,
     standard_error: NDArray[np.float64] | None = None,
     halves: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
-    usual: float | None = None,
+    floor: float | None = None,
 ) -> dict[str, float | int | None]:
     """Return the figures of this file's head by name.
 
@@ -68,9 +68,9 @@ def figures(
     standard_error : (n, C), optional
         Of the reference; without it `z_rms` is None.
     halves : two (n, C), optional
-        Independent halves of the reference; without them `noise_floor` is None.
-    usual : float, optional
-        What dark is measured against; by default `usual_value` of the reference.
+        Independent halves of the reference; without them its noise is None.
+    floor : float, optional
+        See above; by default `dark_floor` of the reference.
 
     Returns
     -------
@@ -82,8 +82,8 @@ def figures(
     if not len(value):
         return found
     value, reference = value.astype(np.float64), reference.astype(np.float64)
-    usual = usual_value(reference) if usual is None else usual
-    error = relative_error(value, reference, usual)
+    floor = dark_floor(reference) if floor is None else floor
+    error = relative_error(value, reference, floor)
     v, r = value.mean(axis=1), reference.mean(axis=1)
     mean = max(float(r.mean()), 1e-12)
     rmse = math.sqrt(float(((value - reference) ** 2).mean()))
@@ -94,7 +94,8 @@ def figures(
     found["p95"], found["p99"] = (float(np.percentile(error, q)) for q in (95, 99))
     found["max"] = float(error.max())
     if halves is not None:
-        found["noise_floor"] = 0.5 * float(np.median(relative_error(halves[0], halves[1], usual)))
+        apart = 0.5 * np.abs((halves[0] - halves[1]).mean(axis=1)) / np.maximum(r, max(floor, 1e-12))
+        found["noise_floor"], found["noise_p95"] = (float(np.percentile(apart, q)) for q in (50, 95))
     if standard_error is not None:
         z = z_scores(value, reference, standard_error)
         found["z_rms"] = math.sqrt(float((z**2).mean())) if z.size else None

@@ -17,6 +17,7 @@ from baker.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 
 # Less of a texel's square than this is no surface to be judged.
 _LEAST = 1.0e-3
+_WHOLE = 0.98
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,15 @@ class TexelPlaces:
         World; `normal` is the shading normal, both on the triangle's front.
     area : (n,) float64
         Share of the texel's square that surface covers.
+    middle : (n, 2) float64
+        Mean of the places from the texel's centre, (column, row), texels; 0 where all of it is covered.
     """
 
     position: NDArray[np.float64]
     normal: NDArray[np.float64]
     face_normal: NDArray[np.float64]
     area: NDArray[np.float64]
+    middle: NDArray[np.float64]
 
 
 def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[np.int32]:
@@ -77,11 +81,13 @@ def texel_places(
     random[..., 0] = np.random.Generator(np.random.PCG64([seed, 8])).permuted(random[..., 0], axis=1)
     found = np.zeros((len(pixel), n_places), np.int64)
     weight = np.zeros((len(pixel), n_places, 3))
-    covered = np.zeros(len(pixel))
+    covered, middle = np.zeros(len(pixel)), np.zeros((len(pixel), 2))
     spread_pieces(
         geometry.uv, geometry.triangle, resolution, pixel, start, triangle, corners, polygon, area,
-        random, found, weight, covered,
+        random, found, weight, covered, middle,
     )  # fmt: skip
+    # A whole texel's places lie around its centre but for their own scatter.
+    middle = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
     corner = geometry.triangle[found]
     position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
     normal = (geometry.normal[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
@@ -89,4 +95,32 @@ def texel_places(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    return TexelPlaces(position, normal, face, covered)
+    return TexelPlaces(position, normal, face, covered, middle)
+
+
+def look_up(
+    pages: NDArray[np.float32], pixel: NDArray[np.int64], middle: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Read maps bilinearly, as engines do, beside the centres of texels.
+
+    Parameters
+    ----------
+    pages : (P, H, W, C) float32
+    pixel : (n,) int64
+    middle : (n, 2) float64
+        Where in relation to the texel's centre, (column, row), texels, -0.5 to 0.5.
+
+    Returns
+    -------
+    value : (n, C) float64
+    """
+    height, width = pages.shape[1:3]
+    page, rest = np.divmod(pixel, height * width)
+    row, column = np.divmod(rest, width)
+    # The neighbours that the place leans towards, and how far.
+    down, right = np.where(middle[:, 1] < 0, -1, 1), np.where(middle[:, 0] < 0, -1, 1)
+    lower, beside = np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1)
+    y, x = np.abs(middle[:, 1])[:, None], np.abs(middle[:, 0])[:, None]
+    above = (1 - x) * pages[page, row, column] + x * pages[page, row, beside]
+    below = (1 - x) * pages[page, lower, column] + x * pages[page, lower, beside]
+    return np.asarray((1 - y) * above + y * below, np.float64)

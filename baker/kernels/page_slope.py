@@ -16,6 +16,8 @@ RIDGE = 1e-3
 HEADROOM = 0.5
 # Extrapolation stops growing this many texels outside the chart.
 MAX_STEP = 2.0
+# A value taken from a few texels must differ by this share to be believed instead of a plane's.
+NOISY = 0.03
 # A noisy slope counts by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
 DOUBT = 3.0
 
@@ -158,6 +160,46 @@ def move_to_centre(value, chart, covered, offset, smallest, out, first_row, end_
             for j in range(channels):
                 estimate = float(value[r, c, j]) - plane[1, j] * x - plane[2, j] * y
                 out[r, c, j] = _limit(estimate, plane[3, j], plane[4, j])
+
+
+@njit(cache=True, nogil=True)
+def match_lookups(value, chart, covered, offset, smallest, moved, out, first_row, end_row):  # type: ignore[no-untyped-def]
+    """Set each partly covered texel so that a bilinear lookup at its centroid finds what was measured there.
+
+    Only where all texels of that lookup are covered and of one chart. What differs from `move_to_centre` by
+    some per cent is left to that: a plane through many texels is less noisy. See `_limit`, too.
+
+    Parameters
+    ----------
+    value, chart, covered, offset, smallest : see `move_to_centre`
+    moved : (H, W, C) float32, from `move_to_centre`
+    out : (H, W, C) float32, changed in rows first_row to end_row - 1
+    """
+    height, width, channels = value.shape
+    plane = np.zeros((5, channels), np.float64)
+    for r in range(first_row, end_row):
+        for c in range(width):
+            x = abs(float(offset[r, c, 0]))
+            y = abs(float(offset[r, c, 1]))
+            if not covered[r, c] or max(x, y) < smallest:
+                continue
+            rr = min(max(r + (1 if offset[r, c, 1] > 0.0 else -1), 0), height - 1)
+            cc = min(max(c + (1 if offset[r, c, 0] > 0.0 else -1), 0), width - 1)
+            known = True
+            for a, b, share in ((r, cc, x), (rr, c, y), (rr, cc, min(x, y))):
+                if share >= smallest and not (covered[a, b] and chart[a, b] == chart[r, c]):
+                    known = False
+            if not known:
+                continue
+            fit_plane(value, chart, covered, offset, r, c, plane)
+            own = (1.0 - x) * (1.0 - y)
+            for j in range(channels):
+                measured, plain = float(value[r, c, j]), float(moved[r, c, j])
+                beside = x * (1.0 - y) * moved[r, cc, j] + (1.0 - x) * y * moved[rr, c, j]
+                beside += x * y * moved[rr, cc, j]
+                way = _limit((measured - beside) / own, plane[3, j], plane[4, j]) - plain
+                excess = max(abs(way) - NOISY * abs(measured), 0.0)
+                out[r, c, j] = plain + (excess if way > 0.0 else -excess)
 
 
 @njit(cache=True, nogil=True)

@@ -71,9 +71,12 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
 
 @njit(cache=True, error_model="numpy")
 def spread_pieces(  # type: ignore[no-untyped-def]
-    uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered
+    uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):
-    """Choose places uniform in the area of a texel's pieces: their triangles, weights and area in all."""
+    """Choose places uniform in the area of a texel's pieces: their triangles, weights and area in all.
+
+    middle : (n, 2) float64 output, mean of the places in the texel's square, 0 to 1 (column, row)
+    """
     for i in range(len(pixel)):
         first, last = start[i], start[i + 1]
         total = 0.0
@@ -90,6 +93,8 @@ def spread_pieces(  # type: ignore[no-untyped-def]
             if e >= last:
                 continue
             x, y = polygon_point(polygon[e], corners[e], random[i, k, 1], random[i, k, 2])
+            middle[i, 0] += x / random.shape[1]
+            middle[i, 1] += y / random.shape[1]
             x += rest % size
             y += rest // size
             t = piece[e]

@@ -1,5 +1,7 @@
 """Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
 
+Texels in narrow gaps form patches apart from those outside.
+
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
 far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity
 in complex environments, 1994.
@@ -53,14 +55,23 @@ class PatchSet:
         return np.stack(columns, axis=1) / np.maximum(total, 1e-300)[:, None]
 
 
-def build_patches(texels: TexelBuffer, *, max_patches: int = MAX_PATCHES) -> PatchSet:
+def build_patches(
+    texels: TexelBuffer, depth: NDArray[np.uint8] | None = None, *, max_patches: int = MAX_PATCHES
+) -> PatchSet:
     """Group texels into blocks: the smallest power of two that keeps to `max_patches`.
 
     Charts smaller than a block still need a patch each, so a page of very many charts may have more.
+
+    Parameters
+    ----------
+    texels : TexelBuffer
+    depth : (n,) uint8, optional
+        0 to 2; entries of different depth share no patch (`crevices`).
     """
+    depth = np.zeros(len(texels.pixel), np.uint8) if depth is None else depth
     block = 1
     while True:
-        number, n_patches = _blocks(texels, block)
+        number, n_patches = _blocks(texels, depth, block)
         if n_patches <= max_patches or block >= 256:
             break
         block *= 2
@@ -77,7 +88,7 @@ def build_patches(texels: TexelBuffer, *, max_patches: int = MAX_PATCHES) -> Pat
     return PatchSet(number, first, order, cumulative.astype(np.float32), area, block)
 
 
-def _blocks(texels: TexelBuffer, block: int) -> tuple[NDArray[np.int32], int]:
+def _blocks(texels: TexelBuffer, depth: NDArray[np.uint8], block: int) -> tuple[NDArray[np.int32], int]:
     """Number the blocks of one size in Morton order of their first texel."""
     size = texels.resolution
     page, rest = np.divmod(texels.pixel, size * size)
@@ -87,7 +98,8 @@ def _blocks(texels: TexelBuffer, block: int) -> tuple[NDArray[np.int32], int]:
     direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
     per_side = -(-size // block)
     key = (page * per_side + row // block) * per_side + column // block
-    key = (key * (int(texels.chart.max(initial=0)) + 1) + texels.chart) * 54 + direction * 2 + texels.back
+    key = (key * (int(texels.chart.max(initial=0)) + 1) + texels.chart) * 162
+    key += (direction * 2 + texels.back) * 3 + depth
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     rank = np.zeros(len(first), np.int32)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first), dtype=np.int32)

@@ -41,17 +41,18 @@ class FirstHits:
 
 
 def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[np.float64]) -> FirstHits:
-    """Trace rays from one point.
+    """Trace rays from one point, or each from its own.
 
     Parameters
     ----------
-    origin : (3,) float64
+    origin : (3,) or (n, 3) float64
     way : (n, 3) float64, unit
     """
     n = len(way)
     triangle, bary = np.full(n, -1, np.int32), np.zeros((n, 2))
     depth, albedo = np.full(n, np.inf), np.zeros((n, 3))
     surfaces = reference.surfaces
+    origin = np.ascontiguousarray(np.broadcast_to(origin, (n, 3)))
     caster = new_caster(reference.rays.tracer)
     _meet(
         origin, way, caster, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth, albedo
@@ -81,7 +82,7 @@ def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth
             valid[lane] = -1 if i < len(way) else 0
             if i < len(way):
                 set_ray(
-                    floats, words, width, lane, origin[0], origin[1], origin[2],
+                    floats, words, width, lane, origin[i, 0], origin[i, 1], origin[i, 2],
                     way[i, 0], way[i, 1], way[i, 2],
                     np.float32(1.0e30),
                 )  # fmt: skip

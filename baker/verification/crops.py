@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +57,7 @@ def trace_crops(
     worst: list[dict[str, Any]],
     bounces: int | None,
     seed: int,
+    seconds: float | None,
     progress: Progress,
 ) -> list[Crop]:
     """Path-trace all texels around the worst ones.
@@ -66,8 +68,11 @@ def trace_crops(
         Worst first; windows that overlap an earlier one of the same channel are left out.
     bounces : int or None
         As of `irradiance_pass`.
+    seconds : float or None
+        Time after which no further pass is begun; each crop gets one.
     """
     crops: list[Crop] = []
+    end = np.inf if seconds is None else time.monotonic() + seconds
     for entry in worst:
         if len(crops) == _MOST:
             break
@@ -75,7 +80,7 @@ def trace_crops(
         if any(_overlap(crop, entry, corner) for crop in crops):
             continue
         report(progress, "crops", len(crops) / _MOST)
-        crops.append(_trace(bake, geometry, reference, entry, corner, bounces, seed))
+        crops.append(_trace(bake, geometry, reference, entry, corner, bounces, seed, end))
     return crops
 
 
@@ -96,6 +101,7 @@ def _trace(
     corner: tuple[int, int],
     bounces: int | None,
     seed: int,
+    end: float,
 ) -> Crop:
     page, size = entry["page"], bake.atlas.resolution
     window = (slice(corner[0], corner[0] + SIZE), slice(corner[1], corner[1] + SIZE))
@@ -106,15 +112,17 @@ def _trace(
     where = (places.position, places.normal, places.face_normal)
     stored = bake.maps[entry["channel"]][page][window] * on[..., None]
     truth = np.zeros_like(stored)
-    if entry["channel"] == "ao":
-        estimate = new_estimate(len(pixel), 1)
-        reach = bake.manifest.get("settings", {}).get("ao_distance_metres")
-        for _ in range(_PASSES):
-            openness_pass(reference, estimate, *where, distance=np.inf if reach is None else reach, seed=seed)
-    else:
-        estimate = new_estimate(len(pixel), 3)
-        for _ in range(_PASSES):
+    occlusion = entry["channel"] == "ao"
+    estimate = new_estimate(len(pixel), 1 if occlusion else 3)
+    reach = bake.manifest.get("settings", {}).get("ao_distance_metres")
+    distance = np.inf if reach is None else float(reach)
+    for _ in range(_PASSES):
+        if occlusion:
+            openness_pass(reference, estimate, *where, distance=distance, seed=seed)
+        else:
             irradiance_pass(reference, estimate, *where, max_bounces=bounces, seed=seed)
+        if time.monotonic() > end:
+            break
     truth[row, column] = estimate.mean
     error, mean = flip_error(truth, stored)
     return Crop(entry["channel"], page, corner[0], corner[1], stored, truth, error, mean)

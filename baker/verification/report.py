@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.io.png import encode_png, srgb_levels
-from baker.judge.figures import FIGURES, relative_error, usual_value
+from baker.judge.figures import FIGURES, dark_floor, relative_error
 from baker.judge.junit import write_text
 from baker.verification.summary import mean_flip, verification_json
 from baker.verification.verify import ChannelCheck, Verification
@@ -100,8 +100,8 @@ def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
     """Return each page, and where on it the judged texels are how wrong."""
     size = found.bake.atlas.resolution
     step = max(size // _SHOWN, 1)
-    usual = usual_value(check.reference)
-    error = relative_error(check.value, check.reference, usual)
+    usual = _usual(check.reference)
+    error = relative_error(check.value, check.reference, dark_floor(check.reference))
     text = ""
     for page in range(found.bake.maps[name].shape[0]):
         stored = found.bake.maps[name][page][::step, ::step]
@@ -120,6 +120,12 @@ def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
 def _heat(error: float) -> tuple[int, int, int]:
     t = min(error / _HOT, 1.0)
     return int(40 + 215 * t), int(60 + 160 * t * t), int(200 * (1 - t))
+
+
+def _usual(value: NDArray[np.float64]) -> float:
+    """Return the median of the colour means of (n, C) that are not black, 1 if all are."""
+    mean = value.mean(axis=1)
+    return float(np.median(mean[mean > 0])) if (mean > 0).any() else 1.0
 
 
 def _shown(image: NDArray[np.float32], middle: float) -> NDArray[np.uint8]:
@@ -161,7 +167,7 @@ def _crops(found: Verification) -> str:
         return ""
     text = "<h2>Around the worst texels</h2>"
     for crop in found.crops:
-        middle = usual_value(crop.reference.reshape(-1, crop.reference.shape[2]).astype(np.float64))
+        middle = _usual(crop.reference.reshape(-1, crop.reference.shape[2]).astype(np.float64))
         where = f"{crop.channel}, page {crop.page}, rows from {crop.row}, columns from {crop.column}"
         text += "<div>" + _figure(_shown(crop.stored, middle), f"stored: {where}", 8)
         text += _figure(_shown(crop.reference, middle), "path-traced", 8)

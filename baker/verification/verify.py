@@ -21,28 +21,36 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.io.bake_folder import StoredBake, read_bake
 from baker.judge.choice import choose_texels
-from baker.judge.figures import FIGURES, figures, usual_value
+from baker.judge.figures import FIGURES, dark_floor, figures
 from baker.judge.limits import Verdict, judge, parse_limits
 from baker.judge.registration import best_shift, exponent
-from baker.judge.texel_area import TexelPlaces, instance_map, texel_places
-from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
-from baker.reference.view import Reference, build_reference
+from baker.judge.texel_area import TexelPlaces, instance_map, look_up, texel_places
+from baker.reference.irradiance import PointEstimate
+from baker.reference.view import build_reference
 from baker.verification.crops import Crop, trace_crops
+from baker.verification.free import free_places
+from baker.verification.tracing import (
+    OPENNESS_ERROR,
+    Effort,
+    relative_standard_error,
+    standard_error,
+    trace_irradiance,
+    trace_openness,
+)
 from baker.verification.worst import worst_texels
 
 CHANNELS = ("irradiance", "ao")
 PLACES = 64
-# Passes of all texels before some are called good enough; passes beyond which AO is not followed.
-_FIRST, _MOST_OPENNESS = 8, 256
-_OPENNESS_ERROR = 0.002
 DEFAULT_LIMITS = (
     "irradiance.median > 0.03, irradiance.bias > 0.03, irradiance.nrmse > 0.5, "
     "ao.median > 0.03, ao.bias > 0.03, ao.rmse > 0.05"
 )
-# An object whose mean is off by more fails on its own, if so many of its texels were judged and it is not in
-# the dark (this share of what is usual).
-_OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_LIGHT = 0.25, 8, 0.1
+# An object whose mean is off by more fails on its own, if so many of its texels were judged, it is not in the
+# dark, and so many standard errors of the reference's mean say so.
+_OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_SURE = 0.25, 8, 3.0
 _EXPONENT = 0.1
+# Pictures of the worst places get this share of the time limit on top.
+_CROP_TIME = 0.1
 
 
 @dataclass(frozen=True)
@@ -178,22 +186,25 @@ def verify(
     sky = _sky(baked)
     bounces = baked.get("bounces")
     deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
+    effort = Effort(settings.spp, settings.target_se, deadline, settings.seed)
     with build_reference(bake.scene, sky=sky, lambertian=True, threads=settings.threads) as reference:
+        places = free_places(reference, places, settings.seed)
         estimates: dict[str, PointEstimate] = {}
         if "ao" in names:
             reach = baked.get("ao_distance_metres")
             distance = np.inf if reach is None else float(reach)
-            estimates["ao"] = _openness(reference, places, distance, settings, deadline, progress)
+            estimates["ao"] = trace_openness(reference, places, distance, effort, progress)
         if "irradiance" in names:
-            estimates["irradiance"] = _irradiance(reference, places, bounces, settings, deadline, progress)
+            estimates["irradiance"] = trace_irradiance(reference, places, bounces, effort, progress)
         covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
         channels = {
-            name: _channel(bake.maps[name], covered, pixel, estimates[name], settings, absolute=name == "ao")
+            name: _channel(bake.maps[name], covered, pixel, places, estimates[name], settings.target_se)
             for name in names
         }
         middle = places.position.mean(axis=1)
         worst = worst_texels(bake, pixel, owner, middle, channels)
-        crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, progress)
+        spare = None if settings.time_limit is None else _CROP_TIME * settings.time_limit
+        crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)
     objects = _objects(bake, owner, channels)
     verdicts = judge(limits, {name: check.figures for name, check in channels.items()})
     return Verification(
@@ -205,7 +216,7 @@ def verify(
         objects=objects,
         worst=worst,
         verdicts=verdicts,
-        problems=[] if settings.fail_if else _problems(channels, objects),
+        problems=[] if settings.fail_if else _problems(channels, objects, owner),
         invalid=int((bake.status == TexelStatus.INVALID).sum()),
         crops=crops,
         rays=sum(estimate.rays for estimate in estimates.values()),
@@ -244,96 +255,25 @@ def _choose(
     return pixel, owner[pixel], texel_places(geometry, pixel, resolution, PLACES, settings.seed)
 
 
-def _openness(
-    reference: Reference,
-    places: TexelPlaces,
-    distance: float,
-    settings: VerifySettings,
-    deadline: float | None,
-    progress: Progress,
-) -> PointEstimate:
-    """Path-trace AO: as many passes as asked for, or until its error is far below what a bake can have."""
-    estimate = new_estimate(len(places.position), 1)
-    passes = _MOST_OPENNESS if settings.spp is None else max(-(-settings.spp // estimate.samples), 2)
-    started = time.monotonic()
-    for number in range(passes):
-        openness_pass(
-            reference, estimate, places.position, places.normal, places.face_normal,
-            distance=distance, seed=settings.seed,
-        )  # fmt: skip
-        report(progress, "ambient occlusion", (number + 1) / passes)
-        if settings.spp is not None or number + 1 < _FIRST:
-            continue
-        # AO may take a quarter of the time; it seldom needs it.
-        late = deadline is not None and time.monotonic() > started + 0.25 * (deadline - started)
-        if late or np.median(estimate.standard_error) < _OPENNESS_ERROR:
-            break
-    return estimate
-
-
-def _irradiance(
-    reference: Reference,
-    places: TexelPlaces,
-    bounces: int | None,
-    settings: VerifySettings,
-    deadline: float | None,
-    progress: Progress,
-) -> PointEstimate:
-    """Path-trace irradiance until each texel is good enough, the paths asked for are cast, or time is up."""
-    estimate = new_estimate(len(places.position), 3)
-    chosen = np.arange(len(places.position))
-    goal = None if settings.spp is None else max(-(-settings.spp // estimate.samples), 2)
-    started = time.monotonic()
-    while True:
-        irradiance_pass(
-            reference, estimate, places.position, places.normal, places.face_normal,
-            max_bounces=bounces, seed=settings.seed, chosen=chosen,
-        )  # fmt: skip
-        if goal is not None:
-            report(progress, "path tracing", estimate.rounds / goal)
-            if estimate.rounds >= goal:
-                break
-        elif estimate.rounds >= _FIRST:
-            error = _relative_standard_error(estimate)
-            chosen = np.flatnonzero(error > settings.target_se)
-            share = 1.0 - len(chosen) / len(error)
-            if deadline is not None:
-                share = max(share, (time.monotonic() - started) / max(deadline - started, 1e-9))
-            report(progress, "path tracing", min(share, 1.0), f"{len(error) - len(chosen)} texels done")
-            if not len(chosen):
-                break
-        if deadline is not None and estimate.rounds >= 2 and time.monotonic() > deadline:
-            break
-    return estimate
-
-
-def _relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
-    """Return the standard error (n,) of the colour mean, relative as errors are (colours taken as one)."""
-    mean = estimate.mean
-    usual = usual_value(mean)
-    error = estimate.standard_error.mean(axis=1)
-    return np.asarray(error / np.maximum(np.maximum(mean.mean(axis=1), 0.1 * usual), 1e-12), np.float64)
-
-
 def _channel(
     stored: NDArray[np.float32],
     covered: NDArray[np.bool_],
     pixel: NDArray[np.int64],
+    places: TexelPlaces,
     estimate: PointEstimate,
-    settings: VerifySettings,
-    *,
-    absolute: bool,
+    target: float,
 ) -> ChannelCheck:
     """Compare a stored channel (P, H, W, C) with its estimate."""
-    flat = stored.reshape(-1, stored.shape[3])
-    value = flat[pixel].astype(np.float64)[:, : estimate.mean.shape[1]]
-    truth, error = estimate.mean, estimate.standard_error
+    # A texel on a chart's border holds the value at its centre, beside its surface: engines look up between.
+    value = look_up(stored, pixel, places.middle)
+    truth, error = estimate.mean, standard_error(estimate)
+    value = value[:, : truth.shape[1]]
     halves = (estimate.half(0), estimate.half(1))
     page = stored.mean(axis=3, dtype=np.float64)
-    if absolute:
-        unresolved = int((error > 2 * _OPENNESS_ERROR).any(axis=1).sum())
+    if truth.shape[1] == 1:
+        unresolved = int((error > 2 * OPENNESS_ERROR).any(axis=1).sum())
     else:
-        unresolved = int((_relative_standard_error(estimate) > settings.target_se).sum())
+        unresolved = int((relative_standard_error(estimate) > target).sum())
     return ChannelCheck(
         value=value,
         reference=truth,
@@ -351,7 +291,7 @@ def _objects(
 ) -> list[dict[str, Any]]:
     """Return the figures of each object that was judged."""
     found = []
-    usual = {name: usual_value(check.reference) for name, check in channels.items()}
+    floor = {name: dark_floor(check.reference) for name, check in channels.items()}
     for number in np.unique(owner):
         mine = owner == number
         instance = bake.scene.instances[int(number)]
@@ -362,13 +302,15 @@ def _objects(
                 check.reference[mine],
                 standard_error=check.standard_error[mine],
                 halves=(check.halves[0][mine], check.halves[1][mine]),
-                usual=usual[name],
+                floor=floor[name],
             )
         found.append(entry)
     return found
 
 
-def _problems(channels: dict[str, ChannelCheck], objects: list[dict[str, Any]]) -> list[str]:
+def _problems(
+    channels: dict[str, ChannelCheck], objects: list[dict[str, Any]], owner: NDArray[np.int32]
+) -> list[str]:
     """Return what is wrong beyond single figures: shifted pages, curves, single objects."""
     found = []
     for name, check in channels.items():
@@ -377,13 +319,16 @@ def _problems(channels: dict[str, ChannelCheck], objects: list[dict[str, Any]]) 
             found.append(f"{name} fits better {down} rows and {right} columns further: the page is shifted")
         if name == "irradiance" and check.exponent is not None and abs(check.exponent - 1.0) > _EXPONENT:
             found.append(f"{name} follows the {check.exponent:.2f}th power of the truth: a curve was applied")
-    usual = {name: usual_value(check.reference) for name, check in channels.items()}
-    for entry in objects:
+    floor = {name: dark_floor(check.reference) for name, check in channels.items()}
+    for entry, number in zip(objects, np.unique(owner), strict=True):
+        mine = owner == number
         for name, values in entry["channels"].items():
-            if values["texels"] < _OBJECT_TEXELS or values["nrmse"] is None:
+            if values["texels"] < _OBJECT_TEXELS or abs(values["bias"]) <= _OBJECT_BIAS:
                 continue
-            mean = values["rmse"] / max(values["nrmse"], 1e-12)
-            if mean > _OBJECT_LIGHT * usual[name] and abs(values["bias"]) > _OBJECT_BIAS:
+            check = channels[name]
+            mean = float(check.reference[mine].mean())
+            error = float(np.sqrt((check.standard_error[mine].mean(axis=1) ** 2).sum()) / values["texels"])
+            if mean > floor[name] and abs(values["bias"]) * mean > _OBJECT_SURE * error:
                 found.append(
                     f"{name} of '{entry['object']}' (node {entry['node']}) is off by"
                     f" {100 * values['bias']:+.0f} % on the whole"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.io.bake_folder import StoredBake
-from baker.judge.figures import relative_error, usual_value
+from baker.judge.figures import dark_floor, relative_error
 
 _WORST = 10
 
@@ -25,10 +25,10 @@ def worst_texels(
     size = bake.atlas.resolution
     found = []
     for name, check in channels.items():
-        usual = usual_value(check.reference)
-        error = relative_error(check.value, check.reference, usual)
+        floor = dark_floor(check.reference)
+        error = relative_error(check.value, check.reference, floor)
         noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
-        sure = error - 3.0 * noise / np.maximum(np.maximum(check.reference.mean(axis=1), 0.1 * usual), 1e-12)
+        sure = error - 3.0 * noise / np.maximum(check.reference.mean(axis=1), max(floor, 1e-12))
         for i in np.argsort(-sure, kind="stable")[:_WORST]:
             page, rest = divmod(int(pixel[i]), size * size)
             instance = bake.scene.instances[int(owner[i])]

@@ -167,7 +167,7 @@ def test_the_same_seed_judges_the_same(sound):
 
 def test_a_time_limit_ends_it(sound):
     found = verify(sound, VerifySettings(texels=300, target_se=1e-6, time_limit=1.0))
-    assert found.seconds < 20
+    assert found.seconds < 60
     assert found.channels["irradiance"].unresolved > 200
 
 

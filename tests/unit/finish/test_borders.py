@@ -94,6 +94,21 @@ def test_recentring_brings_border_lookups_nearer_to_the_truth(field, noise):
         assert wrong_after < 1.12 * wrong_before
 
 
+def test_lookups_at_centroids_find_what_was_measured_there():
+    def gap(k, x, y):
+        return pages.smooth(k, x, y) * (0.05 + np.exp(-np.abs(y - pages.POLYGONS[k][0, 1])))
+
+    value, chart, offset = pages.make_page(gap)
+    covered = chart >= 0
+    page, _ = dilate(recentre(value, chart, offset), covered, chart, 2)
+    r, c = np.nonzero((chart == 0) & (np.abs(offset).max(axis=2) > 0.1))
+    assert len(r) > 50
+    at = c + 0.5 + offset[r, c, 0], r + 0.5 + offset[r, c, 1]
+    before = np.abs(pages.lookup(dilate(value, covered, chart, 2)[0], *at) / value[r, c, 0] - 1)
+    after = np.abs(pages.lookup(page, *at) / value[r, c, 0] - 1)
+    assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())
+
+
 def test_recentring_stays_in_bounds_and_leaves_whole_texels_alone():
     rng = np.random.default_rng(2)
     chart = np.zeros((24, 24), np.int32)

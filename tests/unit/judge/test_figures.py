@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baker.judge.figures import FIGURES, figures, relative_error, usual_value
+from baker.judge.figures import FIGURES, dark_floor, figures, relative_error
 
 
 def test_by_hand():
@@ -21,10 +21,17 @@ def test_by_hand():
     assert found["noise_floor"] is None
 
 
-def test_dark_places_are_held_against_a_tenth_of_what_is_usual():
+def test_dark_places_are_held_against_a_tenth_of_the_median():
     truth = np.array([[1e-6], [1.0], [1.0]])
-    error = relative_error(truth + 0.01, truth, usual_value(truth))
+    assert dark_floor(truth) == pytest.approx(0.1)
+    error = relative_error(truth + 0.01, truth, dark_floor(truth))
     np.testing.assert_allclose(error, [0.1, 0.01, 0.01], rtol=1e-4)
+
+
+def test_where_most_is_dark_they_are_held_against_a_hundredth_of_the_mean():
+    truth = np.array([[0.0], [0.0], [0.0], [400.0]])
+    assert dark_floor(truth) == pytest.approx(1.0)
+    assert dark_floor(np.zeros((0, 3))) == 0.0
 
 
 def test_noise_floor_is_what_noise_alone_shows():
@@ -35,6 +42,7 @@ def test_noise_floor_is_what_noise_alone_shows():
     found = figures(truth, reference, standard_error=np.full(truth.shape, 0.02 / np.sqrt(2)), halves=halves)
     # A map without any error shows exactly the floor.
     assert found["median"] == pytest.approx(found["noise_floor"], rel=0.05)
+    assert found["p95"] == pytest.approx(found["noise_p95"], rel=0.05)
     assert found["z_rms"] == pytest.approx(1.0, abs=0.05)
 
 
@@ -47,4 +55,4 @@ def test_nothing_judged_has_no_figures():
 def test_a_black_truth_gives_finite_figures():
     found = figures(np.full((5, 3), 0.5), np.zeros((5, 3)))
     assert all(np.isfinite(found[name]) for name in ("bias", "rmse", "median", "relmse"))
-    assert usual_value(np.zeros((5, 3))) == 0.0
+    assert dark_floor(np.zeros((5, 3))) == 0.0

@@ -6,7 +6,7 @@ from tiny_scenes import Quad, quad_atlas, quad_scene, quad_world
 from baker.core.geometry import world_geometry
 from baker.judge.choice import choose_texels
 from baker.judge.registration import best_shift, exponent
-from baker.judge.texel_area import instance_map, texel_places
+from baker.judge.texel_area import instance_map, look_up, texel_places
 
 
 def two_quads():
@@ -50,6 +50,25 @@ def test_places_lie_in_their_texel_and_fill_it_evenly():
     spread = at[whole] - np.stack([column, row], axis=1)[whole][:, None]
     np.testing.assert_allclose(spread.mean(axis=(0, 1)), 0.5, atol=0.01)
     np.testing.assert_allclose(spread.var(axis=(0, 1)), 1 / 12, rtol=0.05)
+
+
+def test_border_texels_are_looked_up_where_their_surface_is():
+    geometry = two_quads()
+    size = round(np.sqrt(len(instance_map(geometry, 1, 32).reshape(-1))))
+    pixel = np.flatnonzero(instance_map(geometry, 1, size).reshape(-1) >= 0)
+    found = texel_places(geometry, pixel, size, 64, 1)
+    whole = found.area > 0.999
+    np.testing.assert_array_equal(found.middle[whole], 0)
+    half = (found.area > 0.2) & (found.area < 0.8)
+    assert half.any()
+    assert (np.abs(found.middle[half]).max(axis=1) > 0.1).all()
+    # A page that is linear in the page: a bilinear lookup gives its value at that very place.
+    row, column = np.mgrid[:size, :size]
+    page = np.stack([row + 0.5, column + 0.5], axis=2)[None].astype(np.float32)
+    inside = ((pixel % size) % (size - 1) > 0) & ((pixel // size) % (size - 1) > 0)
+    value = look_up(page, pixel[inside], found.middle[inside])
+    at = np.stack([pixel // size, pixel % size], axis=1) + 0.5 + found.middle[:, ::-1]
+    np.testing.assert_allclose(value, at[inside], atol=1e-5)
 
 
 def test_every_object_and_every_brightness_is_chosen():

@@ -1,0 +1,119 @@
+"""Path-traces the chosen texels until they are known well enough, or time is up.
+
+A texel in the dark that only rare paths reach shows no spread at first: all its samples are black. Taken at
+its word it would be left alone, and found to be black. Each texel therefore counts as if one more of its
+samples had brought the mean light of all texels: what was not seen in n samples is known to that mean / n at
+best.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.progress import Progress, report
+from baker.judge.figures import dark_floor
+from baker.judge.texel_area import TexelPlaces
+from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
+from baker.reference.view import Reference
+
+# Passes of all texels before some are called good enough; passes beyond which AO is not followed.
+_FIRST, _MOST_OPENNESS = 8, 1024
+# Standard error of AO that is good enough, and the share of the time that AO may take; it seldom needs it.
+OPENNESS_ERROR, _OPENNESS_TIME = 0.004, 0.25
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to trace.
+
+    Attributes
+    ----------
+    spp : int or None
+        Samples of each texel, whatever its error.
+    target : float
+        Relative standard error at which a texel is good enough.
+    deadline : float or None
+        Of `time.monotonic`.
+    seed : int
+    """
+
+    spp: int | None
+    target: float
+    deadline: float | None
+    seed: int
+
+    def passes(self, estimate: PointEstimate) -> int | None:
+        """Return the passes asked for, two at least: there is no error of one."""
+        return None if self.spp is None else max(-(-self.spp // estimate.samples), 2)
+
+
+def standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
+    """Return the standard error (n, C), inf before two passes; see the head of this file."""
+    samples = np.maximum(estimate.count.sum(axis=0), 1)[:, None] * estimate.samples
+    unseen = estimate.mean.mean(axis=0) / samples
+    return np.asarray(np.hypot(estimate.standard_error, unseen), np.float64)
+
+
+def relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
+    """Return the standard error (n,) of the colour mean, relative as errors are (colours taken as one)."""
+    mean = estimate.mean
+    error = standard_error(estimate).mean(axis=1)
+    return np.asarray(error / np.maximum(mean.mean(axis=1), max(dark_floor(mean), 1e-12)), np.float64)
+
+
+def trace_openness(
+    reference: Reference, places: TexelPlaces, distance: float, effort: Effort, progress: Progress
+) -> PointEstimate:
+    """Estimate AO."""
+    estimate = new_estimate(len(places.position), 1)
+    goal = effort.passes(estimate)
+    started = time.monotonic()
+    for number in range(goal or _MOST_OPENNESS):
+        openness_pass(
+            reference, estimate, places.position, places.normal, places.face_normal,
+            distance=distance, seed=effort.seed,
+        )  # fmt: skip
+        report(progress, "ambient occlusion", (number + 1) / (goal or _MOST_OPENNESS))
+        if goal is not None or number + 1 < _FIRST:
+            continue
+        late = effort.deadline is not None and time.monotonic() > started + _OPENNESS_TIME * (
+            effort.deadline - started
+        )
+        if late or np.percentile(standard_error(estimate), 95) < OPENNESS_ERROR:
+            break
+    return estimate
+
+
+def trace_irradiance(
+    reference: Reference, places: TexelPlaces, bounces: int | None, effort: Effort, progress: Progress
+) -> PointEstimate:
+    """Estimate irradiance; texels that are good enough are left alone."""
+    estimate = new_estimate(len(places.position), 3)
+    chosen = np.arange(len(places.position))
+    goal = effort.passes(estimate)
+    started = time.monotonic()
+    while True:
+        irradiance_pass(
+            reference, estimate, places.position, places.normal, places.face_normal,
+            max_bounces=bounces, seed=effort.seed, chosen=chosen,
+        )  # fmt: skip
+        if goal is not None:
+            report(progress, "path tracing", estimate.rounds / goal)
+            if estimate.rounds >= goal:
+                break
+        elif estimate.rounds >= _FIRST:
+            error = relative_standard_error(estimate)
+            chosen = np.flatnonzero(error > effort.target)
+            share = 1.0 - len(chosen) / len(error)
+            if effort.deadline is not None:
+                share = max(share, (time.monotonic() - started) / max(effort.deadline - started, 1e-9))
+            report(progress, "path tracing", min(share, 1.0), f"{len(error) - len(chosen)} texels done")
+            if not len(chosen):
+                break
+        if effort.deadline is not None and estimate.rounds >= 2 and time.monotonic() > effort.deadline:
+            break
+    return estimate
