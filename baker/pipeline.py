@@ -140,6 +140,7 @@ def bake(
         world = prepare(scene, atlas, settings, record)
         transport = trace_transport(scene, world, channels, settings, record, farm)
         world.rays.close()
+        farm.close()
         # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
         texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
         del world

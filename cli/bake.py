@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from baker.cli.app import COMMANDS
-from baker.cli.options import build, common_flags, flag, given, setting_flags
+from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
+
+    from baker.cluster.farm import ClusterFarm
 
 
 def command() -> Any:
@@ -39,6 +41,7 @@ def job_flags() -> list[inspect.Parameter]:
         flag(
             "force", bool, typer.Option("--force", help="Replace OUT even if baker did not write it."), False
         ),
+        cluster_flag(),
     ]
 
 
@@ -49,6 +52,7 @@ def work(
     out: Path,
     config: Path | None,
     force: bool,
+    cluster: str | None,
     as_json: bool,
     quiet: bool,
     verbose: int,
@@ -67,8 +71,17 @@ def work(
         progress("start", 0.0)
         from baker.pipeline import bake
 
-        result = bake(scene, out=out, settings=resolved, progress=progress, force=force)
+        spread = {} if cluster is None else {"farm": _farm(cluster, resolved.threads)}
+        result = bake(scene, out=out, settings=resolved, progress=progress, force=force, **spread)
     if not quiet:
         write_summary(result, session.text_stream(as_json=as_json), verbose=verbose)
     if as_json:
         session.write_json(bake_json(result))
+
+
+def _farm(address: str, threads: int | None) -> ClusterFarm:
+    from baker.cluster.connection import Cluster
+    from baker.cluster.farm import ClusterFarm
+    from baker.core.parallel import thread_count
+
+    return ClusterFarm(Cluster(address, threads=thread_count(threads)))

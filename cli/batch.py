@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from baker.cli.app import COMMANDS
-from baker.cli.options import build, common_flags, flag, given, setting_flags
+from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
 
+    from baker.batch.bakery import Bakery
     from baker.batch.run import Outcome
 
 
@@ -45,6 +46,7 @@ def command() -> Any:
             False,
         ),
         flag("junit", Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")),
+        cluster_flag(),
         *setting_flags(only={"threads", "seed"}),
         *common_flags(),
     ]
@@ -61,6 +63,7 @@ def work(
     fail_fast: bool,
     force: bool,
     junit: Path | None,
+    cluster: str | None,
     as_json: bool,
     quiet: bool,
     verbose: int,
@@ -87,9 +90,8 @@ def work(
     overrides.pop("threads", None)
     todo = read_jobs(jobs_file, overrides)
     with session.reporter(quiet=quiet) as progress:
-        outcomes = run_batch(
-            todo, LocalBakery(jobs), options, progress, lambda out: session.will_write(str(out))
-        )
+        bakery = LocalBakery(jobs) if cluster is None or dry_run else _on_cluster(cluster, options.threads)
+        outcomes = run_batch(todo, bakery, options, progress, lambda out: session.will_write(str(out)))
     if junit is not None:
         write_junit(junit, outcomes)
     if not quiet:
@@ -99,6 +101,14 @@ def work(
     code = max((outcome.code for outcome in outcomes), default=0)
     if code:
         raise typer.Exit(code)
+
+
+def _on_cluster(address: str, threads: int | None) -> Bakery:
+    from baker.batch.cluster_bakery import ClusterBakery
+    from baker.cluster.connection import Cluster
+    from baker.core.parallel import thread_count
+
+    return ClusterBakery(Cluster(address, threads=thread_count(threads)))
 
 
 def write_table(outcomes: Sequence[Outcome], stream: TextIO, *, dry_run: bool) -> None:

@@ -39,6 +39,12 @@ def common_flags() -> list[inspect.Parameter]:
     ]
 
 
+def cluster_flag() -> inspect.Parameter:
+    """Return `--cluster`, of the commands that can work on more than one machine."""
+    text = "Work on a dask.distributed cluster: tcp://HOST:8786, or local:N for N processes here."
+    return flag("cluster", str | None, typer.Option("--cluster", metavar="ADDRESS", help=text))
+
+
 def setting_flags(
     *, only: Collection[str] | None = None, without: Collection[str] = ()
 ) -> list[inspect.Parameter]:

@@ -16,6 +16,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
 # Libraries that are slow to import or that a file should hide behind an interface.
 HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic", "pymeshlab")
+HEAVY += ("distributed",)
 NOT_SOURCE = {
     ".git",
     ".venv",

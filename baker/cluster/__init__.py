@@ -1,0 +1,1 @@
+"""Bakes on more than one machine."""
