@@ -17,11 +17,14 @@ from baker.io.glb_rows import gather_rows
 
 # Extensions of primitives and meshes that neither hold nor count vertices.
 _HARMLESS = frozenset({"KHR_materials_variants"})
+_FLOAT = 5126
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
-    """Return each vertex attribute of a primitive, (V, B) uint8 by name.
+    """Return each vertex attribute of a primitive, (V, B) uint8 by name, for comparison.
+
+    They are the bytes of the file, but for -0 among floats, which has become 0.
 
     Raises
     ------
@@ -30,10 +33,13 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     """
     accessors = source.json["accessors"]
     rows = np.arange(accessors[primitive["attributes"]["POSITION"]]["count"], dtype=np.int32)
-    return {
-        name: gather_rows(source.json, source.buffers, index, rows)
-        for name, index in primitive["attributes"].items()
-    }
+    column = {}
+    for name, index in primitive["attributes"].items():
+        data = gather_rows(source.json, source.buffers, index, rows)
+        if accessors[index]["componentType"] == _FLOAT and not name.startswith("_"):
+            data = (np.ascontiguousarray(data).view("<f4") + np.float32(0.0)).view(np.uint8)
+        column[name] = data
+    return column
 
 
 def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:

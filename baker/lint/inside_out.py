@@ -38,17 +38,7 @@ def inside_out(subject: Subject) -> Iterator[Found]:
     surfaces are left alone. Less than 5 % of an object's surface is a warning only.
     """
     for m, facts in enumerate(subject.meshes):
-        if not len(facts.good) or not _may_be(facts):
-            continue
-        wrong = []
-        suspect = np.flatnonzero(facts.closed & (facts.volume < 0))
-        glowing = np.array([max(material.emission) > 0 for material in facts.materials], bool)
-        for piece in suspect:
-            rows = facts.sheet[facts.piece == piece]
-            if facts.double_sided[rows].all() or glowing[facts.material[facts.good[rows]]].any():
-                continue
-            if not _inhabited(subject, m, rows, int(piece)):
-                wrong.append(rows)
+        wrong = inside_out_parts(subject, m)
         if wrong:
             rows = np.concatenate(wrong)
             share = float(facts.area[rows].sum() / facts.area.sum())
@@ -58,6 +48,23 @@ def inside_out(subject: Subject) -> Iterator[Found]:
             found = faces_found(subject, m, facts.good[rows], text)
             severity = "warning" if share < MOST_WRONG else None
             yield replace(found, percent=100.0 * share, severity=severity)
+
+
+def inside_out_parts(subject: Subject, mesh: int) -> list[NDArray[np.int64]]:
+    """Return the parts of a mesh that are inside out, each as rows of the mesh's `good` faces."""
+    facts = subject.meshes[mesh]
+    if not len(facts.good) or not _may_be(facts):
+        return []
+    wrong = []
+    suspect = np.flatnonzero(facts.closed & (facts.volume < 0))
+    glowing = np.array([max(material.emission) > 0 for material in facts.materials], bool)
+    for piece in suspect:
+        rows = facts.sheet[facts.piece == piece]
+        if facts.double_sided[rows].all() or glowing[facts.material[facts.good[rows]]].any():
+            continue
+        if not _inhabited(subject, mesh, rows, int(piece)):
+            wrong.append(rows)
+    return wrong
 
 
 def _may_be(facts: MeshFacts) -> bool:

@@ -77,7 +77,12 @@ class MeshPlan:
     left: tuple[str, ...]
 
 
-def plan_mesh(parts: Sequence[Part], *, make_normals: bool = True) -> MeshPlan:
+def plan_mesh(
+    parts: Sequence[Part],
+    *,
+    make_normals: bool = True,
+    inside_out: Sequence[NDArray[np.bool_]] | None = None,
+) -> MeshPlan:
     """Decide what stays of a mesh.
 
     Parameters
@@ -86,6 +91,8 @@ def plan_mesh(parts: Sequence[Part], *, make_normals: bool = True) -> MeshPlan:
         All its primitives of triangles.
     make_normals : bool
         Make normals where there are none. Not before a repair, which would take them for the file's own.
+    inside_out : sequence of (T,) bool, one for each primitive, or None
+        Faces of closed parts that are to be turned as a whole.
     """
     left: list[str] = []
     choices = [choose_faces(part) for part in parts]
@@ -96,9 +103,17 @@ def plan_mesh(parts: Sequence[Part], *, make_normals: bool = True) -> MeshPlan:
         for part, choice, is_free in zip(parts, choices, free, strict=True)
     ]
     flips = _choose_flips(parts, triangles, left)
+    turns = [np.zeros(len(triangle), bool) for triangle in triangles]
+    if inside_out is not None:
+        turns = [
+            mask[choice.keep] if is_free else mask
+            for mask, choice, is_free in zip(inside_out, choices, free, strict=True)
+        ]
+        turns = _unless_locked(parts, turns, "are inside out", left)
     plans: list[PartPlan] = []
     totals = _Totals()
-    for part, choice, kept, flip in zip(parts, choices, triangles, flips, strict=True):
+    for part, choice, kept, wrong, inward in zip(parts, choices, triangles, flips, turns, strict=True):
+        flip = wrong ^ inward
         turned_faces = np.where(flip[:, None], kept[:, [0, 2, 1]], kept)
         good = part.arrays.triangle[choice.keep] if part.locked else turned_faces
         normals = _normals(part, good, make=make_normals)
@@ -113,7 +128,8 @@ def plan_mesh(parts: Sequence[Part], *, make_normals: bool = True) -> MeshPlan:
         if choice.n_unlike:
             left.append(_unlike_sentence(part, choice.n_unlike))
         plans.append(turn_faces(part, turned_faces, flip, touched=wanted, normals=normals))
-        totals.add(choice, len(np.unique(kept)), n_doubles, int(flip.sum()), normals)
+        totals.add(choice, len(np.unique(kept)), n_doubles, normals)
+        totals.add_turned(int(wrong.sum()), int(inward.sum()))
     return MeshPlan(tuple(plans), totals.changes(), tuple(left))
 
 
@@ -139,7 +155,9 @@ def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> Mended
     column = [data for name, data in part.column.items() if name not in replaced]
     row = first_equal(column, len(part.arrays.position))[plan.triangle].reshape(-1)
     own: list[NDArray[np.generic]] = [row.reshape(-1, 1), plan.turned.reshape(-1, 1)]
-    own += [] if plan.normal is None else [plan.normal.reshape(-1, 3)]
+    # + 0 makes -0 equal to 0, as it is to every reader.
+    normal = None if plan.normal is None else plan.normal.reshape(-1, 3) + np.float32(0.0)
+    own += [] if normal is None else [normal]
     own += [] if uv is None else [uv.reshape(-1, 2)]
     corner, place = compact(first_equal(own, len(row)))
     # Vertices stay in the file's order.
@@ -150,7 +168,7 @@ def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> Mended
     return MendedPrimitive(
         row=row[corner],
         triangle=rank[place].reshape(-1, 3),
-        normal=None if plan.normal is None else plan.normal.reshape(-1, 3)[corner],
+        normal=None if normal is None else normal[corner],
         turned=plan.turned.reshape(-1)[corner],
         uv=None if uv is None else uv.reshape(-1, 2)[corner],
     )
@@ -219,18 +237,21 @@ def _choose_flips(
     winding = judge_winding(position, place[joined[drawn]], normal)
     if winding.n_one_sided:
         left.append(f"{winding.n_one_sided} closed pieces have no outside (like a Klein bottle)")
-    if winding.inward.any():
-        left.append(
-            f"{int(winding.inward.sum())} faces of closed pieces look inwards: right for a room seen from"
-            " inside, else turn them in the scene they come from"
-        )
     flip = np.zeros(len(joined), bool)
     flip[np.flatnonzero(drawn)[winding.flip]] = True
-    locked = [part.locked for k, part in enumerate(parts) if part.locked and flip[owner == k].any()]
-    if locked:
-        left.append(f"{int(flip.sum())} faces look the wrong way, but {locked[0]}")
-        return nothing
-    return [flip[owner == k] for k in range(len(parts))]
+    flips = [flip[owner == k] for k in range(len(parts))]
+    return _unless_locked(parts, flips, "look the wrong way", left)
+
+
+def _unless_locked(
+    parts: Sequence[Part], flips: list[NDArray[np.bool_]], what: str, left: list[str]
+) -> list[NDArray[np.bool_]]:
+    """Return the faces to turn, none of the mesh if some of them must stay as they are."""
+    locked = [part.locked for part, flip in zip(parts, flips, strict=True) if part.locked and flip.any()]
+    if not locked:
+        return flips
+    left.append(f"{sum(int(flip.sum()) for flip in flips)} faces {what}, but {locked[0]}")
+    return [np.zeros(len(flip), bool) for flip in flips]
 
 
 def _face_mean(part: Part, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -269,9 +290,7 @@ class _Totals:
         self._vertices = 0
         self._n: dict[str, int] = {}
 
-    def add(
-        self, choice: FaceChoice, n_vertices: int, n_doubles: int, n_flipped: int, normals: NormalChoice
-    ) -> None:
+    def add(self, choice: FaceChoice, n_vertices: int, n_doubles: int, normals: NormalChoice) -> None:
         self._faces += len(choice.keep) - choice.n_stitches
         self._vertices += n_vertices
         for name, count in (
@@ -279,11 +298,16 @@ class _Totals:
             ("zero-area-faces", choice.n_zero_area),
             ("duplicate-faces", choice.n_duplicate),
             ("duplicate-vertices", n_doubles),
-            ("winding", n_flipped),
+            ("winding", 0),
+            ("inside-out", 0),
             ("missing-normals", normals.n_missing),
             ("bad-normals", normals.n_empty + normals.n_long),
         ):
             self._n[name] = self._n.get(name, 0) + count
+
+    def add_turned(self, n_wrong: int, n_inward: int) -> None:
+        self._n["winding"] += n_wrong
+        self._n["inside-out"] += n_inward
 
     def changes(self) -> tuple[Change, ...]:
         found = []
@@ -303,6 +327,7 @@ class _Totals:
 
 _COUNTED = {
     "winding": "faces that look the wrong way",
+    "inside-out": "faces of closed parts that look inwards, with nothing in them",
     "missing-normals": "vertices without normal",
     "bad-normals": "vertices with a normal not of unit length",
 }

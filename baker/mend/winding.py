@@ -2,7 +2,7 @@
 
 A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
 Which side its faces should look to is read from what the file says of it: from the vertex normals if they
-take sides, else from the larger part of the faces as they are. A room seen from inside stays one.
+take sides, else from the larger part of the faces as they are.
 """
 
 from __future__ import annotations
@@ -30,14 +30,11 @@ class Winding:
         Closed pieces with faces to be turned.
     n_one_sided : int
         Closed pieces that cannot be wound consistently (like a Klein bottle).
-    inward : (T,) bool
-        Faces of closed pieces that look inwards throughout and whose normals agree: a room, or inside out.
     """
 
     flip: NDArray[np.bool_]
     n_pieces: int
     n_one_sided: int
-    inward: NDArray[np.bool_]
 
 
 def judge_winding(
@@ -65,12 +62,11 @@ def judge_winding(
     Winding
     """
     n = len(corner)
-    nothing = np.zeros(n, bool)
     edge = _Edges(corner)
     piece, closed = edge.pieces(n, open_too=open_too)
     closed_face = closed[piece]
     if not closed_face.any():
-        return Winding(nothing, 0, 0, nothing)
+        return Winding(np.zeros(n, bool), 0, 0)
     first_side, one_sided = _orient(edge, n, closed_face)
     n_pieces_all = int(piece.max()) + 1
     faulty = np.bincount(piece, one_sided, n_pieces_all) > 0
@@ -98,9 +94,7 @@ def judge_winding(
     right = np.where(np.abs(by_normal) > _CLEAR, np.sign(by_normal), leaning)
     flip = judged & (sign != right[piece])
     turned = np.bincount(piece, flip, n_pieces_all) > 0
-    flat = np.abs(volume) <= 1e-9 * total**1.5
-    inward = judged & (right != outside)[piece] & ~turned[piece] & ~flat[piece]
-    return Winding(flip, int(turned.sum()), int((closed & faulty).sum()), inward)
+    return Winding(flip, int(turned.sum()), int((closed & faulty).sum()))
 
 
 def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from baker.io.load import SceneFile, importers, load_scene
 from baker.mend.mesh import Change, finish_part, plan_mesh
 from baker.mend.meshlab import require_meshlab
 from baker.mend.part import Part
+from baker.mending.inside_out import faces_to_turn
 from baker.mending.lightmap_uv import new_lightmap_uv
 from baker.mending.repair import repair_mesh
 
@@ -154,14 +155,22 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     elif not _names_files(scene.source):
         written = path.read_bytes()
         data = written if written[:4] == b"glTF" else None
-    first = _mend(scene, data, settings, progress, make_normals=not settings.repair)
-    if not settings.repair:
-        return first
-    repaired = _repair(_read_glb(path, first.data), first, progress)
-    # What was repaired may now have double vertices, or need other lightmap uv.
-    second = _mend(_read_glb(path, repaired.data), repaired.data, settings, progress)
-    left = dict.fromkeys((*repaired.left_alone, *second.left_alone))
-    return Mended(second.data, (*repaired.fixed, *second.fixed), tuple(left))
+    mended = _mend(scene, data, settings, progress, make_normals=not settings.repair)
+    if settings.repair:
+        mended = _repair(_read_glb(path, mended.data), mended, progress)
+        # What was repaired may now have double vertices, or need normals or other lightmap uv.
+        mended = _and_then(mended, _mend(_read_glb(path, mended.data), mended.data, settings, progress))
+    tidy = _read_glb(path, mended.data)
+    wrong = faces_to_turn(tidy)
+    if wrong:
+        mended = _and_then(mended, _mend(tidy, mended.data, settings, progress, inside_out=wrong))
+    return mended
+
+
+def _and_then(first: Mended, second: Mended) -> Mended:
+    """Return what two steps did; what the second still finds to leave alone is told once."""
+    left = dict.fromkeys((*first.left_alone, *second.left_alone))
+    return Mended(second.data, (*first.fixed, *second.fixed), tuple(left))
 
 
 def _mend(
@@ -171,6 +180,7 @@ def _mend(
     progress: Progress,
     *,
     make_normals: bool = True,
+    inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
 ) -> Mended:
     """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
     source, raw = _parsed(scene)
@@ -182,7 +192,11 @@ def _mend(
         report(progress, STAGE, number / len(raw.meshes), mesh.name)
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
-        plan = plan_mesh(_parts(source, index, mesh), make_normals=make_normals)
+        plan = plan_mesh(
+            _parts(source, index, mesh),
+            make_normals=make_normals,
+            inside_out=(inside_out or {}).get(number),
+        )
         plan, uv = new_lightmap_uv(
             plan,
             shown,

@@ -235,6 +235,37 @@ def test_tangents_of_turned_faces_keep_their_bitangent(tmp_path):
         assert two[key] == pytest.approx(one[key], abs=1e-6)
 
 
+@pytest.mark.parametrize("normals", [True, False])
+@pytest.mark.parametrize("inside", ["nothing", "lamp", "skin"])
+def test_a_body_inside_out_is_turned_and_a_room_is_not(inside, normals, tmp_path):
+    b = GltfBuilder()
+    position, triangle = box()
+    members = {"NORMAL": -away_from(position, (0.5,) * 3)} if normals else {}
+    if inside == "skin":
+        members["JOINTS_0"] = np.zeros((8, 4), np.uint8)
+        members["WEIGHTS_0"] = np.tile(np.float32([1, 0, 0, 0]), (8, 1))
+    b.node(mesh=b.mesh(b.primitive(position, triangle[:, ::-1].astype(np.uint16), **members)), name="crate")
+    if inside == "lamp":
+        b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
+        b.json["extensionsUsed"] = ["KHR_lights_punctual"]
+        b.node(translation=[0.5, 0.5, 0.5], extensions={"KHR_lights_punctual": {"light": 0}})
+    _, after, mended = mend_builder(b, tmp_path)
+    done = {fix.change.change: (fix.change.before, fix.change.after) for fix in mended.fixed}
+    primitive = after.json["meshes"][0]["primitives"][0]
+    place = after.corners(primitive, "POSITION").astype(np.float64)
+    front = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
+    outwards = np.einsum("tx,tx->t", front, place.mean(axis=1) - 0.5) > 0
+    if inside == "nothing":
+        assert done["inside-out"] == (12, 0)
+        assert outwards.all()
+        assert (np.einsum("tkx,tx->tk", after.corners(primitive, "NORMAL"), front) > 0).all()
+    else:
+        assert "inside-out" not in done
+        assert not outwards.any()
+    if inside == "skin":
+        assert "12 faces are inside out, but it is skinned" in {left.reason for left in mended.left_alone}
+
+
 @pytest.mark.parametrize("shape", ["zero scale", "shared"])
 def test_a_mesh_is_mended_once_for_all_its_nodes(shape, tmp_path):
     b = box_builder()
