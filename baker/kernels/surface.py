@@ -184,7 +184,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
     size, least = surface.size, surface.least
     full = _u(0)
     same = len(wanted) == 1
-    x0 = y0 = t = first = last = np.int64(0)
+    x0 = y0 = t = first = last = 0
     seed_x = seed_y = _u(0)
     total = a = b = c = d = g = h = 0.0
     sign = 1.0

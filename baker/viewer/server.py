@@ -11,6 +11,7 @@ import contextlib
 import errno
 import json
 from collections.abc import Callable
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 from baker.io.bake_folder import StoredBake
@@ -108,15 +110,12 @@ def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
     for name, path in three.files.items():
         answers[f"/three/{name}"] = _file(path)
     for number, image in enumerate(data.images):
-        answers[f"/image/{number}"] = (_BYTES, lambda image=image: np.ascontiguousarray(image).tobytes())
+        answers[f"/image/{number}"] = (_BYTES, partial(_bytes, image))
     for page in range(bake.atlas.n_pages):
-        answers[f"/status/{page}"] = (_BYTES, lambda page=page: bake.status[page].tobytes())
+        answers[f"/status/{page}"] = (_BYTES, partial(_bytes, bake.status[page]))
         for name, value in bake.maps.items():
             if page < len(value):
-                answers[f"/page/{name}/{page}"] = (
-                    _BYTES,
-                    lambda value=value, page=page: page_numbers(value[page]).tobytes(),
-                )
+                answers[f"/page/{name}/{page}"] = (_BYTES, partial(_page_bytes, value[page]))
     folder = bake.folder.resolve()
     for name in own_files(folder) or ():
         # A manifest is only text: a file that it names may lie anywhere.
@@ -124,6 +123,14 @@ def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
         if path.is_relative_to(folder) and path.is_file():
             answers[f"/out/{name}"] = _file(path)
     return answers
+
+
+def _bytes(array: NDArray[Any]) -> bytes:
+    return np.ascontiguousarray(array).tobytes()
+
+
+def _page_bytes(page: NDArray[np.float32]) -> bytes:
+    return page_numbers(page).tobytes()
 
 
 def _file(path: Path) -> Answer:
