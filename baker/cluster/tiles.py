@@ -82,7 +82,7 @@ def _no_more(world: Any, arrays: Mapping[str, NDArray[Any]]) -> None:
 def _make_patches(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     from baker.radiosity.patches import build_patches
 
-    patches = build_patches(world.texels)
+    patches = build_patches(world.texels, arrays["depth"])
     return patches, world.texels.hit_image(patches.patch, fill=-1)
 
 
