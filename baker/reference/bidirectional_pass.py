@@ -33,14 +33,14 @@ def surface_tile(
     net: NDArray[np.uint32],
     setting: NDArray[np.int64],
     out: NDArray[np.float64],
-) -> int:
-    """Add E / pi of surface points to `out` (m, 3); see `irradiance_pass`. Return the rays cast."""
+) -> tuple[int, int]:
+    """Add E / pi of points to `out` (m, 3), see `irradiance_pass`; return closest-hit and shadow rays."""
     rays, shadows, _ = trace_both_ways(
         *places, begin, np.zeros(15), 0.0, reference.surfaces, reference.lamps, reference.shading,
         reference.sphere, new_caster(reference.rays.tracer), net, setting, out, np.zeros(0, np.int64),
         np.zeros((0, 3)),
     )  # fmt: skip
-    return int(rays + shadows)
+    return int(rays), int(shadows)
 
 
 def picture_pass(
@@ -69,7 +69,6 @@ def picture_pass(
         ]
     )
     seen, splatted = np.zeros((n, 3)), np.zeros((n, 3))
-    rays = 0
     for block in range(0, n, _BLOCK):
         span = min(_BLOCK, n - block)
         found: list[Any] = [None] * -(-span // _TILE)
@@ -86,17 +85,17 @@ def picture_pass(
                 reference.shading, reference.sphere, new_caster(reference.rays.tracer), net, setting,
                 seen[span], splat_pixel, splat,
             )  # fmt: skip
-            found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast + shadows)
+            found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast, shadows)
 
         def told(stage: str, fraction: float, detail: str = "", block: int = block, span: int = span) -> Any:
             return progress(stage, (block + fraction * span) / n, detail)
 
         run_tiles(span, _TILE, work, threads=reference.threads, stage="path tracing", progress=told)
         # The order of tiles, not that of threads.
-        for splat_pixel, splat, cast in found:
+        for splat_pixel, splat, cast, shadows in found:
             for c in range(3):
                 splatted[:, c] += np.bincount(splat_pixel, splat[:, c], n)
-            rays += int(cast)
+            estimate.segments += int(cast)
+            estimate.rays += int(cast + shadows)
     add_pass(estimate, np.arange(n), (seen + splatted) / samples)
     estimate.rounds += 1
-    estimate.rays += rays

@@ -41,7 +41,8 @@ class PointEstimate:
         Samples of a point in each pass.
     rounds : int
         Number of the next pass.
-    rays : int
+    rays, segments : int
+        All rays cast, and the closest-hit rays of paths among them.
     """
 
     total: NDArray[np.float64]
@@ -50,6 +51,7 @@ class PointEstimate:
     samples: int
     rounds: int = 0
     rays: int = 0
+    segments: int = 0
 
     @property
     def mean(self) -> NDArray[np.float64]:
@@ -112,7 +114,7 @@ def irradiance_pass(
     picked = np.arange(len(position)) if chosen is None else chosen
     net = sobol_reversed(samples, seed, 1 + number)
     setting = path_setting(how, how.strata or stratify, max_bounces, seed, number)
-    counted = np.zeros(-(-len(picked) // _TILE), np.int64)
+    counted = np.zeros((-(-len(picked) // _TILE), 2), np.int64)
 
     def work(begin: int, end: int) -> None:
         rows = picked[begin:end]
@@ -127,12 +129,13 @@ def irradiance_pass(
                 *places, begin, True, reference.surfaces, reference.lamps, reference.shading,
                 new_caster(reference.rays.tracer), net, setting, out,
             )  # fmt: skip
-            counted[begin // _TILE] = sum(cast)
+            counted[begin // _TILE] = cast
         add_pass(estimate, rows, out * (math.pi / samples))
 
     run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
     estimate.rounds += 1
     estimate.rays += int(counted.sum())
+    estimate.segments += int(counted[:, 0].sum())
 
 
 def openness_pass(

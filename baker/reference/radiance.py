@@ -55,7 +55,7 @@ def radiance_pass(
 
         picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
         return
-    counted = np.zeros(-(-width * height // _TILE), np.int64)
+    counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
     eye = np.array(camera.position)
 
     def work(begin: int, end: int) -> None:
@@ -67,9 +67,10 @@ def radiance_pass(
             origin, way, way, begin, False, reference.surfaces, reference.lamps, reference.shading,
             new_caster(reference.rays.tracer), net, setting, out,
         )  # fmt: skip
-        counted[begin // _TILE] = sum(cast)
+        counted[begin // _TILE] = cast
         add_pass(estimate, pixel, out / samples)
 
     run_tiles(width * height, _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
     estimate.rounds += 1
     estimate.rays += int(counted.sum())
+    estimate.segments += int(counted[:, 0].sum())
