@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.errors import SettingsError
 from baker.core.scene import Camera
 from baker.kernels.sampling import hash_u32
+from baker.reference.randomness import mix64
 
 
 def parse_camera(text: str) -> Camera:
@@ -66,29 +68,46 @@ def camera_rays(
     number : int
         The pass.
     """
-    k = np.arange(samples)
-    # Kronecker lattice of the plastic number (Roberts 2018): even for any count.
-    lattice = np.stack([(k * 0.7548776662466927) % 1.0, (k * 0.5698402909980532) % 1.0], axis=1)
-    shift = np.stack([_uniform(pixel, seed, 2 * number), _uniform(pixel, seed, 2 * number + 1)], axis=1)
-    inside = (lattice[None] + shift[:, None]) % 1.0
-    row, column = np.divmod(pixel, width)
-    high = math.tan(0.5 * camera.fov)
-    x = (2 * (column[:, None] + inside[..., 0]) / width - 1) * high * width / height
-    y = (1 - 2 * (row[:, None] + inside[..., 1]) / height) * high
-    way = (
-        np.array(camera.forward) + x[..., None] * np.array(camera.right) + y[..., None] * np.array(camera.up)
+    lens = np.array([*camera.right, *camera.up, *camera.forward, math.tan(0.5 * camera.fov)])
+    way = np.zeros((len(pixel), samples, 3))
+    _fill(lens, width, height, pixel, _salt(seed, 2 * number), _salt(seed, 2 * number + 1), way)
+    return way
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-untyped-def]
+    """Write unit directions to `way` (n, samples, 3).
+
+    lens : (10,) float64: right, up, forward, tangent of half the height; first, second : uint64 salts
+    """
+    high = lens[9]
+    for i in range(len(pixel)):
+        row, column = pixel[i] // width, pixel[i] % width
+        u, v = _uniform(pixel[i], first), _uniform(pixel[i], second)
+        for k in range(way.shape[1]):
+            # Kronecker lattice of the plastic number (Roberts 2018): even for any count.
+            x = (k * 0.7548776662466927 + u) % 1.0
+            y = (k * 0.5698402909980532 + v) % 1.0
+            x = (2.0 * (column + x) / width - 1.0) * high * width / height
+            y = (1.0 - 2.0 * (row + y) / height) * high
+            square = 0.0
+            for a in range(3):
+                way[i, k, a] = lens[6 + a] + x * lens[a] + y * lens[3 + a]
+                square += way[i, k, a] * way[i, k, a]
+            scale = 1.0 / math.sqrt(square)
+            for a in range(3):
+                way[i, k, a] *= scale
+
+
+def _salt(seed: int, number: int) -> np.uint64:
+    """Return what makes the numbers of a seed and pass differ from all others."""
+    word = int(hash_u32(np.uint32((seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF)))
+    return np.uint64(word << 17)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _uniform(pixel, salt):  # type: ignore[no-untyped-def]
+    """Return a uniform number of a pixel."""
+    return np.float64(mix64(np.uint64(pixel + 1) * np.uint64(0x9E3779B97F4A7C15) ^ salt) >> np.uint64(11)) * (
+        1.0 / 9007199254740992.0
     )
-    unit: NDArray[np.float64] = way / np.linalg.norm(way, axis=2, keepdims=True)
-    return unit
-
-
-def _uniform(pixel: NDArray[np.int64], seed: int, salt: int) -> NDArray[np.float64]:
-    """Return a uniform number for each pixel."""
-    word = np.uint64(int(hash_u32(np.uint32((seed * 0x9E3779B1 + salt * 0x85EBCA77 + 1) & 0xFFFFFFFF))))
-    x = (pixel.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15) + (word << np.uint64(17))
-    x ^= x >> np.uint64(31)
-    x *= np.uint64(0xBF58476D1CE4E5B9)
-    x ^= x >> np.uint64(29)
-    x *= np.uint64(0x94D049BB133111EB)
-    x ^= x >> np.uint64(32)
-    return (x >> np.uint64(11)).astype(np.float64) / 9007199254740992.0
