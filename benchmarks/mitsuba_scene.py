@@ -66,7 +66,8 @@ def mitsuba_scene(scene: Scene, reference: Reference, **more: Any) -> Any:
             }
         else:
             raise ValueError("Mitsuba's spots fall off in another way than glTF's")
-    return mi.load_dict(parts)
+    # Else equal parts of a dictionary become one, and a meter can stand in one place only.
+    return mi.load_dict(parts, optimize=False)
 
 
 def mitsuba_camera(camera: Camera, width: int, height: int) -> dict[str, Any]:

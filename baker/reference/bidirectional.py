@@ -38,6 +38,7 @@ from baker.reference.bsdf import N_PARAMETERS, bsdf_sample
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.paths import start_path, stratum
 from baker.reference.randomness import draw, path_state
+from baker.reference.step import step
 from baker.reference.vertex import (
     BETA,
     BOUNCES,
@@ -64,7 +65,7 @@ _MOST = 0.98
 _SHORT = 0.9999
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, least):  # type: ignore[no-untyped-def]
     """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
     at_surface = n_subpaths == 0.0
@@ -80,7 +81,7 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, lea
         path[OPEN, lane] = n_subpaths
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ignore[no-untyped-def]
     """Choose the direction in which a subpath goes on; return False where it ends.
 
@@ -123,7 +124,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ign
     return most > 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: ignore[no-untyped-def]
     """Connect an eye subpath's end to vertex k of `kept`, the s-th of a lamp's; return if that brings light.
 
@@ -158,7 +159,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: 
     return total > 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-untyped-def]
     """Connect a lamp's subpath to the camera; return the pixel it is seen through, or -1.
 

@@ -22,6 +22,7 @@ from baker.reference.lamps import RADIANCE, triangle_density
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.lamps import TWO_SIDED as LAMP_TWO_SIDED
 from baker.reference.randomness import draw, path_state
+from baker.reference.step import step
 from baker.reference.vertex import (
     BETA,
     BOUNCES,
@@ -51,7 +52,7 @@ _SURE = 3
 _MOST = 0.98
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def start_path(path, row, lane, where, toward, normal, at_surface, least):  # type: ignore[no-untyped-def]
     """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
 
@@ -77,13 +78,13 @@ def start_path(path, row, lane, where, toward, normal, at_surface, least):  # ty
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def see_emitter(path, lane, surface, triangle, prim, distance, mode, power, value):  # type: ignore[no-untyped-def]
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
     Its texture is not looked up yet.
     """
-    value[:] = 0.0
+    value[0] = value[1] = value[2] = 0.0
     e = np.int64(surface[prim, EMITTER])
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
@@ -99,7 +100,7 @@ def see_emitter(path, lane, surface, triangle, prim, distance, mode, power, valu
         value[c] = path[BETA + c, lane] * triangle[e, RADIANCE + c] * weight
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def see_sky(path, lane, sky, mode, power):  # type: ignore[no-untyped-def]
     """Collect the sky's light at the end of a path that leaves the scene."""
     weight = 1.0
@@ -275,7 +276,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     return rays, shadows
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
     """Return numbers of a scrambled (0,2)-net, scrambled anew for each point, pass and pair."""
     bits = path_state(seed, number_of_pass, point, np.uint64(1) << np.uint64(40 + pair))

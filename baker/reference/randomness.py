@@ -8,14 +8,15 @@ Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators,
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from baker.reference.step import step
 
 _u = np.uint64
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 _INV_2_53 = 1.0 / 9007199254740992.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def mix64(x):  # type: ignore[no-untyped-def]
     """Return a well-mixed uint64 of a uint64."""
     x = _u(x ^ (x >> _u(30)))
@@ -25,7 +26,7 @@ def mix64(x):  # type: ignore[no-untyped-def]
     return _u(x ^ (x >> _u(31)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
     """Return the state (uint64) of sample `sample` of point `point` in pass `number`."""
     x = mix64(_u(_u(seed) + _STEP))
@@ -34,7 +35,7 @@ def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
     return mix64(_u(x ^ _u(_u(sample) + _u(1)) * _STEP))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def draw(state, lane):  # type: ignore[no-untyped-def]
     """Advance `state` (16,) uint64 of a lane and return a float64 in [0, 1)."""
     state[lane] = _u(state[lane] + _STEP)

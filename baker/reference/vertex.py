@@ -32,6 +32,7 @@ from baker.reference.lamps import (
     aim_at_triangle,
     pick_lamp,
 )
+from baker.reference.step import step
 from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
 
 # Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
@@ -46,7 +47,7 @@ _OFFSET = 1.0e-5
 _SHORT = 0.9999
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Write the frame around a unit shading normal."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
@@ -55,7 +56,7 @@ def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
     path[FRAME + 6, lane], path[FRAME + 7, lane], path[FRAME + 8, lane] = nx, ny, nz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return a world direction in the frame of the vertex."""
     return (
@@ -65,7 +66,7 @@ def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`."""
     step = _OFFSET * max(abs(x), abs(y), abs(z), least)
@@ -74,7 +75,7 @@ def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     path[PLACE + 2, lane] = z + step * path[NORMAL + 2, lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v
@@ -145,7 +146,7 @@ def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
             )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def heuristic(own, other, power):  # type: ignore[no-untyped-def]
     """Return the MIS weight of a technique of density `own` against one of density `other`."""
     if power:
@@ -153,7 +154,7 @@ def heuristic(own, other, power):  # type: ignore[no-untyped-def]
     return own / (own + other) if own > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):  # type: ignore[no-untyped-def]
     """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
 
@@ -228,7 +229,7 @@ def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-de
             value[c] *= rgba[c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@step
 def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[no-untyped-def]
     """Choose the direction in which the path goes on; return False where it ends.
 
