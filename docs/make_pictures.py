@@ -1,4 +1,4 @@
-"""Makes the pictures of the docs: bakes the project's scenes and looks at them through a pinhole camera.
+"""Makes the pictures of the docs: bakes the project's scenes and looks at them through their cameras.
 
     python docs/make_pictures.py            needs baker and nothing else
 
@@ -25,32 +25,22 @@ from baker.shading.materials import resolve_materials
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "assets"
-# name: file, settings, camera position, target, vertical field of view in degrees
+# name: file, settings; the camera is the file's own
 VIEWS = {
-    "cornell": ("cornell.glb", {"quality": "high", "resolution": 1024}, (0, 1, 3.4), (0, 1, 0), 38),
-    "interior": ("interior.glb", {"quality": "high", "resolution": 1024}, (3.6, 1.6, 2.2), (-2, 1.1, -1), 65),
-    "hall": (
-        "hall.glb",
-        {"quality": "high", "resolution": 2048, "sky": "0.6,0.8,1.2"},
-        (6, 2, 3.5),
-        (-6, 2, -1),
-        65,
-    ),
+    "cornell": ("cornell.glb", {"quality": "high", "resolution": 1024}),
+    "interior": ("interior.glb", {"quality": "high", "resolution": 1024}),
+    "hall": ("hall.glb", {"quality": "high", "resolution": 2048, "sky": "0.6,0.8,1.2"}),
 }
 WIDTH, HEIGHT, SAMPLES = 960, 720, 4
 
 
-def camera_rays(eye, target, fov, shift):
+def camera_rays(camera, shift):
     """Return directions (HEIGHT * WIDTH, 3) of a pinhole camera, pixels shifted by `shift`."""
-    eye, target = np.array(eye, float), np.array(target, float)
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, (0.0, 1.0, 0.0))
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    tall = np.tan(np.radians(fov) / 2)
+    tall = np.tan(camera.fov / 2)
     x = ((np.arange(WIDTH) + shift[0]) / WIDTH * 2 - 1) * tall * WIDTH / HEIGHT
     y = (1 - (np.arange(HEIGHT) + shift[1]) / HEIGHT * 2) * tall
-    direction = forward + x[None, :, None] * right + y[:, None, None] * up
+    right, up = np.array(camera.right), np.array(camera.up)
+    direction = np.array(camera.forward) + x[None, :, None] * right + y[:, None, None] * up
     return (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).reshape(-1, 3)
 
 
@@ -68,8 +58,9 @@ def bilinear(image, uv):
     return total
 
 
-def draw(result: BakeResult, eye, target, fov, channel="irradiance") -> np.ndarray:
-    """Return the view (HEIGHT, WIDTH, 3), linear, of a bake."""
+def draw(result: BakeResult, channel="irradiance") -> np.ndarray:
+    """Return what the file's first camera sees of a bake, (HEIGHT, WIDTH, 3), linear."""
+    camera = result.scene.cameras[0]
     geometry = world_geometry(result.scene, result.atlas)
     shading = resolve_materials(result.scene, geometry)
     texels, _ = build_texels(geometry, shading, result.atlas, seed=0, threads=1, progress=silent)
@@ -79,8 +70,8 @@ def draw(result: BakeResult, eye, target, fov, channel="irradiance") -> np.ndarr
     TriangleMesh(scene, geometry.position, geometry.triangle)
     total = np.zeros((WIDTH * HEIGHT, 3))
     for shift in np.random.default_rng(0).random((SAMPLES, 2)):
-        direction = camera_rays(eye, target, fov, shift).astype(np.float32)
-        origin = np.tile(np.array(eye, np.float32), (len(direction), 1))
+        direction = camera_rays(camera, shift).astype(np.float32)
+        origin = np.tile(np.array(camera.position, np.float32), (len(direction), 1))
         hit = scene.run(origin, direction, output=True)
         on = hit["primID"] >= 0
         prim, u, v = hit["primID"][on], hit["u"][on], hit["v"][on]
@@ -113,12 +104,12 @@ def main(names: list[str]) -> None:
     folder = HERE / "pictures"
     folder.mkdir(exist_ok=True)
     for name in names or list(VIEWS):
-        file, settings, eye, target, fov = VIEWS[name]
+        file, settings = VIEWS[name]
         result = baker.bake(SCENES / file, **settings)
-        picture = draw(result, eye, target, fov)
+        picture = draw(result)
         lit = picture.mean(axis=2)
         encode(picture, 0.25 / np.median(lit[lit > 0])).save(folder / f"{name}.png", optimize=True)
-        encode(draw(result, eye, target, fov, "ao"), 1.0).save(folder / f"{name}_ao.png", optimize=True)
+        encode(draw(result, "ao"), 1.0).save(folder / f"{name}_ao.png", optimize=True)
         page = result.lightmaps["irradiance"].value[0]
         bright = page.mean(axis=2)
         atlas = encode(page, 0.25 / np.median(bright[bright > 0]))
