@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Longest list shown item by item; the rest is counted (all of it with -v and with --json).
 SHOWN = 20
+# Longest text in a table, which leaves a hash its beginning; -v shows all of it.
+LONGEST = 24
 
 
 def command() -> Any:
@@ -72,16 +74,38 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
                 stream.write(f"{pad}{key} ({len(item)}):\n" if isinstance(item, list) else f"{pad}{key}:\n")
                 write_tree(item, stream, depth=depth + 1, limit=limit)
         return
-    for item in value[:limit]:
-        if isinstance(item, dict) and all(_plain(part) for part in item.values()):
-            stream.write(pad + "- " + ", ".join(f"{key} {_words(part)}" for key, part in item.items()) + "\n")
-        elif _plain(item):
+    rows = value[:limit]
+    if all(isinstance(item, dict) and all(_plain(part) for part in item.values()) for item in rows):
+        _write_table(rows, stream, pad=pad, short=limit is not None)
+        rows = []
+    for item in rows:
+        if _plain(item):
             stream.write(f"{pad}- {_words(item)}\n")
         else:
             stream.write(f"{pad}-\n")
             write_tree(item, stream, depth=depth + 1, limit=limit)
     if limit is not None and len(value) > limit:
         stream.write(f"{pad}... and {len(value) - limit} more (-v shows all)\n")
+
+
+def _write_table(rows: list[dict[str, Any]], stream: TextIO, *, pad: str, short: bool) -> None:
+    """Write rows under their keys; `short` cuts what is too long to be read in a table, like hashes."""
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [[_cell(key, _words(row.get(key, "")), short=short) for key in keys] for row in rows]
+    widths = [max(len(line[index]) for line in [keys, *cells]) for index in range(len(keys))]
+    numbers = [all(isinstance(row.get(key, 0), int | float) for row in rows) for key in keys]
+    for line in [keys, *cells]:
+        words = (
+            word.rjust(width) if number else word.ljust(width)
+            for word, width, number in zip(line, widths, numbers, strict=True)
+        )
+        stream.write(f"{pad}{'  '.join(words).rstrip()}\n")
+
+
+def _cell(key: str, words: str, *, short: bool) -> str:
+    if key == "message":
+        return words  # a sentence is there to be read
+    return words[: LONGEST - 3] + "..." if short and len(words) > LONGEST else words
 
 
 def _plain(value: Any) -> bool:

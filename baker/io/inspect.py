@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -148,6 +149,10 @@ def _scene(path: Path, scene: Scene) -> dict[str, Any]:
         "lights": [
             {"kind": light.kind, "name": light.name, "node": light.node, "intensity": list(light.intensity)}
             for light in scene.lights
+        ],
+        "cameras": [
+            {"name": c.name, "node": c.node, "position": list(c.position), "fov": math.degrees(c.fov)}
+            for c in scene.cameras
         ],
         "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in scene.warnings],
     }

@@ -249,17 +249,20 @@ def test_inspect_prints_text_and_json(monkeypatch, command):
     found = {
         "kind": "scene",
         "triangles": 32,
-        "nodes": [{"name": f"n{k}", "mesh": k} for k in range(25)],
+        "nodes": [{"name": f"n{k}", "mesh": k, "sha256": "0" * 64} for k in range(25)],
         "lights": [],
+        "warnings": [{"code": "odd", "message": "a sentence that is longer than any hash in a table"}],
     }
     monkeypatch.setitem(sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path: found))
     code, out = command("inspect", "a.glb", "--threads", "1", "--seed", "2")
     assert code == 0
     assert "triangles: 32\n" in out
-    assert "- name n19, mesh 19\n" in out
+    assert "nodes (25):\n  name  mesh  sha256\n  n0       0  " + "0" * 21 + "...\n" in out
+    assert "\n  n19     19  " in out
     assert "... and 5 more" in out
     assert "lights: none" in out
-    assert "name n24" in command("inspect", "a.glb", "-v")[1]
+    assert "odd   a sentence that is longer than any hash in a table\n" in out
+    assert "n24     24  " + "0" * 64 in command("inspect", "a.glb", "-v")[1]
     assert json.loads(command("inspect", "a.glb", "--json")[1]) == found
     assert command("inspect", "a.glb", "-q") == (0, "")
 

@@ -23,6 +23,8 @@ def test_a_scene_is_counted(tmp_path: Path) -> None:
     # Squares at x 0 to 1 and 3 to 4, z 0 and 1; one more at y 3 to 4.
     assert (found["box"]["min"], found["box"]["max"]) == ([0, 0, 0], [4, 4, 1])
     assert found["box"]["diagonal"] == pytest.approx(np.sqrt(33))
+    assert [(c["node"], c["name"], c["position"]) for c in found["cameras"]] == [(3, "eye", [0, 0, 5])]
+    assert found["cameras"][0]["fov"] == pytest.approx(np.degrees(0.7))
 
 
 def test_a_bake_is_summed_up_and_its_files_compared(tmp_path: Path) -> None:
