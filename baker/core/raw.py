@@ -24,6 +24,8 @@ class PrimitiveArrays:
         None asks for flat normals.
     texcoord : dict of int to (V, 2) float32
     colour : (V, 4) float32, linear, or None
+    further : (V, B) uint8 or None
+        Bytes of the vertex attributes that are not above; only where a file is read leniently.
     stitched : bool
         True for strips, whose triangles with a repeated index only join pieces: left out without a word.
     """
@@ -35,6 +37,7 @@ class PrimitiveArrays:
     normal: NDArray[np.float32] | None = None
     texcoord: dict[int, NDArray[np.float32]] = field(default_factory=dict)
     colour: NDArray[np.float32] | None = None
+    further: NDArray[np.uint8] | None = None
     stitched: bool = False
 
 

@@ -24,7 +24,8 @@ _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mes
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
     """Return each vertex attribute of a primitive, (V, B) uint8 by name, for comparison.
 
-    They are the bytes of the file, but for -0 among floats, which has become 0.
+    They are the bytes of the file, but for -0 among floats, which has become 0. An attribute with fewer
+    elements than POSITION is left out.
 
     Raises
     ------
@@ -35,6 +36,8 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     rows = np.arange(accessors[primitive["attributes"]["POSITION"]]["count"], dtype=np.int32)
     column = {}
     for name, index in primitive["attributes"].items():
+        if accessors[index]["count"] < len(rows):
+            continue
         data = gather_rows(source.json, source.buffers, index, rows)
         if accessors[index]["componentType"] == _FLOAT and not name.startswith("_"):
             data = (np.ascontiguousarray(data).view("<f4") + np.float32(0.0)).view(np.uint8)
@@ -62,6 +65,10 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
     skinned = any("skin" in node and node.get("mesh") == mesh for node in document.get("nodes", []))
     if skinned or any(name.startswith("JOINTS_") for name in primitive["attributes"]):
         return "it is skinned"
+    count = document["accessors"][primitive["attributes"]["POSITION"]]["count"]
+    for name, index in primitive["attributes"].items():
+        if document["accessors"][index]["count"] < count:
+            return f"its attribute {name} has fewer elements than POSITION; export it again"
     named = [*primitive["attributes"].values(), *([primitive["indices"]] if "indices" in primitive else [])]
     if any("sparse" in document["accessors"][index] for index in named):
         return "it is stored as a sparse accessor"

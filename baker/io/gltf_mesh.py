@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from baker.core.raw import PrimitiveArrays
 from baker.core.scene import SceneWarning
+from baker.io.glb_rows import gather_rows
 from baker.io.gltf_accessor import FLOAT, component_type, read_accessor, read_indices
 from baker.io.gltf_document import GltfDocument
 from baker.io.gltf_json import JsonObject
@@ -117,8 +118,22 @@ def _primitive(
         normal=optional("NORMAL", ("VEC3",)),
         texcoord={k: value for k, value in texcoord.items() if value is not None},
         colour=colour,
+        further=_further(document, attributes, len(position)) if lenient else None,
         stitched=mode == _STRIP,
     )
+
+
+def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) -> NDArray[np.uint8] | None:
+    """Return the bytes of the attributes that are not read otherwise, (V, B) uint8, or None without any."""
+    known = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in range(MOST_TEXCOORDS))}
+    root = document.root.value
+    row = np.arange(n_vertices, dtype=np.int32)
+    found = [
+        gather_rows(root, document.buffers, attributes.integer(name), row)
+        for name in sorted(set(attributes.value) - known)
+        if root["accessors"][attributes.integer(name)]["count"] >= n_vertices
+    ]
+    return np.concatenate(found, axis=1) if found else None
 
 
 def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list[JsonObject]) -> None:

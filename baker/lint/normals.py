@@ -136,7 +136,8 @@ def duplicate_vertices(subject: Subject) -> Iterator[Found]:
         for _, p in _parts(facts):
             if not len(p.triangle):
                 continue
-            columns = [p.position, p.normal, *p.texcoord.values(), p.colour]
+            further = None if p.further is None else p.further.astype(np.float32)
+            columns = [p.position, p.normal, *p.texcoord.values(), p.colour, further]
             number = number_rows(np.concatenate([c for c in columns if c is not None], axis=1))
             repeats = len(number) - (int(number.max()) + 1)
             double, total = double + repeats, total + len(number)

@@ -235,6 +235,20 @@ def test_tangents_of_turned_faces_keep_their_bitangent(tmp_path):
         assert two[key] == pytest.approx(one[key], abs=1e-6)
 
 
+def test_attributes_that_are_too_short_and_indices_that_lead_nowhere_are_named(tmp_path):
+    b = box_builder(TANGENT=np.tile(np.float32([1, 0, 0, 1]), (35, 1)))
+    position, triangle = box()
+    wild = np.concatenate([triangle, [[0, 1, 8]]]).astype(np.uint32)
+    b.node(mesh=b.mesh(b.primitive(position, wild)), name="wild")
+    before, after, mended = mend_builder(b, tmp_path)
+    assert mended.fixed == ()
+    assert [left.reason.partition(": ")[2] for left in mended.left_alone] == [
+        "its attribute TANGENT has fewer elements than POSITION; export it again",
+        "1 of its faces name vertices that do not exist; export it again",
+    ]
+    assert after.json["meshes"] == before.json["meshes"]
+
+
 @pytest.mark.parametrize("normals", [True, False])
 @pytest.mark.parametrize("inside", ["nothing", "lamp", "skin"])
 def test_a_body_inside_out_is_turned_and_a_room_is_not(inside, normals, tmp_path):
