@@ -130,7 +130,7 @@ def test_irradiance(mi, name):
         path = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": 8})
         for seed in range(BATCHES):
             seen = [
-                np.array(mi.render(theirs, sensor=k, integrator=path, spp=20_000, seed=seed)).reshape(3)
+                np.array(mi.render(theirs, sensor=k, integrator=path, spp=60_000, seed=seed)).reshape(3)
                 for k in range(len(flat))
             ]
             judge.append(seen)
