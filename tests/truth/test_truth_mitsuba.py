@@ -130,12 +130,12 @@ def test_irradiance(mi, name):
         path = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": 8})
         for seed in range(BATCHES):
             seen = [
-                np.array(mi.render(theirs, sensor=k, integrator=path, spp=60_000, seed=seed)).reshape(3)
+                np.array(mi.render(theirs, sensor=k, integrator=path, spp=20_000, seed=seed)).reshape(3)
                 for k in range(len(flat))
             ]
             judge.append(seen)
             estimate = new_estimate(len(flat), 3, n_places)
-            for _ in range(24):
+            for _ in range(128):
                 irradiance_pass(reference, estimate, place, normal, normal, seed=seed)
             own.append(estimate.mean)
     compare(batches(np.array(own)), batches(np.array(judge, float)), 0.02)
