@@ -8,7 +8,7 @@ from baker.core.export import EXPORTS
 from baker.export.common import place_named_bake, template, write_readme, write_text
 
 FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
-FILES_3 = ("lightmap.shader", "lightmaps.gd")
+FILES_3 = ("lightmap.shader", "lightmaps.gd", "import_scene.gd")
 # For both versions: stored as they are, linear, without mip levels that would mix charts, and not compressed
 # as soon as somebody uses them in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
 _IMPORT = """\

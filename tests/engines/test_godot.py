@@ -1,0 +1,116 @@
+"""Godot 3 imports and shows the export `godot` as it should, and wrong exports as wrong.
+
+By hand, for Godot is large:
+
+    apt-get install godot3 godot3-server xvfb xauth
+    pytest -m engines_by_hand tests/engines/test_godot.py
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import need_program
+from engine_scenes import QUADRANT, probe_expected, srgb_page, write_probe
+from proof import changed, lower_left_quarter, middles, shows_something_else, shows_the_probe, shows_the_room
+
+pytestmark = pytest.mark.engines_by_hand
+PROJECT = Path(__file__).parent / "godot3"
+# The picture has 8 bits: values are read where their code is high, at several exposures, and averaged.
+EXPOSURES = [2.0 ** (k / 4) for k in range(-8, 17)]
+
+
+def imported(project, environment):
+    """Run the editor until everything is imported: with --quit it may leave before it has begun."""
+    editor = [need_program("godot3-server", "godot3-server"), "--editor", "--path", str(project)]
+    wanted = len(list(project.glob("godot/*.exr"))) + 1
+    log = project.with_suffix(".log")
+    with log.open("w") as stream:
+        process = subprocess.Popen(editor, env=environment, stdout=stream, stderr=subprocess.STDOUT)
+        try:
+            for _ in range(600):
+                # The hash of a file is written after the file itself.
+                if len(list(project.glob(".import/*.md5"))) == wanted or process.poll() is not None:
+                    break
+                time.sleep(0.2)
+        finally:
+            process.terminate()
+            process.wait(20)
+    told = log.read_text("utf-8", "replace")
+    assert len(list(project.glob(".import/*.md5"))) == wanted, told[-3000:]
+    assert "SCRIPT ERROR" not in told, told[-3000:]
+
+
+def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
+    """Import an export with the editor, draw it, and return the picture (64, 64, 3), row 0 on top."""
+    project = tmp_path / "project"
+    shutil.copytree(PROJECT, project)
+    shutil.copytree(folder, project / "godot")
+    # What the README tells a user of Godot 3 to do.
+    for path in sorted((project / "godot" / "godot3").glob("*.*")):
+        path.replace(project / "godot" / path.name)
+    script = 'nodes/custom_script="res://godot/import_scene.gd"'
+    (project / "godot" / "scene.glb.import").write_text(
+        f'[remap]\n\nimporter="scene"\n\n[params]\n\n{script}\n', "utf-8"
+    )
+    (project / "task.json").write_text(json.dumps({"camera": camera, "exposures": exposures}), "utf-8")
+    # Godot keeps its settings in the home folder.
+    environment = {**os.environ, "HOME": str(tmp_path)}
+    imported(project, environment)
+    game = [need_program("xvfb-run", "xvfb"), "-a", need_program("godot3", "godot3")]
+    game += ["--video-driver", "GLES3", "--audio-driver", "Dummy", "--path", str(project)]
+    done = subprocess.run(game, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    told = done.stdout + done.stderr
+    result = project / "result.json"
+    assert result.exists(), told[-3000:]
+    assert "SCRIPT ERROR" not in told, told[-3000:]
+    code = np.array(json.loads(result.read_text("utf-8")), float).reshape(-1, 64, 64, 3)
+    # A code stands for the step above it: Godot cuts off, it does not round.
+    level = (code + 0.5) / 255.0
+    linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
+    good = (code >= 120) & (code <= 250)
+    total = (linear / np.array(exposures)[:, None, None, None] * good).sum(axis=0)
+    return total / np.maximum(good.sum(axis=0), 1)
+
+
+def test_the_probe_is_shown(probe, tmp_path):
+    picture = draw(probe / "godot", tmp_path)
+    assert shows_the_probe(picture), middles(picture)
+
+
+def test_a_room_of_known_radiosity(room, tmp_path):
+    assert shows_the_room(draw(room / "godot", tmp_path, "inside"))
+
+
+def test_offset_and_scale_of_an_object_are_used(probe, tmp_path):
+    picture = draw(lower_left_quarter(probe / "godot", tmp_path / "part"), tmp_path)
+    expected = probe_expected() / QUADRANT.ravel()[:, None] * QUADRANT[1, 0]
+    assert shows_the_probe(picture, expected), middles(picture)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("UV2 * uv_scale + uv_offset", "vec2(0.0, 1.0) + vec2(1.0, -1.0) * UV2"),
+        ("texture(page, UV2", "texture(page, UV"),
+        ("/ 3.14159265359", ""),
+        ("uniform sampler2D page;", "uniform sampler2D page : hint_albedo;"),
+    ],
+    ids=["v turned over", "first uv set", "no pi", "srgb"],
+)
+def test_a_wrong_export_fails(probe, tmp_path, right, wrong):
+    copy = changed(probe / "godot", tmp_path / "wrong", "godot3/lightmap.shader", right, wrong)
+    picture = draw(copy, tmp_path)
+    assert shows_something_else(picture), middles(picture)
+
+
+def test_srgb_numbers_in_the_pages_fail(tmp_path):
+    out = write_probe(tmp_path / "srgb", "godot", page=srgb_page())
+    assert shows_something_else(draw(out / "godot", tmp_path))

@@ -1,0 +1,53 @@
+"""Sources for engines that are not run here are at least whole sentences of their languages."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+from browser import need_program
+
+from baker.export.common import template
+
+pytestmark = pytest.mark.engines
+
+
+def errors(module, source):
+    """Return the lines at which a grammar does not understand a source."""
+    from tree_sitter import Language, Parser
+
+    parser = Parser(Language(module.language()))
+    found, waiting = [], [parser.parse(source.encode()).root_node]
+    while waiting:
+        node = waiting.pop()
+        if node.is_error or node.is_missing:
+            found.append(node.start_point[0] + 1)
+        waiting.extend(node.children)
+    return found
+
+
+@pytest.mark.parametrize("name", ["BakerLightmaps.cs", "BakerLightmapImporter.cs"])
+def test_c_sharp(name):
+    import tree_sitter_c_sharp
+
+    source = template("unity", name)
+    assert errors(tree_sitter_c_sharp, source) == []
+    assert errors(tree_sitter_c_sharp, source.replace("{", "", 1)), "the check sees what is wrong"
+
+
+def test_rust(probe):
+    import tree_sitter_rust
+
+    source = (probe / "bevy" / "baker_lightmaps.rs").read_text("utf-8")
+    assert errors(tree_sitter_rust, source) == []
+    assert errors(tree_sitter_rust, source.rstrip()[:-1]), "the check sees what is wrong"
+
+
+@pytest.mark.parametrize("name", ["three", "babylon"])
+def test_javascript(tmp_path, name):
+    path = tmp_path / "lightmap.mjs"
+    path.write_text(template(name, "lightmap.js"), "utf-8")
+    done = subprocess.run(
+        [need_program("node", "nodejs"), "--check", path], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

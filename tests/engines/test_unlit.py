@@ -1,0 +1,55 @@
+"""The export `unlit`, which needs no module, shown by three.js as any viewer shows it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from engine_scenes import QUADRANT, ROOM_RADIANCE, probe_expected, srgb_page, write_probe
+from proof import draw, middles, shows_something_else
+
+pytestmark = pytest.mark.engines
+
+
+def curve(linear):
+    return np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
+
+
+def exposure_of(folder):
+    return json.loads((folder / "lightmap.json").read_text("utf-8"))["exposure"]
+
+
+def test_the_probe_is_shown(browser, probe):
+    """Eight bits behind the sRGB curve, so nothing may be off by more than half a step of that."""
+    folder = probe / "unlit"
+    exposure = exposure_of(folder)
+    picture = middles(draw(browser, folder, camera="front", plain=1))
+    miss = np.abs(curve(picture) - curve(probe_expected() * exposure))
+    assert miss.max() <= 0.51 / 255, picture
+    # Of bright values that is less than 1 %.
+    bright = probe_expected() > 0.3
+    assert picture[bright] / exposure == pytest.approx(probe_expected()[bright], rel=0.01)
+    # The brightest quadrant's red is what just fits.
+    assert exposure == pytest.approx(1.0 / probe_expected().max(), rel=1e-3)
+
+
+def test_a_room_of_known_radiosity(browser, room):
+    folder = room / "unlit"
+    picture = draw(browser, folder, camera="inside", plain=1) / exposure_of(folder)
+    miss = np.abs(picture / ROOM_RADIANCE - 1.0)
+    # Beside the bake's own borders, texels over the exposure are cut off.
+    assert np.quantile(miss, 0.99) < 0.01
+    assert miss.max() < 0.04
+
+
+def test_numbers_with_a_curve_fail(browser, tmp_path):
+    folder = write_probe(tmp_path, "unlit", page=srgb_page()) / "unlit"
+    picture = draw(browser, folder, camera="front", plain=1) / exposure_of(folder)
+    assert shows_something_else(picture)
+
+
+def test_without_the_exposure_it_is_another_picture(browser, probe):
+    picture = draw(browser, probe / "unlit", camera="front", plain=1)
+    assert shows_something_else(picture)
+    assert middles(picture)[:, 0] == pytest.approx(QUADRANT.ravel() / 2.0, rel=0.01)
