@@ -8,7 +8,7 @@ from baker.core.export import EXPORTS
 from baker.export.common import place_named_bake, template, write_readme, write_text
 
 FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
-FILES_3 = ("lightmap.shader", "lightmaps.gd", "import_scene.gd")
+FILES_3 = ("lightmap.shader", "lightmaps.gd")
 # For both versions: stored as they are, linear, without mip levels that would mix charts, and not compressed
 # as soon as somebody uses them in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
 _IMPORT = """\
@@ -56,7 +56,7 @@ class GodotExport:
             steps=(
                 "Copy the folder into the project. Godot 4: attach lightmaps.gd to the root of the imported",
                 "scene.glb, or set import_scene.gd as its import script (it attaches it). Godot 3 (GLES3;",
-                "GLES2 ends at 1.0): first move the files of godot3/ up, over those of Godot 4.",
+                "GLES2 ends at 1.0): move godot3/* up, delete import_scene.gd, attach lightmaps.gd.",
                 "Exporting a game: add *.json to the filter of non-resource files.",
             ),
             scale="EXR holds irradiance E in lx; the shader shows albedo x E / pi x `exposure`.",

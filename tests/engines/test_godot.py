@@ -54,12 +54,9 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     shutil.copytree(PROJECT, project)
     shutil.copytree(folder, project / "godot")
     # What the README tells a user of Godot 3 to do.
-    for path in sorted((project / "godot" / "godot3").glob("*.*")):
+    for path in sorted((project / "godot" / "godot3").glob("lightmap*")):
         path.replace(project / "godot" / path.name)
-    script = 'nodes/custom_script="res://godot/import_scene.gd"'
-    (project / "godot" / "scene.glb.import").write_text(
-        f'[remap]\n\nimporter="scene"\n\n[params]\n\n{script}\n', "utf-8"
-    )
+    (project / "godot" / "import_scene.gd").unlink()
     (project / "task.json").write_text(json.dumps({"camera": camera, "exposures": exposures}), "utf-8")
     # Godot keeps its settings in the home folder.
     environment = {**os.environ, "HOME": str(tmp_path)}
