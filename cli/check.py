@@ -57,6 +57,12 @@ def command() -> Any:
             Path | None,
             typer.Option("--rates", metavar="OUT", help="Reckon time with the speed of this earlier bake."),
         ),
+        flag(
+            "cost",
+            bool,
+            typer.Option("--cost", help="Tell what a bake will take; measures a second's worth of rays."),
+            False,
+        ),
         *mend_flags(),
         *setting_flags(),
         *common_flags(),
@@ -75,6 +81,7 @@ def work(
     junit: Path | None,
     mip: int | None,
     rates: Path | None,
+    cost: bool,
     fix: bool,
     repair: bool,
     out: Path | None,
@@ -97,7 +104,9 @@ def work(
         from baker.checking.report import report_json, write_text
         from baker.checking.scenes import check_scenes, find_scenes
 
-        wanted = check_settings(config, fail_on=fail_on, ignore=ignore, mip=mip, rates=rates)
+        wanted = check_settings(
+            config, fail_on=fail_on, ignore=ignore, mip=mip, rates=rates, cost=cost or None
+        )
         if request is not None:
             session.will_write(str(request.out))
             mended = mend(request, resolved, progress)
@@ -109,7 +118,9 @@ def work(
         if request is not None and mended is not None:
             write_mended_text(mended, request, session.text_stream(as_json=as_json))
         for report in reports:
-            write_text(report, session.text_stream(as_json=as_json), verbose=verbose)
+            write_text(
+                report, session.text_stream(as_json=as_json), verbose=verbose, cost=cost or rates is not None
+            )
     if as_json:
         more = mended_json(mended, request) if request is not None and mended is not None else {}
         session.write_json({**report_json(reports, unreadable), **more})

@@ -187,6 +187,11 @@ def test_no_path_of_one_machine():
     assert found == []
 
 
+def test_checks_page_is_current():
+    page = run(sys.executable, str(ROOT / "docs" / "make_checks_page.py"), "--print")
+    assert (ROOT / "docs" / "CHECKS.md").read_text("utf-8") == page
+
+
 def test_settings_page_is_current():
     page = run(sys.executable, str(ROOT / "docs" / "make_settings_page.py"), "--print")
     assert (ROOT / "docs" / "SETTINGS.md").read_text("utf-8") == page

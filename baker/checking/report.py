@@ -39,9 +39,13 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
     }
 
 
-def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0) -> None:
-    """Write findings one a line, with what to do below each; infos only with -v."""
-    shown = [finding for finding in report.findings if verbose or finding.severity != "info"]
+def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: bool = False) -> None:
+    """Write findings one a line, with what to do below each; infos only with -v, the cost if asked for."""
+    shown = [
+        finding
+        for finding in report.findings
+        if verbose or finding.severity != "info" or (cost and finding.code == "cost")
+    ]
     for finding in shown:
         where = f" '{finding.object}'" if finding.object else ""
         if finding.node is not None:
@@ -52,6 +56,9 @@ def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0) -> None
             primitive = finding.found.primitive
             stream.write(f"    faces {' '.join(map(str, faces))} of primitive {primitive}\n")
         stream.write(f"    {finding.fix}\n")
+        if finding.code == "cost" and (cost or verbose):
+            for entry in finding.found.more["objects"]:
+                stream.write(f"    {entry['percent']:6.2f}%  {entry['texels']:9} texels  {entry['object']}\n")
     counts = _counts(report)
     parts = [f"{counts[name]} {name}{'s' if counts[name] != 1 else ''}" for name in reversed(SEVERITIES)]
     tail = f", {len(report.ignored)} ignored" if report.ignored else ""

@@ -28,13 +28,16 @@ class CheckSettings:
     mip : int
         Mip level of the lightmap down to which charts must not bleed into each other, 0 to 14.
     rates : str or None
-        Folder of an earlier bake whose speed the cost is reckoned with; None measures for a second.
+        Folder of an earlier bake with whose speed the time is reckoned.
+    cost : bool
+        Measure for a second how fast rays are, if `rates` does not say.
     """
 
     fail_on: str | None = None
     ignore: tuple[str, ...] = ()
     mip: int = DEFAULT_MIP
     rates: str | None = None
+    cost: bool = False
 
 
 def make_check_settings(values: Mapping[str, Any], *, where: str = "") -> CheckSettings:
@@ -77,7 +80,10 @@ def make_check_settings(values: Mapping[str, Any], *, where: str = "") -> CheckS
     rates = clean.get("rates")
     if rates is not None and not isinstance(rates, str):
         raise fail("rates must name the folder of a bake", "rates")
-    return CheckSettings(limit, tuple(ignore), mip, rates)
+    cost = clean.get("cost", False)
+    if not isinstance(cost, bool):
+        raise fail(f"cost is {cost!r}, neither true nor false", "cost")
+    return CheckSettings(limit, tuple(ignore), mip, rates, cost)
 
 
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:

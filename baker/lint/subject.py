@@ -19,6 +19,7 @@ from baker.lint.uv_facts import UvFacts
 from baker.lint.world import World
 
 if TYPE_CHECKING:
+    from baker.lint.cost import Rates
     from baker.lint.light_levels import Levels
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
@@ -37,12 +38,26 @@ class Subject:
     mip : int
         Mip level of the lightmap down to which charts must not bleed into each other.
     meshes : tuple of MeshFacts, one for each of `raw.meshes`
+    rates : Rates or None
+        Speed of an earlier bake.
+    probe : bool
+        Measure the speed if it is not known.
     """
 
-    def __init__(self, scene: Scene, settings: BakeSettings, *, mip: int = DEFAULT_MIP) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: BakeSettings,
+        *,
+        mip: int = DEFAULT_MIP,
+        rates: Rates | None = None,
+        probe: bool = False,
+    ) -> None:
         self.scene = scene
         self.settings = settings
         self.mip = mip
+        self.rates = rates
+        self.probe = probe
         self.raw = scene.raw if scene.raw is not None else raw_of(scene)
         self._uv: dict[int, UvFacts] = {}
         trusted = scene.raw is None

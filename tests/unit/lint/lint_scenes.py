@@ -178,7 +178,7 @@ CASES: dict[str, Case] = {
         scene((FAR_CUBE, TWO_CUBES)),
         scene((np.concatenate([CUBE, CUBE + np.float32([1, 1, 1.5])]), TWO_CUBES)),
     ),
-    "open-edges": Case(scene((BOX, BOX_TRIANGLE[1:])), scene((BOX, BOX_TRIANGLE))),
+    "open-edges": Case(scene((BOX, BOX_TRIANGLE[:-1])), scene((BOX, BOX_TRIANGLE))),
     "flipped-neighbours": Case(scene((GRID, FLIPPED)), scene((GRID, GRID_TRIANGLE))),
     "inside-out": Case(scene((CUBE, CUBE_TRIANGLE[:, ::-1])), scene((CUBE, CUBE_TRIANGLE))),
     "flat-instance": Case(
@@ -274,5 +274,6 @@ CASES: dict[str, Case] = {
         scene(floor(), (CEILING[::-1], QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, LAMP)),
         scene(floor(), (CEILING, QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, LAMP)),
     ),
+    "cost": Case(scene(floor()), scene((FLOOR, [[0, 0, 0]]))),
     "file-note": Case(scene(floor(), lights=(point(1, range=5.0),)), scene(floor(), lights=(point(1),))),
 }

@@ -1,0 +1,122 @@
+"""Writes CHECKS.md from the checks themselves.
+
+python docs/make_checks_page.py            writes the page
+python docs/make_checks_page.py --print    prints it instead
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from baker.lint.registry import GROUPS, Check, all_checks
+
+PICTURES = Path(__file__).with_name("pictures") / "checks"
+NAMES = {
+    "geometry": "Geometry",
+    "uv": "Lightmap UVs",
+    "light": "Light",
+    "file": "The file",
+    "cost": "Cost",
+}
+
+HEAD = """\
+# Checks
+
+`baker check SCENE...` finds what would spoil a bake. It takes files, folders and patterns, traces no light
+beyond a few hundred shadow rays, and never changes a file unless `--fix` is given. This page is made from
+the code by `docs/make_checks_page.py`.
+
+```sh
+baker check level.glb                            # errors and warnings; -v shows infos and face numbers, too
+baker check kit/ --fail-on warning --ignore no-light --ignore 'open-edges@Fence*'
+baker check level.glb --resolution 2048 --padding 8 --sky 1,1,1   # judged for the bake it is for
+baker check level.glb --cost --resolution 4096   # texels, pages, rays, memory, time, each object's share
+baker check level.glb --json                     # {"passed", "findings": [...], "scenes": [...]}
+baker check level.glb --sarif check.sarif --junit check.xml
+```
+
+Exit code 0: nothing reaches `--fail-on` (default `error`). 1: something does. 2: wrong use. 3: a file
+cannot be read; of several the others are still checked. What a bake would refuse although the file can be
+read (an index out of range, no usable triangle, a negative light) is a finding, not a refusal.
+
+Every finding has `code`, `severity`, `object`, `node` (glTF node index; of a mesh that stands in several
+places the first), `count`, `message` and `fix`; where it applies also `percent`, `primitive`, up to ten
+`faces` (numbers within the primitive) or `pairs` of faces, and one `position` in the world. Severities: an
+*error* spoils the object's bake or makes it impossible, a *warning* is seen in the result or lost from it,
+an *info* is good to know.
+
+## Settings of a check
+
+In the file of `--config`, beside the settings of a bake:
+
+```toml
+[check]
+fail-on = "warning"
+ignore = ["no-light", "open-edges@Fence*"]
+mip = 3                  # charts must not mix down to this mip level
+rates = "out/level"      # reckon time with the speed of this bake
+```
+
+In the scene itself, as glTF `extras`. On the document: `{"baker": {"check": {"fail_on": "warning", "ignore":
+["no-light"]}}}`. On a node: `{"baker": {"check": {"ignore": ["open-edges"]}}}`, or `"ignore": true` for
+all of its findings. The command line wins over the file, the file over the scene; what is to be ignored
+adds up.
+
+## On every commit
+
+`.pre-commit-hooks.yaml` defines the hook `baker-check` for [pre-commit](https://pre-commit.com):
+
+```yaml
+repos:
+  - repo: https://example.com/your/copy/of/baker
+    rev: v0.1.0
+    hooks:
+      - id: baker-check
+        args: [--fail-on, warning, --ignore, no-light]
+```
+
+## In a bake
+
+`baker bake` puts what it leaves out or unwraps anew into the `warnings` of `bake.json` under the same
+codes, and runs the checks marked *in a bake* below.
+
+## All codes
+
+"""
+
+
+def page() -> str:
+    """Return the text of the page."""
+    entries = all_checks()
+    parts = [HEAD, "| code | severity | what |\n|---|---|---|\n"]
+    parts += [f"| [`{e.code}`](#{_anchor(e.code)}) | {e.severity} | {e.title} |\n" for e in entries]
+    for group in GROUPS:
+        chosen = [entry for entry in entries if entry.group == group]
+        if chosen:
+            parts.append(f"\n## {NAMES[group]}\n")
+            parts += [_section(entry) for entry in chosen]
+    return "".join(parts)
+
+
+def _section(entry: Check) -> str:
+    notes = f"*{entry.severity}*" + (", *in a bake*" if entry.in_bake else "")
+    picture = PICTURES / f"{entry.code}.png"
+    shown = (
+        f"\n![{entry.code}: bad left, good right](pictures/checks/{picture.name})\n"
+        if picture.exists()
+        else ""
+    )
+    return f"\n### {entry.code}\n\n{notes}. {entry.docs}\n\nTo do: {entry.fix}.\n{shown}"
+
+
+def _anchor(code: str) -> str:
+    # As code hosts make them of headings: dots go, dashes and underscores stay.
+    return code.replace(".", "")
+
+
+if __name__ == "__main__":
+    if "--print" in sys.argv[1:]:
+        sys.stdout.write(page())
+    else:
+        Path(__file__).with_name("CHECKS.md").write_text(page(), "utf-8")
