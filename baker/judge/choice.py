@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Every object gets this many texels, as long as that leaves half of them to be shared out by area.
+# Every object gets this many texels, as long as that leaves three quarters of them to be shared out by area.
 _LEAST = 8
 
 
@@ -27,8 +27,9 @@ def choose_texels(
     if len(candidate) <= n:
         return candidate
     objects, count = np.unique(owner[candidate], return_counts=True)
-    floor = np.minimum(count, min(_LEAST, max(n // (2 * len(objects)), 1)))
-    share = np.maximum(floor, np.floor(n * count / count.sum())).astype(np.int64)
+    floor = np.minimum(count, min(_LEAST, max(n // (4 * len(objects)), 1)))
+    left = count - floor
+    share = floor + np.floor(max(n - floor.sum(), 0) * left / max(left.sum(), 1)).astype(np.int64)
     random = np.random.Generator(np.random.PCG64([seed, 6]))
     order = candidate[np.lexsort((candidate, brightness[candidate], owner[candidate]))]
     begin = np.concatenate([[0], np.cumsum(count)[:-1]])

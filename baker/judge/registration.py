@@ -25,6 +25,7 @@ def best_shift(
     covered: NDArray[np.bool_],
     pixel: NDArray[np.int64],
     truth: NDArray[np.float64],
+    noise: NDArray[np.float64] | None = None,
 ) -> tuple[int, int]:
     """Return the shift (rows, columns) by which the map would fit the truth better, (0, 0) if none does.
 
@@ -35,6 +36,8 @@ def best_shift(
         Only texels whose four neighbours are covered, too, take part.
     pixel : (n,) int64, texels judged
     truth : (n,) float64, their path-traced values
+    noise : (n,) float64, optional
+        Standard errors of these: what they add to the misfit says nothing about a shift.
     """
     height, width = page.shape[1:]
     number, rest = np.divmod(pixel, height * width)
@@ -55,6 +58,8 @@ def best_shift(
         ]
     )
     mean = error.mean(axis=1)
+    if noise is not None:
+        mean = mean - np.minimum((noise[inside] / scale) ** 2, 0.25).mean()
     best = int(np.argmin(mean))
     gain = error[0] - error[best]
     # Where a map is even every shift fits alike but for noise.

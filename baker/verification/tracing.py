@@ -22,6 +22,8 @@ from baker.reference.view import Reference
 
 # Passes of all texels before some are called good enough; passes beyond which AO is not followed.
 _FIRST, _MOST_OPENNESS = 8, 1024
+# Share of the time in which all texels get the same.
+_EVEN = 0.4
 # Standard error of AO that is good enough, and the share of the time that AO may take; it seldom needs it.
 OPENNESS_ERROR, _OPENNESS_TIME = 0.004, 0.25
 
@@ -56,6 +58,14 @@ def standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
     samples = np.maximum(estimate.count.sum(axis=0), 1)[:, None] * estimate.samples
     unseen = estimate.mean.mean(axis=0) / samples
     return np.asarray(np.hypot(estimate.standard_error, unseen), np.float64)
+
+
+def _nearest_to_done(
+    estimate: PointEstimate, error: NDArray[np.float64], chosen: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the half of the chosen texels that needs the fewest samples: others would not get there."""
+    need = estimate.count.sum(axis=0)[chosen] * error[chosen] ** 2
+    return np.sort(chosen[np.argsort(need, kind="stable")[: -(-len(chosen) // 2)]])
 
 
 def relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
@@ -110,7 +120,10 @@ def trace_irradiance(
             chosen = np.flatnonzero(error > effort.target)
             share = 1.0 - len(chosen) / len(error)
             if effort.deadline is not None:
-                share = max(share, (time.monotonic() - started) / max(effort.deadline - started, 1e-9))
+                late = (time.monotonic() - started) / max(effort.deadline - started, 1e-9)
+                share = max(share, late)
+                if late > _EVEN:
+                    chosen = _nearest_to_done(estimate, error, chosen)
             report(progress, "path tracing", min(share, 1.0), f"{len(error) - len(chosen)} texels done")
             if not len(chosen):
                 break

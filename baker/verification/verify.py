@@ -45,9 +45,10 @@ DEFAULT_LIMITS = (
     "irradiance.median > 0.03, irradiance.bias > 0.03, irradiance.nrmse > 0.5, "
     "ao.median > 0.03, ao.bias > 0.03, ao.rmse > 0.05"
 )
-# An object whose mean is off by more fails on its own, if so many of its texels were judged, it is not in the
-# dark, and so many standard errors of the reference's mean say so.
-_OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_SURE = 0.25, 8, 3.0
+# An object whose mean is off by more fails on its own, if it is not in the dark and so many standard errors
+# of the mean say so. Of few texels a single one at the mouth of a gap would decide: with fewer than
+# the second number of them twice as much is allowed, with fewer than the first anything.
+_OBJECT_BIAS, _OBJECT_TEXELS, _OBJECT_SURE = 0.25, (4, 8), 3.0
 _EXPONENT = 0.1
 # Pictures of the worst places get this share of the time limit on top.
 _CROP_TIME = 0.1
@@ -280,7 +281,7 @@ def _channel(
         standard_error=error,
         halves=halves,
         figures=figures(value, truth, standard_error=error, halves=halves),
-        shift=best_shift(page, covered, pixel, truth.mean(axis=1)),
+        shift=best_shift(page, covered, pixel, truth.mean(axis=1), error.mean(axis=1)),
         exponent=exponent(value.mean(axis=1), truth.mean(axis=1)),
         unresolved=unresolved,
     )
@@ -323,7 +324,8 @@ def _problems(
     for entry, number in zip(objects, np.unique(owner), strict=True):
         mine = owner == number
         for name, values in entry["channels"].items():
-            if values["texels"] < _OBJECT_TEXELS or abs(values["bias"]) <= _OBJECT_BIAS:
+            allowed = _OBJECT_BIAS if values["texels"] >= _OBJECT_TEXELS[1] else 2 * _OBJECT_BIAS
+            if values["texels"] < _OBJECT_TEXELS[0] or abs(values["bias"]) <= allowed:
                 continue
             check = channels[name]
             mean = float(check.reference[mine].mean())
