@@ -15,6 +15,8 @@ _BETTER = 0.9
 # By so many standard errors, too.
 _SURE = 4.0
 _ENOUGH = 32
+# Squares of relative errors count up to this: a few texels of large error must not decide.
+_CLIP = 0.01
 # Powers that are tried, 1 in the middle; a texel further from all is no further than this (log scale).
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
 _FAR = 0.1
@@ -50,16 +52,15 @@ def best_shift(
         return 0, 0
     number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
     scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
-    # Robust: a few texels of large error must not decide.
     error = np.array(
         [
-            np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, 0.25)
+            np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, _CLIP)
             for down, right in _STEPS
         ]
     )
     mean = error.mean(axis=1)
     if noise is not None:
-        mean = mean - np.minimum((noise[inside] / scale) ** 2, 0.25).mean()
+        mean = mean - np.minimum((noise[inside] / scale) ** 2, _CLIP).mean()
     best = int(np.argmin(mean))
     gain = error[0] - error[best]
     # Where a map is even every shift fits alike but for noise.
