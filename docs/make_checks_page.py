@@ -81,6 +81,11 @@ repos:
 `baker bake` puts what it leaves out or unwraps anew into the `warnings` of `bake.json` under the same
 codes, and runs the checks marked *in a bake* below.
 
+## How long it takes
+
+A mesh of a million triangles with lightmap UVs at 2048 takes 10.3 s on two cores, a hundred small kit
+pieces in one process 5.7 s (`benchmarks/check_speed.py`, start of the program included).
+
 ## All codes
 
 """
