@@ -29,7 +29,7 @@ def connected_vertices(triangle: NDArray[np.integer], n_vertices: int) -> NDArra
     """Return the (T,) int32 piece of each triangle: pieces share vertices; numbered by first triangle."""
     a = np.concatenate([triangle[:, 0], triangle[:, 1]])
     b = np.concatenate([triangle[:, 1], triangle[:, 2]])
-    label = _connected(a, b, n_vertices)
+    label = connected(a, b, n_vertices)
     return number_by_first(label[triangle[:, 0]])
 
 
@@ -63,10 +63,10 @@ def connected_faces(
     if normal is not None:
         smooth = np.einsum("ex,ex->e", normal[a], normal[b]) > min_dot
         a, b = a[smooth], b[smooth]
-    return number_by_first(_connected(a, b, n))
+    return number_by_first(connected(a, b, n))
 
 
-def _connected(a: NDArray[np.integer], b: NDArray[np.integer], n: int) -> NDArray[np.int64]:
+def connected(a: NDArray[np.integer], b: NDArray[np.integer], n: int) -> NDArray[np.int64]:
     """Return (n,) int64: the smallest node that each node is connected to by edges a[i] - b[i].
 
     scipy's csgraph does the same, but importing it takes 0.1 s, more than the uv of a small scene.

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.topology import connected, number_by_first
+
 
 @dataclass(frozen=True)
 class Edges:
@@ -34,16 +36,10 @@ class Edges:
 
     def connected_faces(self, n_faces: int) -> NDArray[np.int32]:
         """Return the (F,) component of each face: faces that share an edge."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
         link = np.ones(len(self.face), bool)
         link[self.first] = False
         b = np.flatnonzero(link)
-        ones = np.ones(len(b), np.int8)
-        graph = coo_array((ones, (self.face[b - 1], self.face[b])), shape=(n_faces, n_faces))
-        _, label = connected_components(graph, directed=False)
-        return np.asarray(label, np.int32)
+        return number_by_first(connected(self.face[b - 1], self.face[b], n_faces))
 
     def pairs(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return both half edges of the chosen edges, which have two each."""

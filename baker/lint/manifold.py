@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.topology import connected, number_by_first
 from baker.lint.bad_faces import faces_found
 from baker.lint.finding import Found
 from baker.lint.mesh_facts import MeshFacts
@@ -78,9 +79,6 @@ def non_manifold_vertices(subject: Subject) -> Iterator[Found]:
 
 def _fans(facts: MeshFacts) -> NDArray[np.int64]:
     """Return for each corner of `sheet`, (3F,), the fan of faces around its vertex that it belongs to."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     edges = facts.edges
     one, two = edges.pairs(edges.count == 2)
     face, corner = edges.face, edges.corner
@@ -91,9 +89,7 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
     a = np.concatenate([start[0], end[0]])
     b = np.concatenate([np.where(same_way, start[1], end[1]), np.where(same_way, end[1], start[1])])
     n = 3 * len(facts.sheet)
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    return np.asarray(label, np.int64)
+    return connected(a, b, n)
 
 
 @check(
@@ -136,17 +132,13 @@ def _loops(
     low: NDArray[np.int64], high: NDArray[np.int64], piece: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], int]:
     """Return for each open edge the hole that it borders, and how many there are."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     n = int(max(low.max(), high.max())) + 1
     ends = np.concatenate([low, high]) + n * np.concatenate([piece, piece]).astype(np.int64)
     _, node = np.unique(ends, return_inverse=True)
     a, b = node[: len(low)], node[len(low) :]
     size = int(node.max()) + 1
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(size, size))
-    count, label = connected_components(graph, directed=False)
-    return np.asarray(label[a], np.int64), int(count)
+    hole = number_by_first(connected(a, b, size)[a]).astype(np.int64)
+    return hole, int(hole.max(initial=-1)) + 1
 
 
 def _hole_area(

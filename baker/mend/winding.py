@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.topology import number_by_first
+from baker.core.topology import connected, number_by_first
 
 # Share of a piece's area by which normals have to lean to one side to be believed.
 _CLEAR = 0.5
@@ -154,9 +154,4 @@ def _orient(
 
 
 def _components(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    return number_by_first(label).astype(np.int64)
+    return number_by_first(connected(a, b, n)).astype(np.int64)

@@ -1,5 +1,9 @@
 """Lightmap uv: cut with xatlas, or kept from the input, then packed into pages and checked."""
 
+import sys
+from types import ModuleType
+from typing import Any
+
 from baker.core.atlas import Atlas
 from baker.core.progress import Progress, silent
 from baker.core.scene import Scene
@@ -15,3 +19,16 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
 
 
 __all__ = ["unwrap_scene"]
+
+
+class _CallablePackage(ModuleType):
+    """Keeps `baker.unwrap(scene)` working: once imported, the package hides the function of that name."""
+
+    def __call__(self, scene: Scene, *, progress: Progress = silent, **settings: Any) -> Atlas:
+        """Lay out all instances; see the function in `baker/__init__.py`."""
+        from baker.core.settings import make_settings
+
+        return unwrap_scene(scene, make_settings(settings), progress)
+
+
+sys.modules[__name__].__class__ = _CallablePackage
