@@ -348,6 +348,7 @@ def _reflected(
             seed=settings.seed,
             threads=thread_count(settings.threads),
             progress=record.progress,
+            kept=world.kept,
         )
         patches = build_patches(texels, depth)
         matrix = build_form_factors(

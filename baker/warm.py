@@ -59,7 +59,7 @@ def cast_rays() -> None:
     from baker.kernels.area_light import light_samples
     from baker.kernels.emitters import lamps_for, widest_view
     from baker.kernels.form_factor import cast_form_factors, count_targets
-    from baker.kernels.gather import N_COLUMNS, gather
+    from baker.kernels.gather import N_COLUMNS, gather, open_share
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
     from baker.lights.emissive import build_emitters
@@ -92,6 +92,7 @@ def cast_rays() -> None:
     dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
     gather(origin, normal, table, dark, lamps, shading, caster, 0, net, shared, black, two, out)
+    open_share(origin, normal, caster, 0, net, shared, np.float32(1.0), squares)
     target, tally = np.zeros((_TEXELS, 16), np.int32), np.zeros((_TEXELS, 2), np.int32)
     patch = np.zeros(256, np.int32)
     cast_form_factors(origin, normal, table, patch, caster, 0, net, shared, target, tally)

@@ -15,16 +15,16 @@ from baker.core.texels import TexelBuffer
 from baker.kernels.gather import open_share
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import Surface
-from baker.radiosity.points import points_of
+from baker.radiosity.direct import TILE
+from baker.radiosity.points import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
 STAGE = "crevices"
-_TILE = 512
 _RAYS = 16
 # A texel lies in a gap if less than this share of its rays gets further than so many texels: for gaps about
 # as wide as a texel, and for gaps about as wide as a patch.
-_OPEN, _REACH = 0.25, (2.0, 8.0)
+_OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 
 def gap_depth(
@@ -36,6 +36,7 @@ def gap_depth(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
 ) -> tuple[NDArray[np.uint8], int]:
     """Find texels in gaps with short rays.
 
@@ -43,6 +44,8 @@ def gap_depth(
     ----------
     mask : (n,) uint16
         Bit k is set if point k of a texel is not buried.
+    kept : KeptPoints, optional
+        Points of an earlier stage with the same tiles.
 
     Returns
     -------
@@ -52,17 +55,20 @@ def gap_depth(
         Cast.
     """
     n = texels.n
-    share = np.ones((len(_REACH), n), np.float32)
+    near, far = np.ones((2, n), np.float32)
     net, shared = sobol_reversed(_RAYS, seed, 8), shared_bits_mask(_RAYS)
+    cast = np.zeros(-(-n // TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
         # Texels of a tile are neighbours: one length suits them all.
         side = np.sqrt(np.median(texels.area[begin:end]))
-        points = points_of(surface, mask, np.arange(begin, end))
-        for row, reach in zip(share, _REACH, strict=True):
-            open_share(*points, new_caster(tracer), begin, net, shared, np.float32(reach * side), row)
+        points = tile_points(surface, mask, begin, end, kept)
+        for share, reach in ((far, _FAR), (near, _NEAR)):
+            open_share(*points, new_caster(tracer), begin, net, shared, np.float32(reach * side), share)
+            cast[begin // TILE] += _RAYS * (end - begin)
+            # Whatever lies in a narrow gap lies in a wide one, too.
+            if (share[begin:end] >= _OPEN).all():
+                break
 
-    rays = len(_REACH) * _RAYS
-    run_tiles(n, _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    # Whatever lies in a narrow gap lies in a wide one, too.
-    return (share < _OPEN).sum(axis=0, dtype=np.uint8), n * rays
+    run_tiles(n, TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=_RAYS)
+    return (far < _OPEN).astype(np.uint8) + (near < _OPEN), int(cast.sum())
