@@ -19,6 +19,7 @@ COMMANDS = {
     "check": "Find what would spoil a bake, before any ray is cast.",
     "batch": "Bake many scenes, and only what changed.",
     "verify": "Say how wrong a bake is, against path tracing.",
+    "diff": "Compare two bakes on the surface, whatever their UVs.",
     "render": "Path-trace a scene through a camera.",
     "view": "Show a bake in a local web page.",
     "inspect": "Tell what is in a scene, a bake or an EXR.",

@@ -63,6 +63,37 @@ def texel_places(
     n_places : int
         Places of each texel.
     """
+    found, weight, covered, middle = _spread(geometry, pixel, resolution, n_places, seed)
+    # A whole texel's places lie around its centre but for their own scatter.
+    middle = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
+    corner = geometry.triangle[found]
+    position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
+    normal = (geometry.normal[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
+    face = geometry.face_normal[found].astype(np.float64)
+    length = np.linalg.norm(normal, axis=2, keepdims=True)
+    away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
+    normal = np.where(away, face, normal / np.maximum(length, 1e-12))
+    return TexelPlaces(position, normal, face, covered, middle)
+
+
+def texel_points(
+    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, seed: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return one point on the surface inside each texel: its triangle (n,) and the corners' weights (n, 3).
+
+    Parameters
+    ----------
+    geometry, pixel, resolution, seed
+        As of `texel_places`; each texel must hold some surface.
+    """
+    found, weight, _, _ = _spread(geometry, pixel, resolution, 1, seed)
+    return found[:, 0], weight[:, 0]
+
+
+def _spread(
+    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_places: int, seed: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return triangles (n, k), weights (n, k, 3), area in all (n,), mean place in the texel (n, 2)."""
     wanted = np.full((int(geometry.page.max(initial=0)) + 1) * resolution * resolution, -1, np.int32)
     wanted[pixel] = np.arange(len(pixel), dtype=np.int32)
     count = np.zeros(len(pixel), np.int64)
@@ -86,16 +117,7 @@ def texel_places(
         geometry.uv, geometry.triangle, resolution, pixel, start, triangle, corners, polygon, area,
         random, found, weight, covered, middle,
     )  # fmt: skip
-    # A whole texel's places lie around its centre but for their own scatter.
-    middle = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
-    corner = geometry.triangle[found]
-    position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
-    normal = (geometry.normal[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
-    face = geometry.face_normal[found].astype(np.float64)
-    length = np.linalg.norm(normal, axis=2, keepdims=True)
-    away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
-    normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    return TexelPlaces(position, normal, face, covered, middle)
+    return found, weight, covered, middle
 
 
 def look_up(
@@ -124,3 +146,16 @@ def look_up(
     above = (1 - x) * pages[page, row, column] + x * pages[page, row, beside]
     below = (1 - x) * pages[page, lower, column] + x * pages[page, lower, beside]
     return np.asarray((1 - y) * above + y * below, np.float64)
+
+
+def look_up_uv(
+    pages: NDArray[np.float32], page: NDArray[np.int32], uv: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Read maps (P, H, W, C) bilinearly at lightmap uv (n, 2) of pages (n,); return (n, C)."""
+    height, width = pages.shape[1:3]
+    at = uv * (width, height)
+    texel = np.clip(np.floor(at), 0, (width - 1, height - 1))
+    pixel = (page.astype(np.int64) * height + texel[:, 1].astype(np.int64)) * width + texel[:, 0].astype(
+        np.int64
+    )
+    return look_up(pages, pixel, np.clip(at - texel, 0.0, 1.0) - 0.5)

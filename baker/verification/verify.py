@@ -25,6 +25,7 @@ from baker.judge.figures import FIGURES, dark_floor, figures
 from baker.judge.limits import Verdict, judge, parse_limits
 from baker.judge.registration import best_shift, exponent
 from baker.judge.texel_area import TexelPlaces, instance_map, look_up, texel_places
+from baker.judge.worst import worst_texels
 from baker.reference.irradiance import PointEstimate
 from baker.reference.view import build_reference
 from baker.verification.crops import Crop, trace_crops
@@ -37,7 +38,6 @@ from baker.verification.tracing import (
     trace_irradiance,
     trace_openness,
 )
-from baker.verification.worst import worst_texels
 
 CHANNELS = ("irradiance", "ao")
 PLACES = 64
@@ -203,7 +203,7 @@ def verify(
             for name in names
         }
         middle = places.position.mean(axis=1)
-        worst = worst_texels(bake, pixel, owner, middle, channels)
+        worst = worst_texels(bake.scene.instances, bake.atlas.resolution, pixel, owner, middle, channels)
         spare = None if settings.time_limit is None else _CROP_TIME * settings.time_limit
         crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)
     objects = _objects(bake, owner, channels)

@@ -1,28 +1,42 @@
-"""The texels at which a bake is furthest from the truth."""
+"""The texels at which a bake is furthest from its reference."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.io.bake_folder import StoredBake
+from baker.core.scene import Instance
 from baker.judge.figures import dark_floor, relative_error
 
 _WORST = 10
 
 
 def worst_texels(
-    bake: StoredBake,
+    instances: Sequence[Instance],
+    size: int,
     pixel: NDArray[np.int64],
     owner: NDArray[np.int32],
     position: NDArray[np.float64],
     channels: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
-    """Return the texels of the largest error, beyond three standard errors of the reference, worst first."""
-    size = bake.atlas.resolution
+    """Return the texels of the largest error, beyond three standard errors of the reference, worst first.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+    size : int
+        Width and height of a page.
+    pixel : (n,) int64
+        (page * size + row) * size + column.
+    owner : (n,) int32
+        Instance of each texel.
+    position : (n, 3) float64
+        World.
+    channels : mapping of name to an object with `value`, `reference`, `standard_error`, (n, C) each
+    """
     found = []
     for name, check in channels.items():
         floor = dark_floor(check.reference)
@@ -31,7 +45,7 @@ def worst_texels(
         sure = error - 3.0 * noise / np.maximum(check.reference.mean(axis=1), max(floor, 1e-12))
         for i in np.argsort(-sure, kind="stable")[:_WORST]:
             page, rest = divmod(int(pixel[i]), size * size)
-            instance = bake.scene.instances[int(owner[i])]
+            instance = instances[int(owner[i])]
             found.append(
                 {
                     "object": instance.name,

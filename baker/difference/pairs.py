@@ -1,0 +1,87 @@
+"""Which object of one bake is which of another.
+
+Objects with the same node and name are a pair; then those whose name occurs once among what is left on both
+sides; then those with the same node and the very same mesh (renamed ones). What is still left on both sides
+may have been joined or split: such surfaces are looked for in each other, whatever their objects.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import Instance, Mesh, Scene
+
+# Corners that lie nearer to each other, as a share of the mesh's largest coordinate, are the same.
+_NEAR = 1.0e-6
+
+
+@dataclass(frozen=True)
+class ObjectPairs:
+    """Pairs of the instances of scenes a and b.
+
+    Attributes
+    ----------
+    partner : (A,) int64
+        Instance of b for each of a, -1 for none.
+    same : (A,) bool
+        The pair's meshes are equal triangle by triangle.
+    rest_a, rest_b : (k,) int64
+        Instances without a partner.
+    """
+
+    partner: NDArray[np.int64]
+    same: NDArray[np.bool_]
+    rest_a: NDArray[np.int64]
+    rest_b: NDArray[np.int64]
+
+
+def pair_objects(a: Scene, b: Scene) -> ObjectPairs:
+    """Pair the instances of two scenes; see this file's head."""
+    partner = np.full(len(a.instances), -1, np.int64)
+    known: dict[tuple[int, int], bool] = {}
+
+    def same(i: int, j: int) -> bool:
+        key = a.instances[i].mesh, b.instances[j].mesh
+        if key not in known:
+            known[key] = _same_mesh(a.meshes[key[0]], b.meshes[key[1]])
+        return known[key]
+
+    _pair(a, b, partner, lambda instance: (instance.node, instance.name))
+    _pair(a, b, partner, lambda instance: instance.name)
+    _pair(a, b, partner, lambda instance: instance.node, accept=same)
+    equal = np.array([j >= 0 and same(i, int(j)) for i, j in enumerate(partner)], bool)
+    rest_b = np.setdiff1d(np.arange(len(b.instances)), partner)
+    return ObjectPairs(partner, equal, np.flatnonzero(partner < 0), rest_b)
+
+
+def _pair(
+    a: Scene,
+    b: Scene,
+    partner: NDArray[np.int64],
+    key: Callable[[Instance], Hashable],
+    accept: Callable[[int, int], bool] = lambda i, j: True,
+) -> None:
+    """Pair instances whose key occurs once among those without a partner, on both sides."""
+    taken = set(partner.tolist())
+    left = {i: key(instance) for i, instance in enumerate(a.instances) if partner[i] < 0}
+    right = {j: key(instance) for j, instance in enumerate(b.instances) if j not in taken}
+    count_a, count_b = Counter(left.values()), Counter(right.values())
+    place = {value: j for j, value in right.items()}
+    for i, value in left.items():
+        if count_a[value] == count_b[value] == 1 and accept(i, place[value]):
+            partner[i] = place[value]
+
+
+def _same_mesh(a: Mesh, b: Mesh) -> bool:
+    """Tell whether the triangles of two meshes have the same corners, in the same order."""
+    if a.triangle.shape != b.triangle.shape:
+        return False
+    if not len(a.triangle):
+        return True
+    first, second = a.position[a.triangle].astype(np.float64), b.position[b.triangle].astype(np.float64)
+    return bool(np.abs(first - second).max() <= _NEAR * np.abs(first).max())
