@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -59,7 +60,7 @@ def command() -> Any:
             Path | None,
             typer.Option("--lightmap", metavar="OUT", help="Light the scene by this bake instead."),
         ),
-        *setting_flags(only={"sky", "ao_distance", "threads", "seed"}),
+        *setting_flags(only={"sky", "sky_strength", "ao_distance", "threads", "seed"}),
         *common_flags(),
     ]
     return build("render", COMMANDS["render"], work, flags)
@@ -101,9 +102,9 @@ def work(
     with session.reporter(quiet=quiet) as progress:
         progress("start", 0.0)
         from baker.rendering import RenderSettings, check_image, render, write_picture
-        from baker.rendering.write import TONE
+        from baker.rendering.write import exr_layers, tone_of
 
-        check_image(out)
+        layers = tuple(name.strip() for name in aov.split(",")) if aov else ()
         wanted = RenderSettings(
             camera=camera,
             width=width,
@@ -114,21 +115,30 @@ def work(
             max_depth=max_depth,
             ao=ao,
             ao_distance=chosen.get("ao_distance"),
-            aov=tuple(name.strip() for name in aov.split(",")) if aov else (),
+            aov=layers,
             denoise=denoise,
             lightmap=lightmap,
             sky=chosen.get("sky"),
+            sky_strength=resolved.sky_strength,
             seed=resolved.seed,
             threads=resolved.threads,
         )
+        check_image(out, layers)
         picture = render(scene, wanted, progress)
         write_picture(out, picture)
     rate = picture.rays / max(picture.seconds, 1e-9) / 1e6
+    tone = tone_of(out, picture)
     if not quiet:
-        session.text_stream(as_json=as_json).write(
+        stream = session.text_stream(as_json=as_json)
+        for warning in picture.warnings:
+            where = f"{warning.object}: " if warning.object else ""
+            stream.write(f"warning: {where}{warning.message} [{warning.code}]\n")
+        stream.write(
             f"{out}: {width} x {height}, {picture.spp} samples a pixel, {picture.seconds:.1f} s,"
             f" {rate:.1f} Mrays/s\n"
         )
+        if tone is not None:
+            stream.write(f"tone mapping: {tone}\n")
     if as_json:
         eye = picture.camera
         target = [p + f for p, f in zip(eye.position, eye.forward, strict=True)]
@@ -141,12 +151,15 @@ def work(
                 "seconds": picture.seconds,
                 "rays": picture.rays,
                 "unit": picture.unit,
-                "tone": TONE if out.suffix.lower() == ".png" and not ao else None,
+                "tone": tone,
+                "layers": list(exr_layers(picture)) if tone is None else [],
+                "estimator": None if ao or lightmap else estimator,
+                "denoised": denoise,
                 "mean": [float(v) for v in picture.colour.mean(axis=(0, 1), dtype=float)],
                 "camera": {
                     "position": list(eye.position),
                     "target": target,
-                    "fov": eye.fov * 57.29577951308232,
+                    "fov": math.degrees(eye.fov),
                 },
                 "warnings": [
                     {"code": w.code, "message": w.message, "object": w.object} for w in picture.warnings

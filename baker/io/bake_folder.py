@@ -17,6 +17,7 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene, SceneWarning
+from baker.core.settings import make_settings
 from baker.io.load import load_scene
 from baker.io.output_folder import AS_BAKED, MANIFEST_NAME, file_state, own_files
 from baker.io.png import decode_palette_png
@@ -50,6 +51,13 @@ class StoredBake:
     maps: dict[str, NDArray[np.float32]]
     status: NDArray[np.uint8]
     warnings: tuple[SceneWarning, ...]
+
+    @property
+    def sky(self) -> tuple[float, float, float]:
+        """Return the radiance of the sky that it was baked under, cd/m2."""
+        baked = self.manifest.get("settings", {})
+        known = {key: baked[key] for key in ("sky", "sky_strength") if baked.get(key) is not None}
+        return make_settings(known).sky_radiance
 
 
 def read_bake(folder: Path | str) -> StoredBake:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.geometry import Geometry, world_geometry
-from baker.core.settings import make_settings
-from baker.io.bake_folder import StoredBake, read_bake
+from baker.core.scene import SceneWarning
+from baker.io.bake_folder import SCENE_NAME, StoredBake, read_bake
+from baker.io.fingerprint import scene_sha256
+from baker.io.load import load_scene
 from baker.reference.first_hit import FirstHits
 from baker.reference.vertex import glow
 from baker.reference.view import Reference
@@ -27,12 +29,10 @@ class BakedLight:
     bake : StoredBake
     geometry : Geometry
         With its lightmap uv.
-    sky : (3,) tuple, cd/m2
     """
 
     bake: StoredBake
     geometry: Geometry
-    sky: tuple[float, float, float]
 
     @classmethod
     def read(cls, folder: Path) -> BakedLight:
@@ -46,9 +46,7 @@ class BakedLight:
         bake = read_bake(folder)
         if "irradiance" not in bake.maps:
             raise InputError("the bake holds no irradiance to light the scene with", file=str(folder))
-        baked = bake.manifest.get("settings", {}).get("sky")
-        sky = make_settings({} if baked is None else {"sky": baked}).sky_radiance
-        return cls(bake, world_geometry(bake.scene, bake.atlas), sky)
+        return cls(bake, world_geometry(bake.scene, bake.atlas))
 
     def radiance(self, reference: Reference, hits: FirstHits) -> NDArray[np.float64]:
         """Return the radiance (n, 3), cd/m2, that leaves hits; 0 where nothing was met or a back is black."""
@@ -66,6 +64,23 @@ class BakedLight:
             glow(reference.shading, hits.triangle[i], hits.bary[i, 0], hits.bary[i, 1], value, rgba, False)
             light[i] += value
         return light
+
+
+def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
+    """Return a warning if a scene file is not what was baked.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    own = bake.folder / SCENE_NAME
+    known = bake.manifest.get("input", {}).get("sha256")
+    if scene_sha256(scene) == known or (scene.exists() and scene.samefile(own)):
+        return []
+    load_scene(scene)
+    message = f"'{scene}' is not what '{bake.folder}' was baked from; the picture shows the baked scene"
+    return [SceneWarning("other-scene", message)]
 
 
 def bilinear(

@@ -1,13 +1,15 @@
 """Writes a rendered picture: EXR with its layers, or PNG for people.
 
 PNG: x = L / (L + m) for each colour, m being the median luminance of what is not black, then the sRGB curve;
-an ambient occlusion picture is stored as it is, without any curve.
+an ambient occlusion picture is stored as it is, without any curve. The file says which in a text chunk.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Collection
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -20,15 +22,16 @@ from baker.rendering.render import Picture
 
 SUFFIXES = (".exr", ".png")
 TONE = "L / (L + median luminance), then the sRGB curve"
+PLAIN = "none, 0 to 1 is 0 to 255"
 
 
-def check_image(path: Path) -> None:
-    """Make sure, before the long work, that a picture may be written to `path`.
+def check_image(path: Path, aov: Collection[str] = ()) -> None:
+    """Make sure, before the long work, that a picture with layers `aov` may be written to `path`.
 
     Raises
     ------
     SettingsError
-        If its name has another suffix, or it is a folder.
+        If its name has another suffix or one that takes no layers, or it is a folder or lies in a file.
     ResourceError
         If nothing can be written there.
     """
@@ -36,8 +39,12 @@ def check_image(path: Path) -> None:
         raise SettingsError(f"a picture ends in {' or '.join(SUFFIXES)}", file=str(path))
     if path.is_dir():
         raise SettingsError("this is a folder; name an image file", file=str(path))
+    if aov and path.suffix.lower() != ".exr":
+        raise SettingsError("only an EXR takes the layers of --aov; name an .exr file", file=str(path))
     parent = next(p for p in path.resolve().parents if p.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK):
+    if not parent.is_dir():
+        raise SettingsError(f"'{parent}' is a file; the picture cannot lie in it", file=str(path))
+    if not os.access(parent, os.W_OK):
         raise ResourceError("nothing can be written there; name another place", file=str(path))
 
 
@@ -55,9 +62,10 @@ def write_picture(path: Path, picture: Picture) -> None:
         os.close(handle)
         try:
             if path.suffix.lower() == ".png":
-                Path(name).write_bytes(encode_png(tone_mapped(picture)))
+                text = {"tone mapping": tone_of(path, picture) or "", "software": _signature()}
+                Path(name).write_bytes(encode_png(tone_mapped(picture), text))
             else:
-                encode_layers(Path(name), _layers(picture), header={"unit": picture.unit})
+                encode_layers(Path(name), exr_layers(picture), header=_header(picture))
             Path(name).chmod(0o644)
             Path(name).replace(path)
         except BaseException:
@@ -65,6 +73,13 @@ def write_picture(path: Path, picture: Picture) -> None:
             raise
     except OSError as error:
         raise ResourceError(f"the picture cannot be written ({error.strerror})", file=str(path)) from None
+
+
+def tone_of(path: Path, picture: Picture) -> str | None:
+    """Return how `path` holds light as levels; None for an EXR, which holds it as it is."""
+    if path.suffix.lower() != ".png":
+        return None
+    return PLAIN if picture.unit == "1" else TONE
 
 
 def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
@@ -78,7 +93,8 @@ def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
     return srgb_levels(colour / (colour + np.float32(middle)))
 
 
-def _layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
+def exr_layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
+    """Return all planes (H, W) by the names of their EXR channels."""
     named = {"": picture.colour, "variance.": picture.variance}
     named.update({f"{name}.": layer for name, layer in picture.layers.items()})
     letters = {"normal.": "XYZ", "depth.": "Z"}
@@ -87,3 +103,17 @@ def _layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
         for prefix, layer in named.items()
         for index, letter in enumerate(letters.get(prefix, "RGB")[: layer.shape[2]])
     }
+
+
+def _header(picture: Picture) -> dict[str, str]:
+    light = picture.unit != "1"
+    return {
+        "quantity": "radiance" if light else "ambient occlusion",
+        "unit": picture.unit,
+        "colourSpace": "linear Rec.709, D65" if light else "none",
+        "software": _signature(),
+    }
+
+
+def _signature() -> str:
+    return f"baker {version('baker')}"

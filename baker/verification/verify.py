@@ -184,11 +184,10 @@ def verify(
     geometry = world_geometry(bake.scene, bake.atlas)
     pixel, owner, places = _choose(bake, geometry, names[0], settings)
     baked = bake.manifest.get("settings", {})
-    sky = _sky(baked)
     bounces = baked.get("bounces")
     deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
     effort = Effort(settings.spp, settings.target_se, deadline, settings.seed)
-    with build_reference(bake.scene, sky=sky, lambertian=True, threads=settings.threads) as reference:
+    with build_reference(bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads) as reference:
         places = free_places(reference, places, settings.seed)
         estimates: dict[str, PointEstimate] = {}
         if "ao" in names:
@@ -228,14 +227,6 @@ def verify(
 
 def _defaults(names: list[str]) -> str:
     return ", ".join(part for part in DEFAULT_LIMITS.split(", ") if part.split(".")[0] in names)
-
-
-def _sky(baked: dict[str, Any]) -> tuple[float, float, float]:
-    """Return the radiance of the sky that the manifest's settings tell of."""
-    from baker.core.settings import make_settings
-
-    known = {key: baked[key] for key in ("sky",) if baked.get(key) is not None}
-    return make_settings(known).sky_radiance
 
 
 def _choose(

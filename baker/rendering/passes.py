@@ -1,0 +1,187 @@
+"""The passes that a picture is the mean of, and what first hits alone tell.
+
+Pixels are worked on in blocks, so that memory beyond the picture itself does not grow with it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import Camera
+from baker.reference.camera import camera_rays
+from baker.reference.first_hit import FirstHits, first_hits
+from baker.reference.irradiance import PointEstimate, add_pass, new_estimate, openness_pass
+from baker.reference.radiance import radiance_pass
+from baker.reference.view import Reference
+from baker.rendering.baked import BakedLight
+from baker.rendering.settings import RenderSettings
+
+STAGE = "rendering"
+# Samples of a pixel in one pass.
+_PASS, _OPENNESS_PASS = 4, 16
+# Samples that a slow machine makes in a second: passes are small where time is short.
+_RATE, _OPENNESS_RATE = 2.0e4, 2.0e5
+_BLOCK = 1 << 14
+_AOV_SAMPLES = 4
+
+
+@dataclass
+class Run:
+    """One picture being rendered.
+
+    Attributes
+    ----------
+    reference : Reference
+    camera : Camera
+    settings : RenderSettings
+    start : float
+        When it began, by `time.monotonic`.
+    progress : Progress
+    passed : float
+        When the last pass ended, 0 before the first.
+    """
+
+    reference: Reference
+    camera: Camera
+    settings: RenderSettings
+    start: float
+    progress: Progress = silent
+    passed: float = 0.0
+
+    @property
+    def pixels(self) -> int:
+        """Return the number of pixels."""
+        return self.settings.width * self.settings.height
+
+    def samples(self, most: int, rate: float) -> int:
+        """Return the samples of a pass: `most`, or less so that there are two passes, or time is short."""
+        goal, limit = self.settings.goal, self.settings.time_limit
+        if goal is not None:
+            most = min(most, goal // 2)
+        if limit is not None:
+            most = min(most, int(limit * rate / self.pixels))
+        return max(most, 1)
+
+    def enough(self, estimate: PointEstimate) -> bool:
+        """Tell if rendering may end: all samples are made, or another pass would take too long."""
+        now = time.monotonic()
+        last, self.passed = now - self.passed, now
+        self.tell(estimate, 0.0)
+        # Two passes at least: there is no variance of one.
+        if estimate.rounds < 2:
+            return False
+        goal, limit = self.settings.goal, self.settings.time_limit
+        if goal is not None and estimate.rounds * estimate.samples >= goal:
+            return True
+        return limit is not None and now - self.start + last > limit
+
+    def tell(self, estimate: PointEstimate, part: float) -> None:
+        """Report how far the picture is, `part` of the next pass being done."""
+        goal, limit = self.settings.goal, self.settings.time_limit
+        done = estimate.rounds * estimate.samples
+        by_samples = 0.0 if goal is None else (done + part * estimate.samples) / goal
+        by_time = 0.0 if limit is None else (time.monotonic() - self.start) / limit
+        report(self.progress, STAGE, min(max(by_samples, by_time), 1.0), f"{done} samples a pixel")
+
+    def within(self, estimate: PointEstimate) -> Progress:
+        """Return what a pass may report to: its share counts as a share of the picture."""
+
+        def told(_: str, fraction: float, __: str = "", /) -> None:
+            self.tell(estimate, fraction)
+
+        return told
+
+    def hits(self, begin: int, end: int, number: int) -> FirstHits:
+        """Return what one ray through each pixel from `begin` to `end` meets in pass `number`."""
+        settings, camera = self.settings, self.camera
+        pixel = np.arange(begin, end)
+        way = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
+        return first_hits(self.reference, np.array(camera.position), way.reshape(-1, 3))
+
+    def blocks(self, work: Callable[[int, int], None], progress: Progress) -> None:
+        """Call `work(begin, end)` for all pixels, on all threads."""
+        run_tiles(self.pixels, _BLOCK, work, threads=self.reference.threads, stage=STAGE, progress=progress)
+
+
+def traced(run: Run) -> PointEstimate:
+    """Return the radiance (H * W, 3), cd/m2, that path tracing finds."""
+    settings = run.settings
+    estimate = new_estimate(run.pixels, 3, run.samples(_PASS, _RATE))
+    bounces = None if settings.max_depth is None else settings.max_depth - 1
+    while not run.enough(estimate):
+        radiance_pass(
+            run.reference, estimate, run.camera, settings.width, settings.height,
+            estimator=settings.estimator, max_bounces=bounces, seed=settings.seed,
+            progress=run.within(estimate),
+        )  # fmt: skip
+    return estimate
+
+
+def openness(run: Run, distance: float) -> PointEstimate:
+    """Return ambient occlusion (H * W, 1), 1 being open; where nothing is met it is open."""
+    estimate = new_estimate(run.pixels, 1, run.samples(_OPENNESS_PASS, _OPENNESS_RATE))
+    while not run.enough(estimate):
+        cast = run.pixels
+        for begin in range(0, run.pixels, _BLOCK):
+            run.tell(estimate, begin / run.pixels)
+            end = min(begin + _BLOCK, run.pixels)
+            hits = run.hits(begin, end, estimate.rounds)
+            met = np.flatnonzero(hits.triangle >= 0)
+            one = new_estimate(len(met), 1, estimate.samples)
+            one.rounds = estimate.rounds
+            where = (a[met][:, None] for a in (hits.position, hits.normal, hits.face_normal))
+            # Points are numbered from 0 in each block: with one seed all blocks would draw the same numbers.
+            seed = (run.settings.seed + 7919 * (begin // _BLOCK)) & 0x7FFFFFFF
+            openness_pass(run.reference, one, *where, distance=distance, seed=seed)
+            share = np.ones((end - begin, 1))
+            share[met] = one.mean
+            add_pass(estimate, np.arange(begin, end), share)
+            cast += one.rays
+        estimate.rounds += 1
+        estimate.rays += cast
+    return estimate
+
+
+def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
+    """Return what an engine shows (H * W, 3), cd/m2: albedo x map / pi + emission, black backs, the sky."""
+    estimate = new_estimate(run.pixels, 3, 1)
+
+    def work(begin: int, end: int) -> None:
+        hits = run.hits(begin, end, estimate.rounds)
+        light = baked.radiance(run.reference, hits)
+        light[hits.triangle < 0] = sky
+        add_pass(estimate, np.arange(begin, end), light)
+
+    while not run.enough(estimate):
+        run.blocks(work, run.within(estimate))
+        estimate.rounds += 1
+        estimate.rays += run.pixels
+    return estimate
+
+
+def first_layers(run: Run) -> dict[str, NDArray[np.float32]]:
+    """Return albedo and normal of first hits, means over a few samples, and the depth of the first sample."""
+    n = run.pixels
+    total: dict[str, NDArray[Any]] = {
+        "albedo": np.zeros((n, 3)), "normal": np.zeros((n, 3)), "depth": np.zeros((n, 1))
+    }  # fmt: skip
+
+    def work(begin: int, end: int) -> None:
+        for number in range(_AOV_SAMPLES):
+            hits = run.hits(begin, end, number)
+            total["albedo"][begin:end] += hits.albedo / _AOV_SAMPLES
+            total["normal"][begin:end] += hits.normal / _AOV_SAMPLES
+            if number == 0:
+                total["depth"][begin:end, 0] = np.where(np.isfinite(hits.depth), hits.depth, 0.0)
+
+    run.blocks(work, run.progress)
+    shape = (run.settings.height, run.settings.width, -1)
+    return {name: value.astype(np.float32).reshape(shape) for name, value in total.items()}
