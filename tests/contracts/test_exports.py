@@ -8,6 +8,7 @@ import json
 import math
 import re
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,6 +111,16 @@ def test_every_file_is_in_the_manifest(bake, name):
     for file, path in found.items():
         assert hashlib.sha256(path.read_bytes()).hexdigest() == listed[file]
     assert json.loads((out / "bake.json").read_text("utf-8"))["files"] == manifest["files"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_docs_name_every_file(bake, name):
+    page = (Path(__file__).parents[2] / "docs" / "engines" / f"{name}.md").read_text("utf-8")
+    rows = re.search(r"^\| file in .*?\n\n", page, re.DOTALL | re.MULTILINE).group()
+    first = " ".join(row.split("|")[1] for row in rows.splitlines()[2:] if row)
+    found = {p.relative_to(bake[0] / name).as_posix() for p in (bake[0] / name).rglob("*") if p.is_file()}
+    files = {re.sub(r"irradiance_\d+", "irradiance_N", file) for file in found}
+    assert set(re.findall(r"`(.+?)`", first)) == files
 
 
 def test_the_same_bake_gives_the_same_bytes(bake, tmp_path):

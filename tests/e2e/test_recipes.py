@@ -1,0 +1,133 @@
+"""The recipes of docs/BATCH.md do what they say: the Makefile whole, the pipelines' shell lines."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+RECIPES = ROOT / "docs" / "recipes"
+# As quick as can be: the bake is coarse, and its judgement not a strict one.
+QUICK = "--texels 20 --spp 4"
+LIMITS = "irradiance.median > 0.5"
+
+
+@pytest.fixture(scope="module")
+def game(tmp_path_factory):
+    """Return a folder as the recipes want it, baked by the Makefile."""
+    folder = tmp_path_factory.mktemp("recipes") / "game"
+    (folder / "levels").mkdir(parents=True)
+    shutil.copy(ROOT / "assets" / "cornell.glb", folder / "levels")
+    shutil.copy(RECIPES / "Makefile", folder)
+    write_jobs(folder, 48)
+    code, text = run(folder, "make", "bake")
+    assert code == 0, text
+    assert "1 baked, 0 unchanged" in text
+    return folder
+
+
+def write_jobs(folder, resolution):
+    text = (RECIPES / "JOBS.toml").read_text("utf-8")
+    for old, new in (("resolution = 1024", f"resolution = {resolution}"), ('"high"', '"preview"')):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (folder / "JOBS.toml").write_text(text)
+
+
+def run(folder, *command, **more):
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, **more, "PATH": path}
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def make(folder, limits=LIMITS):
+    return run(folder, "make", f"VERIFY={QUICK}", f"LIMITS={limits}")
+
+
+def told(folder, name):
+    """Return the sums of a JUnit file: cases, failures."""
+    root = ElementTree.parse(folder / "reports" / name).getroot()
+    return int(root.get("tests")), int(root.get("failures"))
+
+
+def test_the_makefile(game):
+    code, text = make(game)
+    assert code == 0, text
+    assert [told(game, f"{name}.xml") for name in ("batch", "verify-cornell")] == [(1, 0), (1, 0)]
+
+    # Then there is nothing to do, whatever the clock says of the scene.
+    (game / "levels" / "cornell.glb").touch()
+    code, text = make(game)
+    assert code == 0, text
+    assert "0 baked, 1 unchanged" in text
+    assert "baker verify" not in text
+
+    # Another setting: another bake, and a judgement, which this time nothing could pass.
+    write_jobs(game, 32)
+    code, text = make(game, "irradiance.median > 0.000001")
+    assert code != 0
+    assert "1 baked, 0 unchanged" in text
+    assert told(game, "verify-cornell.xml") == (1, 1)
+    # The bake stays, and its stamp is the old one: it will be judged again.
+    stamp, bake = game / "reports" / "cornell.verified", game / "baked" / "cornell" / "bake.json"
+    assert stamp.stat().st_mtime < bake.stat().st_mtime
+
+
+def test_the_makefile_stops_at_a_scene_that_is_no_scene(game, tmp_path):
+    folder = tmp_path / "game"
+    shutil.copytree(game, folder, ignore=shutil.ignore_patterns("baked", "reports"))
+    (folder / "levels" / "pointer.glb").write_text("version https://git-lfs.github.com/spec/v1\n")
+    code, text = make(folder)
+    assert code != 0
+    assert "pointer.glb" in text
+    assert not (folder / "baked").exists()
+
+
+def github():
+    """Return the shell lines of the GitHub recipe, step by step, and its variables."""
+    job = yaml.safe_load((RECIPES / "github-actions.yml").read_text("utf-8"))["jobs"]["bake"]
+    assert job["defaults"]["run"]["shell"] == "bash"
+    return [step["run"] for step in job["steps"] if "run" in step], job["env"]
+
+
+def gitlab():
+    """Return the shell lines of the GitLab recipe and its variables."""
+    job = yaml.safe_load((RECIPES / "gitlab-ci.yml").read_text("utf-8"))["bake"]
+    return [*job["before_script"], "\n".join(job["script"])], job["variables"]
+
+
+@pytest.mark.parametrize("recipe", [github, gitlab])
+def test_the_lines_of_a_pipeline(game, tmp_path, recipe):
+    folder = tmp_path / "game"
+    # What the cache brings.
+    shutil.copytree(game, folder, ignore=shutil.ignore_patterns("reports"))
+    steps, variables = recipe()
+    assert steps[0].startswith("pip install ")
+    assert set(variables) == {"VERIFY", "LIMITS"}
+    text = ""
+    for step in steps[1:]:
+        code, said = shell(folder, step)
+        assert code == 0, said
+        text += said
+    assert "0 baked, 1 unchanged" in text
+    found = sorted(path.name for path in (folder / "reports").iterdir())
+    assert found == ["batch.xml", "check.xml", "verify-cornell.xml"]
+    # Whatever a judgement ends with counts for the job, here a limit that baker does not know.
+    code, said = shell(folder, steps[-1], limits="irradiance.nothing > 1")
+    assert code != 0
+    assert "nothing" in said
+
+
+def shell(folder, lines, limits=LIMITS):
+    """Run lines as both services do: they end at the first one that fails."""
+    return run(folder, "bash", "-eo", "pipefail", "-c", lines, VERIFY=QUICK, LIMITS=limits)
