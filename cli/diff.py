@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 from baker.cli.app import COMMANDS
 from baker.cli.failures import FAILED_CHECK
+from baker.cli.judged import write_failed, write_worst
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -93,32 +94,23 @@ def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:
     for name, check in found.channels.items():
         stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>11}" for c in columns) + "\n")
     most = None if verbose else _SHOWN
-    for size, name, entry in _furthest(found)[:most]:
+    for apart, name, entry in _furthest(found)[:most]:
         bias = entry["channels"][name]["bias"]
-        stream.write(
-            f"object: {name} of '{entry['object']}' (node {entry['node']}): bias {bias:+.2%}, "
-            f"nrmse {size:.2%}\n"
-        )
-    for entry in found.worst[:most]:
-        place = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
-        stream.write(
-            f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
-        )
-    for verdict in found.verdicts:
-        if verdict.failed:
-            value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"
-            stream.write(f"failed: {verdict.limit} ({value})\n")
+        whose = f"'{entry['object']}' (node {entry['node']})"
+        stream.write(f"object: {name} of {whose}: bias {bias:+.2%}, p95 {apart:.2%}\n")
+    write_worst(found.worst[:most], stream)
+    write_failed(found.verdicts, stream)
     verdict_text = ("passed" if found.passed else "FAILED") if found.verdicts else "done"
     stream.write(f"{verdict_text} ({found.seconds:.0f} s)\n")
 
 
 def _furthest(found: Difference) -> list[tuple[float, str, dict[str, Any]]]:
-    """Return (nrmse, channel, object) of objects that differ, the furthest first."""
+    """Return (p95, channel, object) of objects that differ, the furthest first."""
     apart = [
-        (float(figures["nrmse"]), name, entry)
+        (float(figures["p95"]), name, entry)
         for entry in found.objects
         for name, figures in entry["channels"].items()
-        if figures["nrmse"]
+        if figures["p95"]
     ]
     return sorted(apart, key=lambda item: -item[0])
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 from baker.cli.app import COMMANDS
 from baker.cli.failures import FAILED_CHECK
+from baker.cli.judged import write_failed, write_worst
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -125,15 +126,8 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
         if check.unresolved:
             share = check.unresolved / max(len(check.value), 1)
             stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")
-    for entry in found.worst[: None if verbose else 3]:
-        place = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
-        stream.write(
-            f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
-        )
-    for verdict in found.verdicts:
-        if verdict.failed:
-            value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"
-            stream.write(f"failed: {verdict.limit} ({value})\n")
+    write_worst(found.worst[: None if verbose else 3], stream)
+    write_failed(found.verdicts, stream)
     for problem in found.problems:
         stream.write(f"failed: {problem}\n")
     stream.write(f"{'passed' if found.passed else 'FAILED'} ({found.seconds:.0f} s)\n")

@@ -80,6 +80,19 @@ def quad_scene(quads):
     return Scene("tiny", None, tuple(meshes), tuple(q.material for q in quads), tuple(instances))
 
 
+def joined(scene, order=slice(None)):
+    """The same triangles as one object, in another order."""
+    first = np.cumsum([0, *(len(m.position) for m in scene.meshes)])
+    names = ("position", "normal", "material", "primitive", "vertex_primitive", "source_vertex")
+    column = {name: np.concatenate([getattr(m, name) for m in scene.meshes]) for name in names}
+    triangle = np.concatenate([m.triangle + s for m, s in zip(scene.meshes, first, strict=False)])
+    # A triangle's material goes with it.
+    for name in ("material", "primitive"):
+        column[name] = column[name][order]
+    mesh = Mesh("all", triangle=np.int32(triangle[order]), **column)
+    return Scene("tiny", None, (mesh,), scene.materials, (Instance(0, "all", 0, np.eye(4)),))
+
+
 def quad_atlas(scene, size, inset=0.0):
     """Put each quad into its own cell of a square grid, `inset` texels away from the cell's border."""
     side = int(np.ceil(np.sqrt(len(scene.instances))))

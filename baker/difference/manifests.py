@@ -36,14 +36,16 @@ def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> li
 def _facts(bake: StoredBake) -> Iterator[tuple[str, Any]]:
     manifest = bake.manifest
     for section in ("input", "settings", "versions"):
-        for key, value in (manifest.get(section) or {}).items():
+        entries = manifest.get(section)
+        for key, value in entries.items() if isinstance(entries, dict) else ():
             # The path is told from the output folder, so it differs with that, too.
             if (section, key) != ("input", "path"):
                 yield f"{section}.{key}", value
     yield "pages.count", bake.atlas.n_pages
     yield "pages.resolution", bake.atlas.resolution
     yield "pages.channels", list(bake.maps)
-    for light in manifest.get("lights") or []:
+    lights = manifest.get("lights")
+    for light in lights if isinstance(lights, list) else ():
         name = (
             f"lights.{light.get('kind')} '{light.get('name')}' {light.get('node', light.get('material', ''))}"
         )

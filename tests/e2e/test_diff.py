@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from baker.cli.app import run
-from tiny_scenes import Quad, box_quads, grey, quad_scene
+from tiny_scenes import Quad, box_quads, grey, joined, quad_scene
 
 from baker.core.geometry import world_geometry
 from baker.core.scene import PunctualLight
@@ -162,6 +162,19 @@ def test_what_is_no_bake(first, tmp_path):
         assert code == 3
         assert "holds no bake" in found["error"]["message"]
         assert found["error"]["file"] == str(tmp_path)
+
+
+def test_a_room_that_was_joined_into_one_object_is_found(first, tmp_path):
+    scene = joined(quad_scene([*ROOM, LAMP]), np.random.default_rng(1).permutation(14))
+    settings = make_settings({"resolution": 96, "samples": 64, "ao_distance": "0.7", "denoise": False})
+    bake(replace(scene, lights=(BULB,)), settings=settings, out=tmp_path / "joined")
+    for pair in ((tmp_path / "joined", first), (first, tmp_path / "joined")):
+        code, found = told(*pair, "--no-flip")
+        assert code == 0
+        assert found["only_in_a"] == found["only_in_b"] == []
+        assert found["unmatched"] == 0
+        assert abs(found["channels"]["irradiance"]["bias"]) < 0.002
+        assert found["channels"]["irradiance"]["nrmse"] < 0.015
 
 
 def test_an_object_of_one_side_only(first, tmp_path):

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_scenes import Quad, quad_atlas, quad_scene
+from tiny_scenes import Quad, joined, quad_atlas, quad_scene
 
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
-from baker.core.scene import Instance, Mesh, Scene
 from baker.difference.match import SurfacePoints, make_sides, match
 from baker.difference.pairs import pair_objects
 from baker.difference.pictures import read
@@ -19,19 +18,6 @@ from baker.io.bake_folder import StoredBake
 
 FLOOR = Quad((0, 0, 0), (4, 0, 0), (0, 2, 0))
 CEILING = Quad((0, 0, 3), (0, 2, 0), (4, 0, 0))
-
-
-def joined(scene, order=slice(None), name="all"):
-    """The same triangles as one object, in another order."""
-    first = np.cumsum([0, *(len(m.position) for m in scene.meshes)])
-    names = ("position", "normal", "material", "primitive", "vertex_primitive", "source_vertex")
-    column = {name: np.concatenate([getattr(m, name) for m in scene.meshes]) for name in names}
-    triangle = np.concatenate([m.triangle + s for m, s in zip(scene.meshes, first, strict=False)])[order]
-    return of_mesh(Mesh("all", triangle=np.int32(triangle), **column), name, scene)
-
-
-def of_mesh(mesh, name, scene):
-    return Scene("x", None, (mesh,), scene.materials, (Instance(0, name, 0, np.eye(4)),))
 
 
 def plain_atlas(scene):
