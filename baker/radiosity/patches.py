@@ -1,6 +1,8 @@
 """Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
 
-Texels in narrow gaps form patches apart from those outside.
+Texels in narrow gaps form patches apart from those outside, and where a gap is narrower than a texel each is
+a patch of its own if there are not too many: light gets no further into such a gap than a few times its
+width, but would cross all of a patch at once.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
 far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity
@@ -16,8 +18,10 @@ from numpy.typing import NDArray
 
 from baker.core.texels import TexelBuffer
 
-# The most patches a solve may have; larger pages get larger blocks.
+# The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
 MAX_PATCHES = 32768
+# Depth in gaps (`crevices`) from which blocks are as small as can be.
+_NARROW = 2
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class PatchSet:
     first : (P + 1,) int64, `member` : (n,) int32, entries patch by patch, in rising order
     cumulative : (n,) float32, running share of the patch's area along `member`
     area : (P,) float64, m2
-    block : int, side of a block in texels
+    block : int, side of a block outside narrow gaps in texels
     """
 
     patch: NDArray[np.int32]
@@ -66,15 +70,15 @@ def build_patches(
     ----------
     texels : TexelBuffer
     depth : (n,) uint8, optional
-        0 to 2; entries of different depth share no patch (`crevices`).
+        0 to 2; entries of different depth share no patch (`crevices`). Those of depth 2 form smaller blocks
+        that keep to `max_patches` for themselves.
     """
     depth = np.zeros(len(texels.pixel), np.uint8) if depth is None else depth
-    block = 1
-    while True:
-        number, n_patches = _blocks(texels, depth, block)
-        if n_patches <= max_patches or block >= 256:
-            break
-        block *= 2
+    block = _smallest_block(texels, depth, np.arange(len(depth)), max_patches)
+    narrow = np.flatnonzero(depth >= _NARROW)
+    side = np.full(len(depth), block, np.int64)
+    side[narrow] = min(_smallest_block(texels, depth, narrow, max_patches), block)
+    number, n_patches = _blocks(texels, depth, side)
     order = np.argsort(number, kind="stable").astype(np.int32)
     first = np.zeros(n_patches + 1, np.int64)
     np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
@@ -88,19 +92,40 @@ def build_patches(
     return PatchSet(number, first, order, cumulative.astype(np.float32), area, block)
 
 
-def _blocks(texels: TexelBuffer, depth: NDArray[np.uint8], block: int) -> tuple[NDArray[np.int32], int]:
-    """Number the blocks of one size in Morton order of their first texel."""
+def _smallest_block(
+    texels: TexelBuffer, depth: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
+) -> int:
+    """Return the side of the smallest blocks that cut the chosen entries into at most `max_patches`."""
+    # Entries of one side of a page lie in pixels of their own: blocks of one texel are as many as they.
+    if len(chosen) <= max_patches:
+        return 1
+    block = 2
+    while block < 256:
+        key = _keys(texels, depth, np.full(len(depth), block, np.int64))
+        if len(np.unique(key[chosen])) <= max_patches:
+            break
+        block *= 2
+    return block
+
+
+def _keys(texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return (n,) int64 that are equal for entries of one block; `side` is that of each entry's blocks."""
     size = texels.resolution
     page, rest = np.divmod(texels.pixel, size * size)
     row, column = np.divmod(rest, size)
     # 26 directions: an axis-aligned or diagonal surface is never split by rounding.
     facing = np.rint(texels.normal.astype(np.float64) * 1.2).astype(np.int64) + 1
     direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
-    per_side = -(-size // block)
-    key = (page * per_side + row // block) * per_side + column // block
+    key = (page * size + row // side) * size + column // side
     key = (key * (int(texels.chart.max(initial=0)) + 1) + texels.chart) * 162
-    key += (direction * 2 + texels.back) * 3 + depth
-    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    return np.asarray(key + (direction * 2 + texels.back) * 3 + depth, np.int64)
+
+
+def _blocks(
+    texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], int]:
+    """Number the blocks in Morton order of their first texel."""
+    _, first, inverse = np.unique(_keys(texels, depth, side), return_index=True, return_inverse=True)
     rank = np.zeros(len(first), np.int32)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first), dtype=np.int32)
     return rank[inverse.reshape(-1)], len(first)

@@ -8,7 +8,9 @@ from tiny_scenes import Quad, quad_world
 
 from baker.core.progress import silent
 from baker.radiosity.crevices import gap_depth
+from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.patches import build_patches
+from baker.radiosity.solve import solve_radiosity
 
 SIDE = 4.0 / 31
 
@@ -64,3 +66,40 @@ def test_patches_end_at_the_mouth_of_a_gap(world):
         assert len(np.unique(found[patches.member[patches.first[p] : patches.first[p + 1]]])) == 1
     assert mixed.n < patches.n
     assert patches.area.sum() == pytest.approx(mixed.area.sum())
+
+
+def test_in_a_narrow_gap_each_texel_is_a_patch_and_light_does_not_cross_it():
+    """A sheet as near to the floor as a tenth of a texel; only the floor at one edge of it is lit."""
+    floors = [Quad((9 * k, 0, 0), (0, 0, 4), (4, 0, 0)) for k in range(8)]
+    sheet = Quad((1, 0.02, 1), (1.5, 0, 0), (0, 0, 1.5))
+    world = quad_world([*floors, sheet], 64, inset=0.0)
+    texels = world.texels
+    found, _ = depth(world)
+    x = texels.position[:, 0]
+    lit = (texels.instance == 0) & (np.abs(x - 2.5) < 0.2)
+    light = np.repeat(1000 * lit[:, None].astype(np.float32), 3, axis=1)
+    deep = (found == 2) & (x > 1.4) & (x < 1.9)
+    indirect = {}
+    for name, used in (("texels", found), ("blocks", found.clip(max=1))):
+        patches = build_patches(texels, used, max_patches=500)
+        members = np.diff(patches.first)[patches.patch]
+        assert patches.block == 4
+        assert members[used == 0].max() == 16
+        assert (members[deep].max() == 1) == (name == "texels")
+        matrix = build_form_factors(
+            patches, texels.hit_image(patches.patch, fill=-1), world.surface, world.free, world.table,
+            world.rays.tracer, n_rays=64, seed=0, threads=1, progress=silent,
+        )  # fmt: skip
+        source, albedo = patches.mean(light, texels.area), np.full((patches.n, 3), 0.7)
+        solution = solve_radiosity(matrix, source, albedo, patches.area, bounces=None, progress=silent)
+        indirect[name] = solution.irradiance[patches.patch[deep], 0].mean()
+    assert indirect["texels"] < 0.05 * indirect["blocks"]
+
+
+def test_many_texels_in_gaps_share_patches_again(world):
+    found, _ = depth(world)
+    most = int((found == 2).sum()) // 2
+    patches = build_patches(world.texels, found, max_patches=most)
+    shared = np.diff(patches.first)[patches.patch[found == 2]]
+    assert 1 < shared.max() <= patches.block**2
+    assert len(np.unique(patches.patch[found == 2])) <= most
