@@ -99,6 +99,14 @@ def test_an_object_that_is_nowhere_else_is_missing_though_it_lies_on_another():
     assert ((found.triangle < 0) == (sides.a.instance[points.triangle] == 2)).all()
 
 
+def test_what_has_no_partner_on_either_side_is_not_taken_for_one_another():
+    chair, table = Quad((1, 1, 1), (1, 0, 0), (0, 1, 0)), Quad((2, 1, 2), (1, 0, 0), (0, 1, 0))
+    a, b = quad_scene([FLOOR, chair]), quad_scene([FLOOR, table])
+    b = replace(b, instances=(b.instances[0], replace(b.instances[1], name="table")))
+    sides = sides_of(a, b)
+    assert sides.missing_a.tolist() == sides.missing_b.tolist() == [False, True]
+
+
 def test_a_moved_and_mirrored_object_is_compared_with_itself():
     scene = quad_scene([FLOOR])
     matrix = np.diag([-2.0, 1, 1, 1])
