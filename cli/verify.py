@@ -123,6 +123,10 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
     stream.write(f"{'':12}" + "".join(f"{name:>13}" for name in columns) + "\n")
     for name, check in found.channels.items():
         stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>13}" for c in columns) + "\n")
+        ratio, error = check.figures["energy_ratio"], check.figures["energy_ratio_se"]
+        if ratio is not None:
+            give = "" if error is None else f" +- {error:.4f}"
+            stream.write(f"  energy ratio {ratio:.4f}{give}\n")
         if check.unresolved:
             share = check.unresolved / max(len(check.value), 1)
             stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")

@@ -31,7 +31,7 @@ from baker.judge.texel_area import instance_map, texel_points
 from baker.judge.worst import worst_texels
 
 # A second bake has no noise that is known, so no limit can be set on it.
-LIMITED = (*(name for name in FIGURES if not name.startswith(("noise", "z_"))), "flip")
+LIMITED = (*(name for name in FIGURES if not name.startswith(("noise", "z_", "energy"))), "flip")
 
 
 @dataclass(frozen=True)

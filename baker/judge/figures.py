@@ -8,15 +8,21 @@ For each place the mean over colours v of the value and r of the reference:
     nrmse            rmse / mean(r)
     relmse           mean (v - r)^2 / (r^2 + 0.01 mean(r)^2)
     z                (v_c - r_c) / standard error of r_c
+    energy ratio     R = sum w v / sum w r            w: the surface, m2, that a place stands for
+    its error        sqrt(sum w^2 (v - R r)^2) / sum w r
 
 `median`, `p95`, `p99`, `max` are of the relative error, whose floor keeps places in the dark from deciding:
 an error there counts against a tenth of the median light, or a hundredth of the mean, if that is more.
 `noise_floor` is the median relative error that the reference alone would show, `noise_p95` its 95th
 percentile: two independent halves of it are compared, and their difference is halved, since the mean of both
 halves is nearer to the truth than either by that much.
+`energy_ratio` tells, as a furnace does, whether light is gained or lost on the whole: all that the maps hold
+over all that the reference finds. `bias` weighs places alike, and small objects have more of them than their
+area would give. `energy_ratio_se` is the standard error of such a ratio: it holds the reference's noise and
+which places were picked, since both move v - R r.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
-2011 (relMSE).
+2011 (relMSE); Cochran, Sampling Techniques, 1977, chapter 6 (ratios).
 """
 
 from __future__ import annotations
@@ -28,7 +34,7 @@ from numpy.typing import NDArray
 
 FIGURES = (
     "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "noise_p95",
-    "z_rms",
+    "z_rms", "energy_ratio", "energy_ratio_se",
 )  # fmt: skip
 # Values below this share of the median, or of the mean, count as dark.
 _DARK_MEDIAN, _DARK_MEAN = 0.1, 0.01
@@ -59,6 +65,7 @@ def figures(
     standard_error: NDArray[np.float64] | None = None,
     halves: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     floor: float | None = None,
+    weight: NDArray[np.float64] | None = None,
 ) -> dict[str, float | int | None]:
     """Return the figures of this file's head by name.
 
@@ -71,6 +78,8 @@ def figures(
         Independent halves of the reference; without them its noise is None.
     floor : float, optional
         See above; by default `dark_floor` of the reference.
+    weight : (n,), m2, optional
+        Surface that each place stands for; without it the energy ratio is None.
 
     Returns
     -------
@@ -99,7 +108,25 @@ def figures(
     if standard_error is not None:
         z = z_scores(value, reference, standard_error)
         found["z_rms"] = math.sqrt(float((z**2).mean())) if z.size else None
+    if weight is not None:
+        found["energy_ratio"], found["energy_ratio_se"] = energy_ratio(v, r, weight)
     return found
+
+
+def energy_ratio(
+    value: NDArray[np.float64], reference: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[float | None, float | None]:
+    """Return the ratio of this file's head for colour means (n,), and its standard error.
+
+    Both are None where the reference holds no light; the error also for a single place.
+    """
+    total = float((weight * reference).sum())
+    if not total > 0:
+        return None, None
+    ratio = float((weight * value).sum()) / total
+    if len(value) < 2:
+        return ratio, None
+    return ratio, math.sqrt(float(((weight * (value - ratio * reference)) ** 2).sum())) / total
 
 
 def z_scores(

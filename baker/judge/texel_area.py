@@ -30,6 +30,8 @@ class TexelPlaces:
         World; `normal` is the shading normal, both on the triangle's front.
     area : (n,) float64
         Share of the texel's square that surface covers.
+    surface : (n,) float64
+        That surface's size in the world, m2.
     middle : (n, 2) float64
         Mean of the places from the texel's centre, (column, row), texels; 0 where all of it is covered.
     """
@@ -38,6 +40,7 @@ class TexelPlaces:
     normal: NDArray[np.float64]
     face_normal: NDArray[np.float64]
     area: NDArray[np.float64]
+    surface: NDArray[np.float64]
     middle: NDArray[np.float64]
 
 
@@ -73,7 +76,22 @@ def texel_places(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    return TexelPlaces(position, normal, face, covered, middle)
+    surface = covered * _square_metres(geometry, found, resolution).mean(axis=1)
+    return TexelPlaces(position, normal, face, covered, surface, middle)
+
+
+def _square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:
+    """Return how many m2 of the world one texel's square is on triangles (n, k)."""
+    corner = geometry.triangle[triangle]
+    one, two = (
+        geometry.position[corner[..., k]].astype(np.float64) - geometry.position[corner[..., 0]]
+        for k in (1, 2)
+    )
+    u, v = ((geometry.uv[corner[..., k]].astype(np.float64) - geometry.uv[corner[..., 0]]) for k in (1, 2))
+    texels = np.abs(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]) * resolution**2
+    world = np.linalg.norm(np.cross(one, two), axis=-1)
+    # Places lie where a triangle takes some of the page, so its uv area is not zero.
+    return np.asarray(world / np.maximum(texels, 1e-12), np.float64)
 
 
 def texel_points(

@@ -23,7 +23,7 @@ _SHOWN = 512
 # Relative errors of these colours' ends: dark blue is none, yellow is this and more.
 _HOT = 0.10
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem}
-table{border-collapse:collapse;margin:1rem 0}
+.wide{overflow-x:auto}table{border-collapse:collapse;margin:1rem 0}
 td,th{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}
 td:first-child,th:first-child{text-align:left}
 img{image-rendering:pixelated;background:#000;margin-right:.6rem}
@@ -78,16 +78,21 @@ def _failures(found: Verification) -> str:
 
 
 def _figures_table(found: Verification) -> str:
-    head = "".join(f"<th>{name}</th>" for name in (*FIGURES, "flip"))
+    # A row for each figure: side by side they are wider than a page.
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
     rows = ""
-    for name, check in found.channels.items():
-        cells = "".join(f"<td>{_number(check.figures[key])}</td>" for key in FIGURES)
-        rows += f"<tr><td>{name}</td>{cells}<td>{_number(mean_flip(found, name))}</td></tr>"
+    for key in FIGURES:
+        cells = "".join(f"<td>{_number(check.figures[key])}</td>" for check in found.channels.values())
+        rows += f"<tr><td>{key}</td>{cells}</tr>"
+    cells = "".join(f"<td>{_number(mean_flip(found, name))}</td>" for name in found.channels)
+    rows += f"<tr><td>flip</td>{cells}</tr>"
     note = (
         "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's "
-        "own noise adds to the median. flip is the mean over the pictures of the worst places below.</p>"
+        "own noise adds to the median. energy_ratio is all that the map holds over all that path "
+        "tracing finds, by area, with its standard error. flip is the mean over the pictures of the worst "
+        "places below.</p>"
     )
-    return f"<table><tr><th>channel</th>{head}</tr>{rows}</table>{note}"
+    return f"<table><tr><th>figure</th>{head}</tr>{rows}</table>{note}"
 
 
 def _number(value: Any) -> str:
@@ -188,7 +193,7 @@ def _worst_table(found: Verification) -> str:
         )
     head = "<tr><th>object</th><th>node</th><th>channel</th><th>page, row, column</th><th>position</th>"
     head += "<th>stored</th><th>path-traced</th><th>error</th></tr>"
-    return f"<h2>Worst texels</h2><table>{head}{rows}</table>"
+    return f"<h2>Worst texels</h2><div class=wide><table>{head}{rows}</table></div>"
 
 
 def _objects_table(found: Verification) -> str:
@@ -200,4 +205,4 @@ def _objects_table(found: Verification) -> str:
             cells = "".join(f"<td>{_number(values[key])}</td>" for key in shown)
             rows += f"{name}<td>{channel}</td>{cells}</tr>"
     head = "".join(f"<th>{title}</th>" for title in ("object", "node", "channel", *shown))
-    return f"<h2>Objects</h2><table><tr>{head}</tr>{rows}</table>"
+    return f"<h2>Objects</h2><div class=wide><table><tr>{head}</tr>{rows}</table></div>"

@@ -182,7 +182,8 @@ def verify(
         raise InputError("the bake holds no channel that can be verified (irradiance, ao)", file=str(out))
     limits = parse_limits(settings.fail_if or _defaults(names), names, FIGURES)
     geometry = world_geometry(bake.scene, bake.atlas)
-    pixel, owner, places = _choose(bake, geometry, names[0], settings)
+    pixel, owner, places, stands_for = _choose(bake, geometry, names[0], settings)
+    weight = stands_for * places.surface
     baked = bake.manifest.get("settings", {})
     bounces = baked.get("bounces")
     deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
@@ -198,14 +199,16 @@ def verify(
             estimates["irradiance"] = trace_irradiance(reference, places, bounces, effort, progress)
         covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
         channels = {
-            name: _channel(bake.maps[name], covered, pixel, places, estimates[name], settings.target_se)
+            name: _channel(
+                bake.maps[name], covered, pixel, places, weight, estimates[name], settings.target_se
+            )
             for name in names
         }
         middle = places.position.mean(axis=1)
         worst = worst_texels(bake.scene.instances, bake.atlas.resolution, pixel, owner, middle, channels)
         spare = None if settings.time_limit is None else _CROP_TIME * settings.time_limit
         crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)
-    objects = _objects(bake, owner, channels)
+    objects = _objects(bake, owner, channels, weight)
     verdicts = judge(limits, {name: check.figures for name, check in channels.items()})
     return Verification(
         bake=bake,
@@ -231,8 +234,8 @@ def _defaults(names: list[str]) -> str:
 
 def _choose(
     bake: StoredBake, geometry: Geometry, name: str, settings: VerifySettings
-) -> tuple[NDArray[np.int64], NDArray[np.int32], TexelPlaces]:
-    """Pick texels and spread places over them."""
+) -> tuple[NDArray[np.int64], NDArray[np.int32], TexelPlaces, NDArray[np.float64]]:
+    """Pick texels and spread places over them; tell how many texels of its object each of them stands for."""
     resolution = bake.atlas.resolution
     owner = instance_map(geometry, bake.atlas.n_pages, resolution).reshape(-1)
     judged = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED)).reshape(-1)
@@ -244,7 +247,11 @@ def _choose(
         raise InputError(
             "no texel of the bake lies on a surface; bake the scene again", file=str(bake.folder)
         )
-    return pixel, owner[pixel], texel_places(geometry, pixel, resolution, PLACES, settings.seed)
+    n = len(bake.scene.instances)
+    chosen = owner[pixel]
+    of_object = np.bincount(owner[judged & (owner >= 0)], minlength=n)
+    stands_for = (of_object / np.maximum(np.bincount(chosen, minlength=n), 1))[chosen]
+    return pixel, chosen, texel_places(geometry, pixel, resolution, PLACES, settings.seed), stands_for
 
 
 def _channel(
@@ -252,6 +259,7 @@ def _channel(
     covered: NDArray[np.bool_],
     pixel: NDArray[np.int64],
     places: TexelPlaces,
+    weight: NDArray[np.float64],
     estimate: PointEstimate,
     target: float,
 ) -> ChannelCheck:
@@ -271,7 +279,7 @@ def _channel(
         reference=truth,
         standard_error=error,
         halves=halves,
-        figures=figures(value, truth, standard_error=error, halves=halves),
+        figures=figures(value, truth, standard_error=error, halves=halves, weight=weight),
         shift=best_shift(page, covered, pixel, truth.mean(axis=1), error.mean(axis=1)),
         exponent=exponent(value.mean(axis=1), truth.mean(axis=1)),
         unresolved=unresolved,
@@ -279,7 +287,10 @@ def _channel(
 
 
 def _objects(
-    bake: StoredBake, owner: NDArray[np.int32], channels: dict[str, ChannelCheck]
+    bake: StoredBake,
+    owner: NDArray[np.int32],
+    channels: dict[str, ChannelCheck],
+    weight: NDArray[np.float64],
 ) -> list[dict[str, Any]]:
     """Return the figures of each object that was judged."""
     found = []
@@ -295,6 +306,7 @@ def _objects(
                 standard_error=check.standard_error[mine],
                 halves=(check.halves[0][mine], check.halves[1][mine]),
                 floor=floor[name],
+                weight=weight[mine],
             )
         found.append(entry)
     return found

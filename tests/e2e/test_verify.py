@@ -95,6 +95,9 @@ def test_a_sound_bake_passes(sound):
         found["worst"][0]
     )
     assert found["warnings"] == []
+    for figures in (light, ao):
+        assert 0 < figures["energy_ratio_se"] < 0.01
+        assert abs(figures["energy_ratio"] - 1) < 4 * figures["energy_ratio_se"] + 0.005
     assert sum(entry["channels"]["irradiance"]["texels"] for entry in found["objects"]) == light["texels"]
     assert sum(light["z_histogram"]["counts"]) > 3 * 350
 
@@ -112,6 +115,36 @@ def test_tampering_is_caught(sound, tmp_path, name):
         assert found["channels"]["irradiance"]["shift"] != [0, 0]
     if "gamma" in name:
         assert found["channels"]["irradiance"]["exponent"] == pytest.approx(1 / 2.2, abs=0.05)
+
+
+def test_light_gained_on_the_whole_is_told(sound, tmp_path):
+    out = tampered(sound, tmp_path, lambda pixels, _: pixels * 1.03)
+    limit = ("--fail-if", "irradiance.energy_ratio > 1.02, irradiance.energy_ratio < 0.98")
+    code, before = told(sound, *QUICK, *limit)
+    assert (code, before["passed"]) == (0, True)
+    code, after = told(out, *QUICK, *limit)
+    assert (code, [v["failed"] for v in after["limits"]]) == (1, [True, False])
+    ratio = [found["channels"]["irradiance"]["energy_ratio"] for found in (before, after)]
+    assert ratio[1] / ratio[0] == pytest.approx(1.03, rel=1e-3)
+    stream = StringIO()
+    assert run(["verify", str(out), *QUICK, *limit], out=stream) == 1
+    assert f"energy ratio {ratio[1]:.4f} +- " in stream.getvalue()
+
+
+def test_texels_stand_for_the_surface_of_their_objects(sound):
+    from baker.core.geometry import world_geometry
+    from baker.io.bake_folder import read_bake
+    from baker.judge.texel_area import instance_map, texel_places
+
+    stored = read_bake(sound)
+    geometry = world_geometry(stored.scene, stored.atlas)
+    owner = instance_map(geometry, 1, 128).reshape(-1)
+    pixel = np.flatnonzero(owner >= 0)
+    size = np.bincount(owner[pixel], weights=texel_places(geometry, pixel, 128, 4, 0).surface)
+    # Walls of 2 x 3 x 2 m, the lamp, the block's sides of 0.6 m.
+    np.testing.assert_allclose(np.sort(size[:6]), [4, 4, 6, 6, 6, 6], rtol=0.02)
+    assert size[6] == pytest.approx(0.48, rel=0.06)
+    np.testing.assert_allclose(size[7:], 0.36, rtol=0.06)
 
 
 def test_limits_decide_the_exit_code(sound):
@@ -152,6 +185,9 @@ def test_reports(sound, tmp_path):
     text = page.read_text()
     assert text.count("data:image/png;base64,") >= 4 + 9
     assert "http" not in text.replace("http-equiv", "")
+    assert "energy_ratio_se" in text
+    # No table is wider than a page of 1200 pixels: figures are rows, long tables scroll.
+    assert max(row.count("<th>") for row in text.split("<tr>")) <= 8
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.attrib["tests"]) >= 6
     assert suite.attrib["failures"] == "0"

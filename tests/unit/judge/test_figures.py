@@ -46,6 +46,30 @@ def test_noise_floor_is_what_noise_alone_shows():
     assert found["z_rms"] == pytest.approx(1.0, abs=0.05)
 
 
+def test_energy_ratio_by_hand():
+    value, truth = np.array([[1.0, 3.0], [4.0, 4.0]]), np.array([[1.0, 1.0], [5.0, 5.0]])
+    found = figures(value, truth, weight=np.array([3.0, 1.0]))
+    # Means over colours 2, 4 and 1, 5: (6 + 4) / (3 + 5).
+    assert found["energy_ratio"] == pytest.approx(1.25)
+    assert found["energy_ratio_se"] == pytest.approx(np.hypot(3 * (2 - 1.25), 4 - 6.25) / 8)
+    assert figures(value, truth)["energy_ratio"] is None
+    dark = figures(value, 0 * truth, weight=np.ones(2))
+    assert (dark["energy_ratio"], dark["energy_ratio_se"]) == (None, None)
+
+
+def test_the_error_of_the_energy_ratio_is_its_spread():
+    rng = np.random.default_rng(1)
+    ratios, errors = [], []
+    for _ in range(300):
+        truth = rng.uniform(0.1, 2.0, (200, 1))
+        noisy = truth * (1 + 0.1 * rng.standard_normal(truth.shape))
+        found = figures(1.1 * truth, noisy, weight=rng.uniform(0.5, 2.0, 200))
+        ratios.append(found["energy_ratio"])
+        errors.append(found["energy_ratio_se"])
+    assert np.mean(ratios) == pytest.approx(1.1, abs=0.002)
+    assert np.std(ratios) == pytest.approx(np.mean(errors), rel=0.15)
+
+
 def test_nothing_judged_has_no_figures():
     found = figures(np.zeros((0, 3)), np.zeros((0, 3)))
     assert found["texels"] == 0
