@@ -213,3 +213,13 @@ def test_few_bounces_are_judged_as_few(tmp_path):
     found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
     assert found.channels["irradiance"].reference.mean() == pytest.approx(1.5 * np.pi, rel=0.01)
     assert found.passed
+
+
+def test_a_bake_under_a_weaker_sky_is_judged_under_it(tmp_path):
+    scene = quad_scene(box_quads((0, 0, 0), (1, 1, 1), inward=False, material=grey(0.5)))
+    settings = make_settings({"resolution": 64, "samples": 64, "sky": "2,2,2", "sky_strength": 0.25})
+    bake(scene, settings=settings, out=tmp_path / "out")
+    found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
+    # A box alone sees nothing but the sky: E = pi L.
+    assert found.channels["irradiance"].reference == pytest.approx(0.5 * np.pi, rel=1e-3)
+    assert found.channels["irradiance"].figures["energy_ratio"] == pytest.approx(1, abs=0.002)
