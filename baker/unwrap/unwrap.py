@@ -64,7 +64,15 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     if kept.together:
         atlas = _keep_all(scene, settings, kept.warnings)
     else:
-        atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
+        try:
+            atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
+        except InputError as error:
+            # What packs charts does not know where they come from.
+            raise InputError(
+                error.message,
+                file=error.file or (str(scene.path) if scene.path else None),
+                object=error.object,
+            ) from None
     report(progress, STAGE, 1.0, f"{atlas.n_charts} charts, {atlas.n_pages} pages")
     return atlas
 
