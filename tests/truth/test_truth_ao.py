@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import limited_wall_open_share, wall_open_share
+from closed_forms import cornered_open_share, limited_wall_open_share, wall_open_share, walled_open_share
 from scenes import SceneBuilder, icosphere
 from ztest import assert_unbiased
 
@@ -27,7 +27,7 @@ def ao_rows(builder, floor, seed, **settings):
 
 
 def test_closed_forms_agree_with_quadrature():
-    """The two closed forms themselves against a plain sum over the projected disc."""
+    """The closed forms themselves against a plain sum over the projected disc."""
     x, y = np.meshgrid(*[(np.arange(1500) + 0.5) / 750 - 1] * 2)
     inside = x * x + y * y < 1
     x, z = x[inside], np.sqrt(1 - x[inside] ** 2 - y[inside] ** 2)
@@ -38,6 +38,13 @@ def test_closed_forms_agree_with_quadrature():
         assert 1 - blocked.mean() == pytest.approx(wall_open_share(d, h), abs=1e-3)
         blocked = toward & (d / x < h)
         assert 1 - blocked.mean() == pytest.approx(limited_wall_open_share(d, h), abs=1e-3)
+    for d, h, r in ((0.3, 1.0, 0.5), (0.1, 0.2, 0.5), (0.3, 0.2, 0.33), (0.4, 3.0, 1.0)):
+        blocked = toward & (d * z / x < h) & (d / x < r)
+        assert 1 - blocked.mean() == pytest.approx(walled_open_share(d, h, r), abs=1e-3)
+    y = y[inside]
+    for a, b, r in ((0.1, 0.1, 0.5), (0.3, 0.4, 0.5), (0.2, 0.45, 0.5), (0.01, 0.02, 1.0), (0.3, 0.7, 0.5)):
+        blocked = (x * r > a) | (y * r > b)
+        assert 1 - blocked.mean() == pytest.approx(cornered_open_share(a, b, r), abs=1e-3)
     assert wall_open_share(0.7, 1.0) == pytest.approx(0.7867, abs=1e-4)
 
 

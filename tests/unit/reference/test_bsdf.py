@@ -71,17 +71,19 @@ def test_samples_follow_their_density(name, degrees):
     random = np.random.default_rng(3).random((200_000, 3))
     found = draw_many(row, *view, random)
     up = found[:, 2] > 0
-    # What a rough lobe sends below the surface is lost; everything else must be where the density says.
-    assert mass.sum() == pytest.approx(up.mean(), abs=0.004)
+    # What a rough lobe sends below the surface is lost; with it the density integrates to 1, within three
+    # standard errors of the lost share and what the midpoint rule is good to.
+    lost = 1 - up.mean()
+    assert mass.sum() + lost == pytest.approx(1, abs=3 * np.sqrt(lost * up.mean() / len(up)) + 2e-4)
     if name == "lambert":
-        assert mass.sum() == pytest.approx(1, abs=1e-3)
+        assert mass.sum() == pytest.approx(1, abs=1e-9)
     z, phi = found[up, 2], np.arctan2(found[up, 1], found[up, 0]) % (2 * np.pi)
     cell = np.minimum((z * 12).astype(int), 11) * 16 + np.minimum((phi / (2 * np.pi) * 16).astype(int), 15)
     count = np.bincount(cell, minlength=len(cells))
     expected = mass / mass.sum() * up.sum()
-    # Narrow lobes: the midpoint rule inside a cell is good to a few permille only.
+    # Narrow lobes: the midpoint rule inside a cell is good to 0.3 % only.
     many = expected > 50
-    chi = ((count - expected)[many] ** 2 / (expected + (0.01 * expected) ** 2)[many]).sum()
+    chi = ((count - expected)[many] ** 2 / (expected + (0.003 * expected) ** 2)[many]).sum()
     assert chi < stats.chi2.isf(1e-4, many.sum())
 
 

@@ -1,0 +1,120 @@
+"""Runs of the reference on scenes of closed form, and the bar that each has to pass.
+
+A place is traced many times over: copies of it share no random numbers, so that their spread is what the
+standard errors that the reference tells of itself have to match.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from baker.core.scene import Scene
+from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
+from baker.reference.view import Reference, build_reference
+
+UP = (0.0, 0.0, 1.0)
+WITHIN = 0.002
+COPIES = 256
+
+
+def copies_of(place: Any, normal: Any = UP, copies: int = COPIES) -> tuple[np.ndarray, np.ndarray]:
+    """Return position and normal (n * copies, 1, 3) of n places (n, 3) that face `normal` (3,) or (n, 3)."""
+    place = np.atleast_2d(np.asarray(place, float))
+    normal = np.broadcast_to(np.asarray(normal, float), place.shape)
+    return np.repeat(place, copies, axis=0)[:, None], np.repeat(normal, copies, axis=0)[:, None]
+
+
+def spread_over(triangle: Any, samples: int, seed: int = 0, copies: int = COPIES) -> tuple[Any, Any]:
+    """Return position and normal (copies, samples, 3): random points, evenly many to a share of the area.
+
+    triangle : (t, 3, 3), the surface
+    """
+    rng = np.random.default_rng(seed)
+    corner = np.asarray(triangle, float)
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    share = (np.arange(samples) + rng.random((copies, samples))) / samples
+    chosen = np.minimum(np.searchsorted(np.cumsum(area) / area.sum(), share), len(corner) - 1)
+    u, v = np.sqrt(rng.random((copies, samples))), rng.random((copies, samples))
+    weight = np.stack([1 - u, u * (1 - v), u * v], axis=-1)
+    return (weight[..., None] * corner[chosen]).sum(axis=2), (cross / area[:, None])[chosen]
+
+
+def traced(
+    scene: Scene,
+    where: Any,
+    *,
+    passes: int = 8,
+    samples: int = 64,
+    sky: Any = (0, 0, 0),
+    threads: int = 2,
+    **how: Any,
+) -> PointEstimate:
+    """Return path-traced irradiance: `where` is position and normal, or a function of the pass that tells."""
+    with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
+        return _passes(irradiance_pass, reference, where, 3, passes, samples, how)
+
+
+def opened(scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64) -> PointEstimate:
+    """Return the ambient occlusion of the reference, 1 = open."""
+    with build_reference(scene, threads=2) as reference:
+        return _passes(openness_pass, reference, where, 1, passes, samples, {"distance": distance})
+
+
+def _passes(
+    trace: Any, reference: Reference, where: Any, channels: int, passes: int, samples: int, how: Any
+) -> PointEstimate:
+    estimate = None
+    for k in range(passes):
+        position, normal = where(k) if callable(where) else where
+        if estimate is None:
+            estimate = new_estimate(len(position), channels, samples)
+        trace(reference, estimate, position, normal, normal, **how)
+    assert estimate is not None
+    return estimate
+
+
+def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, rounding: float = 1e-5) -> None:
+    """Check each place, n of them in equally many copies, against its truth (n,).
+
+    Away by at most three of the standard errors that the reference itself tells, and by 0.2 %; the errors
+    small enough that three of them are below 0.2 %; and as large as the spread of the copies is.
+    rounding : share of the truth that is no noise: float32, and rays that leave surfaces by 1e-5 of the scene
+    Seeds are fixed. After a change of random numbers one place in 370 may be beyond three errors by chance:
+    one that stays there with other seeds is wrong.
+    """
+    truth = np.atleast_1d(np.asarray(truth, float))
+    mean = found.mean[:, channel].reshape(len(truth), -1)
+    error = found.standard_error[:, channel].reshape(len(truth), -1)
+    copies = mean.shape[1]
+    told = np.sqrt((error**2).sum(axis=1)) / copies
+    value = mean.mean(axis=1)
+    away, noise = value / truth - 1, told / truth
+    report = "\n".join(
+        f"place {k}: found {v:.6g}, truth {t:.6g}: {100 * a:+.4f} %, standard error {100 * s:.4f} %"
+        for k, (v, t, a, s) in enumerate(zip(value, truth, away, noise, strict=True))
+    )
+    print(report)  # noqa: T201, shown by pytest -rP
+    assert (3 * noise < WITHIN).all(), f"too noisy to tell\n{report}"
+    assert (np.abs(away) <= 3 * noise + rounding).all(), f"more than three standard errors away\n{report}"
+    assert (np.abs(away) <= WITHIN).all(), f"more than 0.2 % away\n{report}"
+    _assert_believable(mean, error, report)
+
+
+def _assert_believable(mean: Any, error: Any, report: str) -> None:
+    """Check that copies spread as their standard errors tell, by an F-test over all places."""
+    real, told = mean.var(axis=1, ddof=1), (error**2).mean(axis=1)
+    noisy = told > 0
+    if not noisy.any():
+        return
+    n = mean.shape[1]
+    ratio = float((real[noisy] / told[noisy]).mean())
+    degrees = noisy.sum() * (n - 1)
+    # Told errors come from a few passes of each copy: about as many degrees again.
+    low, high = stats.f.ppf([5e-5, 1 - 5e-5], degrees, degrees)
+    assert low < ratio < high, (
+        f"copies vary {ratio:.3f} times as told (from {low:.3f} to {high:.3f})\n{report}"
+    )
