@@ -12,7 +12,7 @@ def polygon_irradiance(polygon: Any, point: Any, normal: Any) -> np.ndarray:
 
     E = L / 2 sum_i angle_i Gamma_i . n; the whole polygon must lie above the surface, its front is the
     side from which its corners run counter-clockwise.
-    Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995, ch. 2.
+    Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995.
     """
     point, normal = np.asarray(point, float), np.asarray(normal, float)
     arm = np.asarray(polygon, float) - point[..., None, :]

@@ -4,7 +4,7 @@
 
 Based on: Malley, A shading method for computer generated images, 1988; Goral et al., Modeling the
 interaction of light between diffuse surfaces, 1984; Cohen and Wallace, Radiosity and realistic image
-synthesis, 1993, ch. 5.
+synthesis, 1993.
 """
 
 from __future__ import annotations

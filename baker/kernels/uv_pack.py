@@ -4,7 +4,7 @@ An outline is one texel span per row, so a free place is found by jumping from o
 occupied run, and the cost hardly depends on the size of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
-Generation*, 2002, section 4 (packing along outlines); here on runs of rows, so that holes fill too.
+Generation*, 2002 (packing along outlines); here on runs of rows, so that holes fill too.
 """
 
 from __future__ import annotations

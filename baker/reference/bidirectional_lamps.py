@@ -4,7 +4,7 @@ A lamp is chosen as `lamps` says. From a triangle light starts at a uniform poin
 point into all directions; from a spot into its cone; sun and sky shine through a disc as wide as the scene.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 10.3; Pharr, Jakob and
-Humphreys, Physically based rendering, 3rd ed. 2016, ch. 16.1.2 (light that comes from infinity).
+Humphreys, Physically based rendering, 3rd ed. 2016, ch. 16 (light that comes from infinity).
 """
 
 from __future__ import annotations
