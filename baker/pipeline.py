@@ -250,10 +250,10 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
     # It has done its part.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
-        run = farm.runner("final gather", {"mask": world.mask, "exitance": exitance})
+        run = farm.runner("final gather", {"mask": world.mask, "exitance": exitance, "exact": direct.exact})
         seen = texels.hit_image(exitance)
         del exitance
-        gathered = gather_light(world, seen, settings, record.progress, run)
+        gathered = gather_light(world, (seen, direct.exact), settings, record.progress, run)
         record.rays["final gather"] = gathered.rays
     return Transport(direct=direct, gathered=gathered)
 
@@ -281,15 +281,22 @@ def light_directly(
 
 
 def gather_light(
-    world: World, seen: NDArray[np.float32], settings: BakeSettings, progress: Progress, run: TileRunner
+    world: World,
+    found: tuple[NDArray[np.float32], NDArray[np.uint8]],
+    settings: BakeSettings,
+    progress: Progress,
+    run: TileRunner,
 ) -> Gathered:
-    """Final gather of all texels, or of the tiles that `run` works on; `seen` is what hits send back."""
+    """Final gather of all texels, or of the tiles that `run` works on.
+
+    `found` is what hits send back, and which entries have all light of emitters.
+    """
     return final_gather(
         world.texels.n_front,
         world.surface,
         world.mask,
         world.table,
-        seen,
+        *found,
         world.emitters,
         world.shading,
         world.rays.tracer,

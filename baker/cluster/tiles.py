@@ -86,9 +86,8 @@ def _make_patches(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     return patches, world.texels.hit_image(patches.patch, fill=-1)
 
 
-def _make_image(world: Any, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
-    image: NDArray[np.float32] = world.texels.hit_image(arrays["exitance"])
-    return image
+def _make_image(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    return world.texels.hit_image(arrays["exitance"]), arrays["exact"]
 
 
 def _direct(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:

@@ -2,7 +2,7 @@
 
     E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit (emitters aside)
     E_sky      = pi / n sum L_sky         over rays that leave the scene
-    E_emitted  = sum of MIS-weighted hits of emitters (the other half of `area_light`)
+    E_emitted  = sum of MIS-weighted hits of emitters (the other half of `area_light`, where that left one)
     AO         = share of rays that meet nothing within the distance
 
 Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
@@ -40,7 +40,9 @@ N_COLUMNS = 8
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, sky, limits, out):  # type: ignore[no-untyped-def]
+def gather(  # type: ignore[no-untyped-def]
+    origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
+):
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
@@ -48,6 +50,7 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
         spare); no rows if nothing does
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
+    exact : (m,) uint8, 1 for texels that have all light of emitters already
     begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
     """
     n_samples = len(net)
@@ -97,9 +100,9 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
                     rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
                 )  # fmt: skip
                 hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
-                if row[prim, 12] >= _f(0.0):
+                i = group + lane
+                if row[prim, 12] >= _f(0.0) and exact[i] == 0:
                     m = np.int64(row[prim, 12])
-                    i = group + lane
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,
                         normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],
@@ -141,10 +144,12 @@ def gather(origin, normal, table, exitance, lamps, shading, caster, begin, net, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def open_share(origin, normal, caster, begin, net, shared, distance, out):  # type: ignore[no-untyped-def]
+def open_share(origin, normal, caster, begin, net, shared, distance, look, out):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32
+    look : after so many rays sixteen texels are done if at most one of each one's rays was blocked; 0: never
+    Returns the number of rays cast.
     """
     n_samples = len(net)
     scene, occluded, width = caster.scene, caster.occluded, caster.width
@@ -152,12 +157,14 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
     spare_on, spare = caster.valid, caster.floats
     count = np.zeros(LANES, np.int32)
     seeds, frame = new_lanes()
+    cast = 0
     for group in range(0, len(origin), LANES):
         lanes = min(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
             count[lane] = 0
+        done = 0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
@@ -166,5 +173,14 @@ def open_share(origin, normal, caster, begin, net, shared, distance, out):  # ty
             trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
             for lane in range(LANES):
                 count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
+            done += 1
+            if done == look:
+                least = done
+                for lane in range(lanes):
+                    least = min(least, np.int64(count[lane]))
+                if least >= look - 1:
+                    break
+        cast += done * lanes
         for lane in range(lanes):
-            out[begin + group + lane] = count[lane] / n_samples
+            out[begin + group + lane] = count[lane] / done
+    return cast

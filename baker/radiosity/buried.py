@@ -26,8 +26,8 @@ _TILE = 2048
 # First look: every 4th of the 16 points, one ray each. Second look: every point.
 _STRIDE = 4
 _RAYS_PER_POINT = 8
-# A point is buried if more than this share of its rays hits backs.
-_SHARE = 0.5
+# A point is buried if more than so many of its rays hit backs.
+_MOST = _RAYS_PER_POINT // 2
 
 
 def find_buried(
@@ -46,29 +46,37 @@ def find_buried(
     if not n or not (table.row[:, 7] == 0).any():
         return mask, 0
 
-    def look(chosen: NDArray[np.int64], rays_per_point: int, stride: int, pair: int) -> NDArray[np.uint8]:
+    cast = 0
+
+    def look(
+        chosen: NDArray[np.int64], rays_per_point: int, stride: int, pair: int, most: int
+    ) -> NDArray[np.bool_]:
         wanted = np.arange(0, N_POINTS, stride, dtype=np.uint8)[None]
         hits = np.zeros((len(chosen), wanted.size), np.uint8)
         net = sobol_reversed(wanted.size * rays_per_point, seed, pair)
         shared = shared_bits_mask(len(net))
+        rays = np.zeros(-(-len(chosen) // _TILE), np.int64)
 
         def work(begin: int, end: int) -> None:
             points = points_of(surface, mask, chosen[begin:end], wanted)
-            back_face_hits(*points, table, new_caster(tracer), begin, net, shared, rays_per_point, hits)
+            rays[begin // _TILE] = back_face_hits(
+                *points, table, new_caster(tracer), begin, net, shared, rays_per_point, most, hits
+            )
 
         run_tiles(
             len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=len(net)
         )
-        return hits
+        nonlocal cast
+        cast += int(rays.sum())
+        return hits > most
 
-    suspect = _with_neighbours(texels, (look(np.arange(n), 1, _STRIDE, 3) > 0).max(axis=1))
+    suspect = _with_neighbours(texels, look(np.arange(n), 1, _STRIDE, 3, 0).max(axis=1))
     chosen = np.flatnonzero(suspect)
-    hits = look(chosen, _RAYS_PER_POINT, 1, 4)
-    good = hits <= _SHARE * _RAYS_PER_POINT
+    good = ~look(chosen, _RAYS_PER_POINT, 1, 4, _MOST)
     mask[chosen] = (
         (good.astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)).sum(axis=1).astype(np.uint16)
     )
-    return mask, n * N_POINTS // _STRIDE + len(chosen) * N_POINTS * _RAYS_PER_POINT
+    return mask, cast
 
 
 def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -21,7 +21,8 @@ from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
 STAGE = "crevices"
-_RAYS = 16
+# Sixteen neighbouring texels of which at most one of these first rays each was blocked are in the open.
+_RAYS, _LOOK = 16, 4
 # A texel lies in a gap if less than this share of its rays gets further than so many texels: for gaps about
 # as wide as a texel, and for gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
@@ -64,8 +65,9 @@ def gap_depth(
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = tile_points(surface, mask, begin, end, kept)
         for share, reach in ((far, _FAR), (near, _NEAR)):
-            open_share(*points, new_caster(tracer), begin, net, shared, np.float32(reach * side), share)
-            cast[begin // TILE] += _RAYS * (end - begin)
+            cast[begin // TILE] += open_share(
+                *points, new_caster(tracer), begin, net, shared, np.float32(reach * side), _LOOK, share
+            )
             # Whatever lies in a narrow gap lies in a wide one, too.
             if (share[begin:end] >= _OPEN).all():
                 break

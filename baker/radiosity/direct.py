@@ -45,12 +45,14 @@ class DirectLight:
     weighted : (n, 3) float32, lx, without what gather rays find at emitters
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
+    exact : (n,) uint8, 1 where `weighted` is complete, too
     rays : int, shadow rays cast at lamps; of other rays those that may be needed
     """
 
     weighted: NDArray[np.float32]
     complete: NDArray[np.float32]
     variance: NDArray[np.float32]
+    exact: NDArray[np.uint8]
     rays: int
 
 
@@ -86,7 +88,7 @@ def direct_light(
     """
     n = len(surface.pixel)
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
-    variance = np.zeros(n, np.float32)
+    variance, exact = np.zeros(n, np.float32), np.zeros(n, np.uint8)
     net = sobol_reversed(n_light, seed, 1)
     shared = shared_bits_mask(n_light)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
@@ -104,11 +106,11 @@ def direct_light(
         origin, normal = tile_points(surface, mask, begin, end, kept)
         lamps = lamps_for(emitters, origin)
         out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
-        spread = np.zeros(end - begin, np.float32)
+        spread, done = np.zeros(end - begin, np.float32), np.zeros(end - begin, np.uint8)
         near, n_cast = widest_view(emitters, origin) > CLOSE, 0
         if lamps.chance.any():
             n_cast = light_samples(
-                origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], out, second
+                origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], done, out, second
             )
             spread = batch_variance(out[:, :3].sum(axis=1), second)
         if near:
@@ -127,6 +129,7 @@ def direct_light(
                 few_shared,
                 black,
                 limits,
+                done,
                 found,
             )
             out[:, 3:] += found[:, DIRECT : DIRECT + 3]
@@ -137,14 +140,15 @@ def direct_light(
                 if family is not None:
                     family(light, origin, normal, ray, weight)
                     add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
-        return out[:, :3], out[:, 3:], spread, n_cast
+        return out[:, :3], out[:, 3:], spread, done, n_cast
 
     def keep(begin: int, end: int, part: Part) -> None:
-        weighted[begin:end], complete[begin:end], variance[begin:end], cast[begin // TILE] = part
+        weighted[begin:end], complete[begin:end], variance[begin:end], exact[begin:end] = part[:4]
+        cast[begin // TILE] = part[4]
 
     rays = n_light * bool(len(emitters.power)) + N_POINTS * len(families)
     run(n, TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    return DirectLight(weighted, complete, variance, int(cast.sum()) + N_POINTS * len(families) * n)
+    return DirectLight(weighted, complete, variance, exact, int(cast.sum()) + N_POINTS * len(families) * n)
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:

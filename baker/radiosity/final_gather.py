@@ -49,6 +49,7 @@ def final_gather(
     mask: NDArray[np.uint16],
     table: HitTable,
     exitance: NDArray[np.float32],
+    exact: NDArray[np.uint8],
     emitters: Emitters,
     shading: Any,
     tracer: Tracer,
@@ -70,6 +71,8 @@ def final_gather(
     exitance : (sides * P * H * W, 4) float32, lx
         Light that the texel at each pixel reflects (`TexelBuffer.hit_image`; RGB and one spare);
         emission is found by MIS with `n_light` shadow rays.
+    exact : (n,) uint8
+        1 for entries whose direct light from emitters is complete already.
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
     kept : points of an earlier stage with the same tiles
@@ -87,7 +90,20 @@ def final_gather(
         lamps, caster = lamps_for(emitters, origin), new_caster(tracer)
         out = np.zeros((end - begin, N_COLUMNS), np.float32)
         gather(
-            origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, radiance, limits, out
+            origin,
+            normal,
+            table,
+            exitance,
+            lamps,
+            shading,
+            caster,
+            begin,
+            net,
+            shared,
+            radiance,
+            limits,
+            exact[begin:end],
+            out,
         )
         spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
         return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread
@@ -130,7 +146,7 @@ def ambient_occlusion(
 
     def work(begin: int, end: int) -> Part:
         points = tile_points(surface, mask, begin, end, kept)
-        open_share(*points, new_caster(tracer), begin, net, shared, reach, out)
+        open_share(*points, new_caster(tracer), begin, net, shared, reach, 0, out)
         return (out[begin:end],)
 
     def keep(begin: int, end: int, part: Part) -> None:

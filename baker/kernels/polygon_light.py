@@ -1,0 +1,169 @@
+"""Irradiance from evenly shining triangles with nothing in between, in closed form.
+
+    E = L / 2 |sum_i angle_i Gamma_i . n|
+
+over the edges of what of a triangle lies above the surface; angle_i is the angle that edge i fills as seen
+from the point, Gamma_i the unit normal of the plane through both. With a, b the arms to its ends,
+angle Gamma = f(a.b / |a||b|) (a x b) / |a||b| and f(x) = arccos(x) / sqrt(1 - x^2).
+
+Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995;
+Abramowitz and Stegun, Handbook of mathematical functions, 1964, 4.4.46 (the polynomial).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from baker.kernels.emitters import AREA, NORMAL, RADIANCE, TWO_SIDED
+from baker.kernels.surface import N_POINTS
+from baker.trace.packets import LANES
+
+_f = np.float32
+# Rows of the working memory: origin, normal, four corners as arms, heights of three, the sum over edges,
+# what a triangle that looks small gives (-1: it does not), 1 if the triangle's shining side is turned here.
+_ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _TURNED = 0, 3, 6, 18, 21, 22, 23
+_ROWS = 24
+# Triangles whose longest edge is under a hundredth of their distance shine from their centroid: the sum over
+# edges would lose digits, and the error is of the order of the square, 1e-5.
+_SMALL_VIEW = np.float32(1.0e-4)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def angle_over_sine(x):  # type: ignore[no-untyped-def]
+    """Return arccos(x) / sqrt(1 - x^2) of a float32 in [-1, 1], relative error under 1e-6 away from -1."""
+    y = abs(x)
+    series = _f(1.5707963050) + y * (
+        _f(-0.2145988016)
+        + y * (
+            _f(0.0889789874)
+            + y * (
+                _f(-0.0501743046)
+                + y * (
+                    _f(0.0308918810)
+                    + y * (_f(-0.0170881256) + y * (_f(0.0066700901) + y * _f(-0.0012624911)))
+                )
+            )
+        )
+    )  # fmt: skip
+    near = series / math.sqrt(_f(1.0) + y)
+    sine = math.sqrt(max((_f(1.0) - y) * (_f(1.0) + y), _f(1.0e-12)))
+    return near if x >= _f(0.0) else _f(math.pi) / sine - near
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-untyped-def]
+    """Write the irradiance of sixteen texels from all emitters, as if nothing stood in between.
+
+    origin, normal : (m, 16, 3) float32, texels group to group + lanes are lit
+    row : (M, 24) float32, see `emitters`; none textured
+    found : (3 * 16,) float32, lx: RGB by lane, means over the texels' points
+    """
+    work = np.zeros(_ROWS * LANES, np.float32)
+    found[:] = _f(0.0)
+    for k in range(N_POINTS):
+        for lane in range(lanes):
+            for a in range(3):
+                work[(_ORIGIN + a) * LANES + lane] = origin[group + lane, k, a]
+                work[(_NORMAL + a) * LANES + lane] = normal[group + lane, k, a]
+        for m in range(len(row)):
+            if _reach_for_corners(work, row, m, lanes):
+                _add_edges(work)
+                for c in range(3):
+                    scale = row[m, RADIANCE + c] / _f(N_POINTS)
+                    for lane in range(LANES):
+                        small, turned = work[_SMALL * LANES + lane], work[_TURNED * LANES + lane]
+                        light = abs(_f(0.5) * work[_SUM * LANES + lane])
+                        found[c * LANES + lane] += scale * turned * (small if small >= _f(0.0) else light)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
+    """Write the arms to the corners of what of triangle m lies above each surface; False: none for any."""
+    for j in range(3):
+        for lane in range(LANES):
+            height = _f(0.0)
+            for a in range(3):
+                arm = row[m, 3 * j + a] - work[(_ORIGIN + a) * LANES + lane]
+                work[(_ARM + 3 * j + a) * LANES + lane] = arm
+                height += arm * work[(_NORMAL + a) * LANES + lane]
+            work[(_HEIGHT + j) * LANES + lane] = height
+    longest = _f(0.0)
+    for j in range(3):
+        edge = _f(0.0)
+        for a in range(3):
+            step = row[m, 3 * ((j + 1) % 3) + a] - row[m, 3 * j + a]
+            edge += step * step
+        longest = max(longest, edge)
+    two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
+    for lane in range(LANES):
+        facing, square = _f(0.0), _f(1.0e-30)
+        for a in range(3):
+            centre = work[(_ARM + a) * LANES + lane] + work[(_ARM + 3 + a) * LANES + lane]
+            centre = (centre + work[(_ARM + 6 + a) * LANES + lane]) * _f(1.0 / 3.0)
+            facing -= centre * row[m, NORMAL + a]
+            square += centre * centre
+            work[(_ARM + 9 + a) * LANES + lane] = work[(_ARM + 6 + a) * LANES + lane]
+        low = work[_HEIGHT * LANES + lane] + work[(_HEIGHT + 1) * LANES + lane]
+        height = max(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * _f(1.0 / 3.0)
+        small = longest < _SMALL_VIEW * square
+        work[_SMALL * LANES + lane] = area * height * abs(facing) / (square * square) if small else _f(-1.0)
+        work[_TURNED * LANES + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
+    some = False
+    for lane in range(lanes):
+        above = 0
+        for j in range(3):
+            above += 1 if work[(_HEIGHT + j) * LANES + lane] > _f(0.0) else 0
+        if above == 0:
+            work[_TURNED * LANES + lane] = _f(0.0)
+        if work[_TURNED * LANES + lane] > _f(0.0):
+            some = True
+            if above < 3:
+                _cut(work, lane)
+    return some
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cut(work, lane):  # type: ignore[no-untyped-def]
+    """Cut off what of a lane's triangle lies below its surface: three or four corners remain."""
+    corner = np.zeros(15, np.float32)
+    n = 0
+    for j in range(3):
+        after = (j + 1) % 3
+        here, there = work[(_HEIGHT + j) * LANES + lane], work[(_HEIGHT + after) * LANES + lane]
+        if here > _f(0.0):
+            for a in range(3):
+                corner[3 * n + a] = work[(_ARM + 3 * j + a) * LANES + lane]
+            n += 1
+        if (here > _f(0.0)) != (there > _f(0.0)):
+            share = here / (here - there)
+            for a in range(3):
+                first = work[(_ARM + 3 * j + a) * LANES + lane]
+                second = work[(_ARM + 3 * after + a) * LANES + lane]
+                corner[3 * n + a] = first + share * (second - first)
+            n += 1
+    for j in range(4):
+        for a in range(3):
+            work[(_ARM + 3 * j + a) * LANES + lane] = corner[3 * min(j, n - 1) + a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_edges(work):  # type: ignore[no-untyped-def]
+    """Write the sum over the edges of the four corners of every lane; an edge without length adds nothing."""
+    for lane in range(LANES):
+        work[_SUM * LANES + lane] = _f(0.0)
+    for j in range(4):
+        here, there = _ARM + 3 * j, _ARM + 3 * ((j + 1) % 4)
+        for lane in range(LANES):
+            ax, bx = work[here * LANES + lane], work[there * LANES + lane]
+            ay, by = work[(here + 1) * LANES + lane], work[(there + 1) * LANES + lane]
+            az, bz = work[(here + 2) * LANES + lane], work[(there + 2) * LANES + lane]
+            nx, ny, nz = work[_NORMAL * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
+            ex, ey, ez = bx - ax, by - ay, bz - az
+            spread = (ay * ez - az * ey) * nx + (az * ex - ax * ez) * ny + (ax * ey - ay * ex) * nz
+            squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
+            inverse = _f(1.0) / math.sqrt(max(squares, _f(1.0e-30)))
+            cosine = min(max((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
+            work[_SUM * LANES + lane] += spread * inverse * angle_over_sine(cosine)
