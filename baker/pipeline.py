@@ -369,6 +369,7 @@ def _reflected(
             seed=settings.seed,
             threads=thread_count(settings.threads),
             progress=record.progress,
+            kept=world.kept,
             run=farm.runner("form factors", {"mask": world.mask, "depth": depth}),
         )
         record.rays["form factors"] = matrix.rays + cast

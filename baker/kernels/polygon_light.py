@@ -4,7 +4,7 @@
 
 over the edges of what of a triangle lies above the surface; angle_i is the angle that edge i fills as seen
 from the point, Gamma_i the unit normal of the plane through both. With a, b the arms to its ends,
-angle Gamma = f(a.b / |a||b|) (a x b) / |a||b| and f(x) = arccos(x) / sqrt(1 - x^2).
+angle Gamma = angle / sin(angle) (a x b) / |a||b|.
 
 Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995;
 Abramowitz and Stegun, Handbook of mathematical functions, 1964, 4.4.46 (the polynomial).
@@ -32,8 +32,11 @@ _SMALL_VIEW = np.float32(1.0e-4)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def angle_over_sine(x):  # type: ignore[no-untyped-def]
-    """Return arccos(x) / sqrt(1 - x^2) of a float32 in [-1, 1], relative error under 1e-6 away from -1."""
+def angle_over_sine(x, sine):  # type: ignore[no-untyped-def]
+    """Return an angle over its sine from its cosine x in [-1, 1], float32; relative error under 1e-6.
+
+    Both are asked for: near a straight angle the cosine alone does not tell the sine any more.
+    """
     y = abs(x)
     series = _f(1.5707963050) + y * (
         _f(-0.2145988016)
@@ -48,9 +51,8 @@ def angle_over_sine(x):  # type: ignore[no-untyped-def]
             )
         )
     )  # fmt: skip
-    near = series / math.sqrt(_f(1.0) + y)
-    sine = math.sqrt(max((_f(1.0) - y) * (_f(1.0) + y), _f(1.0e-12)))
-    return near if x >= _f(0.0) else _f(math.pi) / sine - near
+    acute = series / math.sqrt(_f(1.0) + y)
+    return acute if x >= _f(0.0) else _f(math.pi) / max(sine, _f(1.0e-12)) - acute
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -69,8 +71,9 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
                 work[(_ORIGIN + a) * LANES + lane] = origin[group + lane, k, a]
                 work[(_NORMAL + a) * LANES + lane] = normal[group + lane, k, a]
         for m in range(len(row)):
-            if _reach_for_corners(work, row, m, lanes):
-                _add_edges(work)
+            corners = _reach_for_corners(work, row, m, lanes)
+            if corners:
+                _add_edges(work, corners)
                 for c in range(3):
                     scale = row[m, RADIANCE + c] / _f(N_POINTS)
                     for lane in range(LANES):
@@ -81,7 +84,10 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
-    """Write the arms to the corners of what of triangle m lies above each surface; False: none for any."""
+    """Write the arms to the corners of what of triangle m lies above each surface.
+
+    Returns how many corners that are at most, 3 or 4, and 0 if no lane sees any of it.
+    """
     for j in range(3):
         for lane in range(LANES):
             height = _f(0.0)
@@ -111,7 +117,7 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         small = longest < _SMALL_VIEW * square
         work[_SMALL * LANES + lane] = area * height * abs(facing) / (square * square) if small else _f(-1.0)
         work[_TURNED * LANES + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
-    some = False
+    corners = 0
     for lane in range(lanes):
         above = 0
         for j in range(3):
@@ -119,10 +125,11 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         if above == 0:
             work[_TURNED * LANES + lane] = _f(0.0)
         if work[_TURNED * LANES + lane] > _f(0.0):
-            some = True
+            corners = max(corners, 3)
             if above < 3:
                 _cut(work, lane)
-    return some
+                corners = 4
+    return corners
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -150,20 +157,22 @@ def _cut(work, lane):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_edges(work):  # type: ignore[no-untyped-def]
-    """Write the sum over the edges of the four corners of every lane; an edge without length adds nothing."""
+def _add_edges(work, corners):  # type: ignore[no-untyped-def]
+    """Write the sum over the edges between the corners of every lane; one without length adds nothing."""
     for lane in range(LANES):
         work[_SUM * LANES + lane] = _f(0.0)
-    for j in range(4):
-        here, there = _ARM + 3 * j, _ARM + 3 * ((j + 1) % 4)
+    for j in range(corners):
+        here, there = _ARM + 3 * j, _ARM + 3 * ((j + 1) % corners)
         for lane in range(LANES):
             ax, bx = work[here * LANES + lane], work[there * LANES + lane]
             ay, by = work[(here + 1) * LANES + lane], work[(there + 1) * LANES + lane]
             az, bz = work[(here + 2) * LANES + lane], work[(there + 2) * LANES + lane]
             nx, ny, nz = work[_NORMAL * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
             ex, ey, ez = bx - ax, by - ay, bz - az
-            spread = (ay * ez - az * ey) * nx + (az * ex - ax * ez) * ny + (ax * ey - ay * ex) * nz
+            cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
             squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
             inverse = _f(1.0) / math.sqrt(max(squares, _f(1.0e-30)))
             cosine = min(max((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
-            work[_SUM * LANES + lane] += spread * inverse * angle_over_sine(cosine)
+            sine = math.sqrt(cx * cx + cy * cy + cz * cz) * inverse
+            spread = (cx * nx + cy * ny + cz * nz) * inverse
+            work[_SUM * LANES + lane] += spread * angle_over_sine(cosine, sine)

@@ -26,7 +26,7 @@ from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.patches import PatchSet
-from baker.radiosity.points import points_of
+from baker.radiosity.points import KeptPoints, some_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -84,6 +84,7 @@ def build_form_factors(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
     run: TileRunner = run_tiles,
 ) -> FormFactorMatrix:
     """Cast `n_rays` from every patch and build the matrix.
@@ -92,6 +93,8 @@ def build_form_factors(
     ----------
     hit_patch : (sides * P * H * W,) int32
         Patch at each pixel, `TexelBuffer.hit_image` of `patches.patch` with -1 where nothing is.
+    kept : KeptPoints, optional
+        Points of an earlier stage.
     run : TileRunner
         Works on tiles of patches.
     """
@@ -107,6 +110,7 @@ def build_form_factors(
         seed=seed,
         threads=threads,
         progress=progress,
+        kept=kept,
         run=run,
     )
     ordered = [rows[begin] for begin in sorted(rows)]
@@ -134,6 +138,7 @@ def cast_rows(
     seed: int,
     threads: int,
     progress: Progress,
+    kept: KeptPoints | None = None,
     run: TileRunner = run_tiles,
 ) -> dict[int, Part]:
     """Cast the rays; see `build_form_factors`.
@@ -150,21 +155,21 @@ def cast_rows(
     tally = np.zeros((n, 2), np.int32)
     rows: dict[int, Part] = {}
 
-    # Each ray starts from the texel where its share of the patch's area lies, at a point of its own.
+    # Each ray starts from the texel where its share of the patch's area lies, at a point of its own: the
+    # first share c of the area has those rays whose (k + 0.5) / R is at most c.
     owner = np.repeat(np.arange(n), np.diff(patches.first))
-    where = owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)
-    share = (np.arange(n_rays) + 0.5) / n_rays
+    running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)
+    running[patches.first[1:] - 1] = n_rays * np.arange(1, n + 1)
+    starts_of = np.diff(running.astype(np.int64), prepend=0)
     shuffle = np.random.Generator(np.random.PCG64(seed)).permuted(
         np.resize(np.arange(N_POINTS, dtype=np.uint8), (64, n_rays)), axis=1
     )
 
     def work(begin: int, end: int) -> Part:
-        row = np.arange(begin, end)
-        at = np.minimum(np.searchsorted(where, row[:, None] + share), patches.first[row + 1, None] - 1)
-        wanted = shuffle[row % len(shuffle)]
-        points = points_of(
-            surface, mask, patches.member[at].reshape(-1).astype(np.int64), wanted.reshape(-1, 1)
-        )
+        own = slice(patches.first[begin], patches.first[end])
+        start = np.repeat(patches.member[own].astype(np.int64), starts_of[own])
+        wanted = shuffle[np.arange(begin, end) % len(shuffle)]
+        points = some_points(surface, mask, start, wanted.reshape(-1), kept)
         origin, normal = (p.reshape(end - begin, n_rays, 3) for p in points)
         target = np.full((end - begin, n_rays), -1, np.int32)
         cast_form_factors(

@@ -74,3 +74,21 @@ def tile_points(
         )  # fmt: skip
         kept.made.add((begin, end))
     return origin, normal
+
+
+def some_points(
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    chosen: NDArray[np.int64],
+    wanted: NDArray[np.uint8],
+    kept: KeptPoints | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return one point of each chosen entry, (m, 1, 3), see `points_of`; from `kept` if all are there.
+
+    chosen : (m,) int64, entries; wanted : (m,) uint8, which of the 16 points of each
+    """
+    if kept is None or sum(end - begin for begin, end in kept.made) < len(kept.origin):
+        return points_of(surface, mask, chosen, wanted[:, None])
+    at = chosen * N_POINTS + wanted
+    origin, normal = (np.take(p.reshape(-1, 3), at, axis=0)[:, None] for p in (kept.origin, kept.normal))
+    return origin, normal

@@ -19,7 +19,11 @@ def transport():
     opened[:2] = [0, 1]
     return Transport(
         direct=DirectLight(
-            rng.random((N, 3), np.float32), rng.random((N, 3), np.float32), rng.random(N, np.float32), 1
+            rng.random((N, 3), np.float32),
+            rng.random((N, 3), np.float32),
+            rng.random(N, np.float32),
+            np.zeros(N, np.uint8),
+            1,
         ),
         gathered=Gathered(
             rng.random((N_FRONT, 3), np.float32),

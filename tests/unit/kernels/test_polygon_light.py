@@ -68,10 +68,22 @@ def points_below(rng, depth, tilt=0.3):
 
 
 def test_the_angle_over_its_sine():
-    x = np.linspace(-0.999, 1, 20001).astype(np.float32)
-    wide = x.astype(float)[:-1]
-    truth = np.append(np.arccos(wide) / np.sqrt(1 - wide**2), 1.0)
-    np.testing.assert_allclose([angle_over_sine(v) for v in x], truth, rtol=1e-6)
+    angle = np.linspace(1e-4, np.pi - 1e-4, 20001)
+    pairs = zip(np.cos(angle).astype(np.float32), np.sin(angle).astype(np.float32), strict=True)
+    np.testing.assert_allclose([angle_over_sine(*p) for p in pairs], angle / np.sin(angle), rtol=1e-6)
+    assert angle_over_sine(np.float32(1), np.float32(0)) == pytest.approx(1, rel=1e-6)
+
+
+def test_close_to_a_lamp_s_edge_the_light_is_that_of_a_half_plane():
+    """A hair's breadth from the edge of a lamp at a right angle, half of the hemisphere's light comes."""
+    lamp = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
+    for distance in (1e-2, 1e-3, 1e-4, 1e-5):
+        origin = np.tile(np.float32([distance, -1e-7, 0.37]), (LANES, 16, 1))
+        normal = np.tile(np.float32([0, 1, 0]), (LANES, 16, 1))
+        square = np.array([(0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0)], float)
+        truth = by_angles(square, origin[:1, :1].astype(float), normal[:1, :1])[0, 0]
+        assert truth == pytest.approx(np.pi / 2, rel=5 * distance + 2e-4)
+        np.testing.assert_allclose(clear(origin, normal, lamp)[:, 0], truth, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
