@@ -175,10 +175,10 @@ def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
                 count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
             done += 1
             if done == look:
-                least = done
+                clear = 0
                 for lane in range(lanes):
-                    least = min(least, np.int64(count[lane]))
-                if least >= look - 1:
+                    clear += 1 if count[lane] >= look - 1 else 0
+                if clear == lanes:
                     break
         cast += done * lanes
         for lane in range(lanes):
