@@ -69,10 +69,12 @@ def work(
     with session.reporter(quiet=quiet) as progress:
         # Inside: importing the kernels takes a moment, and the bar is there meanwhile.
         progress("start", 0.0)
+        from baker.batch.lock import held
         from baker.pipeline import bake
 
         spread = {} if cluster is None else {"farm": _farm(cluster, resolved.threads)}
-        result = bake(scene, out=out, settings=resolved, progress=progress, force=force, **spread)
+        with held(out):
+            result = bake(scene, out=out, settings=resolved, progress=progress, force=force, **spread)
     if not quiet:
         write_summary(result, session.text_stream(as_json=as_json), verbose=verbose)
     if as_json:

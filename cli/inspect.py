@@ -22,7 +22,8 @@ LONGEST = 24
 def command() -> Any:
     """Return the subcommand."""
     path = Annotated[
-        Path, typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json or EXR.")
+        Path,
+        typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json, image or status_0.png."),
     ]
     keyword = signature.Parameter.KEYWORD_ONLY
     flags = [

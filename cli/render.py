@@ -24,7 +24,11 @@ def command() -> Any:
         inspect.Parameter("ctx", keyword, annotation=typer.Context),
         inspect.Parameter("scene", keyword, annotation=scene),
         inspect.Parameter("out", keyword, annotation=image),
-        _text("camera", "PX,PY,PZ,TX,TY,TZ,FOV", "Position, target, vertical field of view in degrees."),
+        _text(
+            "camera",
+            "PX,PY,PZ,TX,TY,TZ,FOV|NAME|NUMBER",
+            "Position, target, vertical field of view in degrees; or one of the file's own.",
+        ),
         flag("width", int, typer.Option("--width", metavar="N", help="Pixels."), 640),
         flag("height", int, typer.Option("--height", metavar="N", help="Pixels."), 480),
         flag(

@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
+from baker.core.errors import ResourceError
 from baker.io.output_folder import remove_leftovers
 
 
@@ -67,6 +69,32 @@ class OutputLock:
                 self._made.pop().rmdir()
             except OSError:
                 self._made.clear()
+
+
+@contextlib.contextmanager
+def held(out: Path) -> Iterator[None]:
+    """Hold an output folder for one bake that does not wait for others.
+
+    Where no lock file can be made beside the folder (it is a mount point, say), nothing is held.
+
+    Raises
+    ------
+    ResourceError
+        If another run is baking into it.
+    """
+    lock = OutputLock(out)
+    try:
+        # A second time: whoever held it may have removed it meanwhile.
+        free = lock.acquire() or lock.acquire() or not lock.path.exists()
+    except OSError:
+        free = True
+    if not free:
+        message = "another run is baking into this folder; wait until it has ended, or name another folder"
+        raise ResourceError(message, file=str(out))
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def sweep(out: Path) -> None:

@@ -12,8 +12,10 @@ import numpy as np
 
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
+from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
 from baker.io.output_folder import MANIFEST_NAME, file_state, own_files
+from baker.io.png import decode_palette_png
 
 
 def inspect_path(path: Path | str) -> dict[str, Any]:
@@ -26,12 +28,12 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
     Returns
     -------
     dict
-        `kind` is "scene", "bake" or "image"; the other keys depend on it.
+        `kind` is "scene", "bake", "image" or "status" (of a `status_0.png`); the other keys depend on it.
 
     Raises
     ------
     InputError
-        If there is nothing at `path`, or it is none of the three.
+        If there is nothing at `path`, or it is none of these.
     """
     path = Path(path)
     if not path.exists():
@@ -40,6 +42,8 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
         path = path.parent
     if path.is_dir():
         return _bake(path)
+    if path.suffix.lower() == ".png" and (found := _status(path)) is not None:
+        return found
     encoding = encoding_of(path.name)
     if encoding is not None:
         return _image(path, encoding.decode(path))
@@ -73,6 +77,29 @@ def _bake(folder: Path) -> dict[str, Any]:
         "warnings": manifest.get("warnings", []),
         "seconds": sum(v for v in manifest.get("timings", {}).values() if isinstance(v, int | float)),
         "settings": settings,
+    }
+
+
+def _status(path: Path) -> dict[str, Any] | None:
+    """Count the texels of each status in a `status_0.png`; None if the PNG is none."""
+    try:
+        data = path.read_bytes()
+        # The chunk that the bake writes: other pictures with palettes are none of ours.
+        if b"tEXtLegend\x00" not in data:
+            return None
+        index = decode_palette_png(data)
+    except (OSError, ValueError):
+        return None
+    count = np.bincount(index.ravel(), minlength=len(TexelStatus))
+    if count[len(TexelStatus) :].any():
+        return None
+    height, width = index.shape
+    return {
+        "kind": "status",
+        "path": str(path),
+        "width": width,
+        "height": height,
+        "texels": {status.name.lower(): int(count[status]) for status in TexelStatus},
     }
 
 

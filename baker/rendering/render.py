@@ -18,6 +18,7 @@ from baker.io.load import load_scene
 from baker.reference.camera import parse_camera
 from baker.reference.view import Reference, build_reference
 from baker.rendering.baked import BakedLight, other_scene
+from baker.rendering.cameras import named_camera
 from baker.rendering.passes import Run, first_layers, lit_by, openness, traced
 from baker.rendering.settings import RenderSettings
 
@@ -66,7 +67,9 @@ def render(
     settings = settings or RenderSettings()
     start = time.monotonic()
     report(progress, "load", 0.0)
-    camera = None if settings.camera is None else parse_camera(settings.camera)
+    # Seven numbers are judged before anything is loaded; a name needs the file.
+    text = settings.camera
+    camera = parse_camera(text) if text is not None and ("," in text or not text) else None
     resolved = make_settings(_bake_settings(settings))
     if settings.denoise:
         from baker.finish.oidn import denoiser_name
@@ -84,6 +87,8 @@ def render(
     elif not isinstance(scene, Scene):
         scene = load_scene(scene, reflections=True)
     warnings += scene.warnings
+    if text is not None and camera is None:
+        camera = named_camera(scene.cameras, text)
     with build_reference(scene, sky=sky, threads=settings.threads) as reference:
         run = Run(reference, camera or _own_camera(scene, reference), settings, start, progress)
         if settings.ao:

@@ -20,7 +20,8 @@ class RenderSettings:
     Attributes
     ----------
     camera : str or None
-        See `parse_camera`; None takes the file's first camera.
+        Numbers as `parse_camera` takes them, or the name or number of one of the file's own (`named_camera`);
+        None takes the file's first camera.
     width, height : int
     spp : int or None
         Samples of each pixel, rounded up to whole passes, of which there are at least two; None renders until

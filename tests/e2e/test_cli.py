@@ -15,6 +15,7 @@ import pytest
 from baker.cli.app import run
 from baker.cli.progress import Reporter
 
+from baker.batch.lock import OutputLock
 from baker.core.errors import Cancelled, InputError
 from baker.core.settings import BakeSettings
 
@@ -346,3 +347,39 @@ def test_full_or_closed_standard_output_is_no_traceback():
         closed.stdout.close()
         assert closed.stderr.read() == ""
     assert closed.returncode == 0
+
+
+def test_a_bake_into_a_folder_that_another_run_holds_is_refused(pipeline, command, tmp_path, capsys):
+    lock = OutputLock(tmp_path / "out")
+    assert lock.acquire()
+    code, text = command("bake", tmp_path / "a.glb", "-o", tmp_path / "out", "--json", "-q")
+    assert code == 4
+    message = json.loads(text)["error"]["message"]
+    assert "another run is baking into this folder; wait" in message
+    assert not pipeline.calls
+    lock.release()
+    for name in ("bake", "ao"):
+        assert command(name, tmp_path / "a.glb", "-o", tmp_path / "out", "-q", "--force")[0] == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_bake_holds_its_folder_and_frees_it_whatever_happens(pipeline, command, tmp_path):
+    held = []
+
+    def bake(scene, *, out, **how):
+        held.append(not OutputLock(out).acquire())
+        raise InputError("broken", file="a.glb")
+
+    pipeline.bake = bake
+    assert command("bake", tmp_path / "a.glb", "-o", tmp_path / "out", "-q")[0] == 3
+    assert held == [True]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bake_goes_on_where_no_lock_can_be_made(pipeline, command, tmp_path, monkeypatch):
+    def acquire(self):
+        raise PermissionError(errno.EACCES, "no")
+
+    monkeypatch.setattr(OutputLock, "acquire", acquire)
+    assert command("bake", tmp_path / "a.glb", "-o", tmp_path / "out", "-q")[0] == 0
+    assert len(pipeline.calls) == 1

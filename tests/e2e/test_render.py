@@ -123,6 +123,49 @@ def test_a_turned_camera_of_the_file(tmp_path):
     assert planes(out)[0]["G"] == pytest.approx(1, rel=1e-5)
 
 
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory) -> Path:
+    """The unit square and four cameras: eye, top, 0 (the third) and another eye."""
+    builder = quad_builder(emissiveFactor=[1, 1, 1])
+    for k in range(4):
+        fov = 0.3 + 0.1 * k
+        builder.add("cameras", {"type": "perspective", "perspective": {"yfov": fov, "znear": 0.1}})
+    for k, name in enumerate(("eye", "top", "0", "eye")):
+        builder.node(camera=k, name=name, translation=[0.5, 0.5, 2 + k])
+    return write(tmp_path_factory.mktemp("render") / "watched.glb", builder)
+
+
+@pytest.mark.parametrize(("text", "number"), [(None, 0), ("top", 1), ("1", 1), ("0", 2), ("3", 3)])
+def test_a_camera_of_the_file_by_name_or_number(watched, tmp_path, text, number):
+    argv = () if text is None else ("--camera", text)
+    code, said = told(watched, "-o", tmp_path / "a.exr", *SMALL, *argv)
+    assert code == 0
+    assert said["camera"]["position"] == [0.5, 0.5, 2 + number]
+    assert math.radians(said["camera"]["fov"]) == pytest.approx(0.3 + 0.1 * number)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("bottom", "no camera 'bottom'; the file has 0 'eye', 1 'top', 2 '0', 3 'eye'"),
+        ("4", "no camera '4'; the file has 0 'eye'"),
+        ("-1", "no camera '-1'"),
+        ("eye", "2 cameras are named 'eye'; say which by its number; the file has 0 'eye'"),
+    ],
+)
+def test_an_unknown_camera_is_told_what_there_is(watched, tmp_path, text, sentence):
+    code, said = told(watched, "-o", tmp_path / "a.exr", *SMALL, f"--camera={text}")
+    assert code == 2
+    assert sentence in said["error"]["message"]
+    assert not (tmp_path / "a.exr").exists()
+
+
+def test_a_name_where_the_file_has_no_camera(glowing, tmp_path):
+    code, said = told(glowing, "-o", tmp_path / "a.exr", *SMALL, "--camera", "eye")
+    assert code == 2
+    assert "no camera of its own; give seven numbers" in said["error"]["message"]
+
+
 def test_no_camera_is_one_sentence_with_a_view_that_works(glowing, tmp_path):
     code, said = told(glowing, "-o", tmp_path / "a.exr", *SMALL)
     assert code == 3

@@ -11,6 +11,7 @@ from io_scenes import quad_result, rich_builder
 from baker.core.errors import InputError
 from baker.io.inspect import inspect_path
 from baker.io.output import write_bake
+from baker.io.png import encode_palette_png, encode_png
 
 
 def test_a_scene_is_counted(tmp_path: Path) -> None:
@@ -69,3 +70,28 @@ def test_what_is_nothing_of_that_is_refused(tmp_path: Path) -> None:
         inspect_path(tmp_path / "absent")
     with pytest.raises(InputError, match="holds no bake"):
         inspect_path(tmp_path)
+
+
+def test_a_status_picture_is_counted(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in")
+    write_bake(result, tmp_path / "out")
+    found = inspect_path(tmp_path / "out" / "status_0.png")
+    json.dumps(found, allow_nan=False)
+    assert (found["kind"], found["width"], found["height"]) == ("status", 16, 16)
+    count = np.bincount(result.status[0].ravel(), minlength=5)
+    assert count[1] > 0
+    assert list(found["texels"]) == ["empty", "covered", "dilated", "invalid", "unconverged"]
+    assert list(found["texels"].values()) == count.tolist()
+
+
+def test_other_pictures_are_no_status(tmp_path: Path) -> None:
+    path = tmp_path / "status_0.png"
+    for data in (
+        encode_png(np.zeros((2, 2), np.uint8)),
+        encode_palette_png(np.zeros((2, 2), np.uint8), {0: (1, 2, 3)}, {}),
+        encode_palette_png(np.full((2, 2), 9, np.uint8), {}, {"Legend": "9 lives"}),
+        b"",
+    ):
+        path.write_bytes(data)
+        with pytest.raises(InputError, match="png"):
+            inspect_path(path)
