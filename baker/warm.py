@@ -25,7 +25,7 @@ def start() -> subprocess.Popen[bytes] | None:
     """Start compiling in the background, if the kernels are not on disk yet."""
     from baker.kernels.page_guard import hold_to_samples
 
-    folder = Path(hold_to_samples._cache.cache_path)  # type: ignore[attr-defined]
+    folder = Path(hold_to_samples._cache.cache_path)
     if any(folder.glob("page_guard.hold_to_samples-*.nbi")):
         return None
     command = [sys.executable, "-m", "baker.warm"]
@@ -58,7 +58,7 @@ def cast_rays() -> None:
     from baker.core.scene import Instance, Material, Mesh, Scene
     from baker.kernels.area_light import light_samples
     from baker.kernels.emitters import lamps_for, widest_view
-    from baker.kernels.form_factor import cast_form_factors, count_targets
+    from baker.kernels.form_factor import cast_form_factors
     from baker.kernels.gather import N_COLUMNS, gather, open_share
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
@@ -96,7 +96,6 @@ def cast_rays() -> None:
     target, tally = np.zeros((_TEXELS, 16), np.int32), np.zeros((_TEXELS, 2), np.int32)
     patch = np.zeros(256, np.int32)
     cast_form_factors(origin, normal, table, patch, caster, 0, net, shared, target, tally)
-    count_targets(target, np.zeros_like(target), np.zeros_like(target), np.zeros(_TEXELS, np.int32))
     rays.close()
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import silent
 from baker.kernels.emitters import Emitters
-from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
 from baker.pipeline import World
@@ -71,7 +71,7 @@ def _made(function, caster, origin, normal, begin, net, shared, far):  # type: i
     width, scene = caster.width, caster.scene
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
-    seeds, frame = new_lanes()
+    seeds, frame = new_seeds(), new_frame()
     mixed = np.uint32(0)
     for group in range(0, len(origin), LANES):
         lanes = min(LANES, len(origin) - group)
@@ -93,7 +93,7 @@ def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, 
     """
     width = caster.width
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    seeds, frame = new_lanes()
+    seeds, frame = new_seeds(), new_frame()
     packet = 0
     for group in range(0, len(origin), LANES):
         lanes = min(LANES, len(origin) - group)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.finish.page import check_page
+from baker.finish.slope import match_lookups, move_to_centre
 from baker.finish.tiles import over_rows
-from baker.kernels.page_slope import match_lookups, move_to_centre
 
 # Sub-positions place a fully covered texel's centroid only so well; below this nothing is gained.
 SMALLEST_OFFSET = 0.02

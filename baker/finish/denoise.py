@@ -26,10 +26,10 @@ from baker.core.progress import Progress, silent
 from baker.finish.noise import estimate_error
 from baker.finish.oidn import MEMORY_MB, denoiser_name, filter_lightmap
 from baker.finish.page import check_page
+from baker.finish.slope import noisy_planes
 from baker.finish.tiles import over_rows
 from baker.kernels.page_fill import nearest_texel, reflect_outwards
 from baker.kernels.page_guard import hold_to_samples
-from baker.kernels.page_slope import border_planes
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
@@ -40,6 +40,8 @@ REACH = 96
 MARGIN = 16
 # Half window of the slopes at chart borders, texels.
 SLOPE_RADIUS = 4
+# Texels whose slopes are fitted at a time.
+_BORDER_TEXELS = 4096
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -137,13 +139,13 @@ def surround_charts(
     """
     nearest = np.zeros(covered.shape, np.int32)
     nearest_texel(covered, nearest)
-    border = np.unique(nearest[~covered])
+    border = np.unique(nearest[~covered]).astype(np.int64)
     plane = np.zeros((len(border), 3, value.shape[2]), np.float32)
-    over_rows(
-        lambda begin, end: border_planes(value, chart, covered, border, SLOPE_RADIUS, plane, begin, end),
-        len(border),
-        threads,
-    )
+
+    def fit(begin: int, end: int) -> None:
+        plane[begin:end] = noisy_planes(value, chart, covered, border[begin:end], SLOPE_RADIUS)
+
+    over_rows(fit, len(border), threads, _BORDER_TEXELS)
     plane_row = np.zeros(covered.shape, np.int32)
     plane_row.reshape(-1)[border] = np.arange(len(border), dtype=np.int32)
     picture = np.array(value)

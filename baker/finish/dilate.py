@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.finish.page import check_page
+from baker.finish.slope import extrapolate_outwards
 from baker.finish.tiles import over_rows
 from baker.kernels.page_fill import nearest_texel
-from baker.kernels.page_slope import extrapolate_outwards
 
 
 def dilate(

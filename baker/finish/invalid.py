@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.finish.page import check_page
-from baker.kernels.page_fill import grow_rings
+
+# Of the 8 neighbours, row by row.
+_RING_WEIGHTS = (0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5)
 
 
 def fill_invalid(
@@ -42,14 +44,14 @@ def fill_invalid(
         If the arrays do not belong together.
     """
     check_page(value, chart, valid=valid)
-    filled = np.array(value)
+    filled = np.array(value, order="C")
     covered = chart >= 0
-    known = valid & covered
+    known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
     # Whatever a buried texel holds (even NaN) must not survive.
     filled[covered & ~known] = 0.0
-    grow_rings(filled, chart, known)
+    _grow_rings(filled, chart, known)
     left = covered & ~known
     if not left.any():
         return filled, 0
@@ -63,3 +65,43 @@ def fill_invalid(
         mean = total / np.maximum(count, 1)
         filled[..., channel][left] = mean[owner]
     return filled, int((count[owner] == 0).sum())
+
+
+def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDArray[np.bool_]) -> None:
+    """Fill the unknown texels of each chart ring by ring from its known ones, in place.
+
+    A texel of the next ring takes the mean of its known 8-neighbours of the same chart (edge neighbours
+    weigh 1, diagonal ones 1/2). A ring is finished before its values are used, so no order of texels matters.
+
+    value (H, W, C) float32 and known (H, W) bool change at the texels that get filled; chart : (H, W) int32,
+    -1 = empty
+    """
+    flat_chart, flat_known = chart.reshape(-1), known.reshape(-1)
+    flat_value = value.reshape(-1, value.shape[2])
+    queued = np.zeros(chart.size, np.bool_)
+    ring = np.flatnonzero((flat_chart >= 0) & ~flat_known)
+    beside, inside = _neighbours(ring, chart.shape)
+    ring = ring[(inside & flat_known[beside] & (flat_chart[beside] == flat_chart[ring])).any(axis=0)]
+    queued[ring] = True
+    while len(ring):
+        beside, inside = _neighbours(ring, chart.shape)
+        own = inside & (flat_chart[beside] == flat_chart[ring])
+        total, weight_sum = np.zeros((len(ring), value.shape[2])), np.zeros(len(ring))
+        for texel, use, weight in zip(beside, own & flat_known[beside], _RING_WEIGHTS, strict=True):
+            weight_sum[use] += weight
+            total[use] += weight * flat_value[texel[use]].astype(np.float64)
+        flat_value[ring] = total / weight_sum[:, None]
+        flat_known[ring] = True
+        ring = np.unique(beside[own & ~flat_known[beside] & ~queued[beside]])
+        queued[ring] = True
+
+
+def _neighbours(
+    texel: NDArray[np.int64], shape: tuple[int, int]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the 8 neighbours (8, n) int64 of flat texel numbers, and which of them lie on the page."""
+    row, column = np.divmod(texel, shape[1])
+    down = row + np.array([-1, -1, -1, 0, 0, 1, 1, 1])[:, None]
+    right = column + np.array([-1, 0, 1, -1, 1, -1, 0, 1])[:, None]
+    inside = (down >= 0) & (down < shape[0]) & (right >= 0) & (right < shape[1])
+    return np.where(inside, down * shape[1] + right, 0), inside

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 ROWS = 64
 
 
-def over_rows(kernel: Callable[[int, int], object], height: int, threads: int) -> None:
+def over_rows(kernel: Callable[[int, int], object], height: int, threads: int, band_rows: int = ROWS) -> None:
     """Call `kernel(first_row, end_row)` for all bands of a page of `height` rows.
 
     Parameters
@@ -19,8 +19,9 @@ def over_rows(kernel: Callable[[int, int], object], height: int, threads: int) -
     height : int
     threads : int
         At least 1.
+    band_rows : int
     """
-    bands = [(first, min(first + ROWS, height)) for first in range(0, height, ROWS)]
+    bands = [(first, min(first + band_rows, height)) for first in range(0, height, band_rows)]
     if threads <= 1 or len(bands) == 1:
         for band in bands:
             kernel(*band)

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.kernels.textures import sample_alpha
+from baker.trace.jit import inner, larger, smaller
 
 # Columns of a row: image uv of corner 0, its two edges (2 each), factor times vertex alpha at corner 0 and
 # what corners 1 and 2 add to it, cutoff (-1: BLEND), texture (-1: none).
@@ -35,7 +35,7 @@ def no_alpha() -> AlphaTable:
     return AlphaTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def presence(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-def]
     """Return how much of the surface of row k is there at barycentrics, 0 to 1; arrays: `TexturePack`."""
     alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA + 1] + b2 * row[k, ALPHA + 2]
@@ -46,10 +46,10 @@ def presence(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-de
     if row[k, CUTOFF] >= np.float32(0.0):
         # Weights of a lookup may add up to a hair less than 1: the comparison is one of float32.
         return 1.0 if np.float32(alpha) >= row[k, CUTOFF] else 0.0
-    return min(max(alpha, 0.0), 1.0)
+    return smaller(larger(alpha, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def presence_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
     """Return the same for triangle t of the scene, 1 if it blocks everywhere."""
     if len(shading.alpha.slot) == 0 or shading.alpha.slot[t] < 0:

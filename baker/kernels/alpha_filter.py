@@ -11,12 +11,13 @@ stochastic transparency, 2011; Embree 4 API reference, RTCFilterFunctionN.
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, cfunc, njit, types  # type: ignore[attr-defined]
+from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
 from baker.kernels.alpha import AlphaTable, presence
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import TexturePack
 from baker.trace.embree import SeeThrough
+from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, HIT_U, HIT_V, ID, NG_X, ORG_X, PRIM_ID
 from baker.trace.pointers import pointer
 
@@ -31,7 +32,7 @@ def filter_of(alpha: AlphaTable, pack: TexturePack) -> SeeThrough:
     return SeeThrough(alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _one_of_sixteen(k, seed):  # type: ignore[no-untyped-def]
     """Return a random uint32 whose upper four bits take each value once over k = 0 to 15."""
     x = np.uint32(k)

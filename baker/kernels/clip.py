@@ -5,14 +5,20 @@ Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import njit
+
+from baker.trace.jit import inner, larger, scratch, smaller
 
 # A triangle cut by four half-planes has at most seven corners; two spare rows for the cutting.
 MAX_CORNERS = 9
+# Memory of kernels for a triangle and for what is left of it, (3, 2) and (MAX_CORNERS, 2) float64.
+new_triangle = scratch((3, 2), np.float64)
+new_polygon = scratch((MAX_CORNERS, 2), np.float64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
     """Cut a triangle (3, 2) by the unit square at (x0, y0); return the corner count of `out`.
 
@@ -47,7 +53,7 @@ def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def polygon_area(corner, n):  # type: ignore[no-untyped-def]
     """Return the area of the convex polygon of the first n corners (never negative)."""
     twice = 0.0
@@ -59,7 +65,7 @@ def polygon_area(corner, n):  # type: ignore[no-untyped-def]
     return 0.5 * twice
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
     """Return the point (x, y) that a uniform (u, v) of the unit square maps to, uniform in the polygon."""
     if n < 3:
@@ -78,13 +84,13 @@ def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
         by = corner[i + 1, 1] - corner[0, 1]
         area = 0.5 * abs(ax * by - bx * ay)
         if target < area or i == last:
-            s = np.sqrt(min(max(target / area, 0.0), 1.0)) if area > 0.0 else 0.0
+            s = math.sqrt(smaller(larger(target / area, 0.0), 1.0)) if area > 0.0 else 0.0
             return corner[0, 0] + s * (ax + v * (bx - ax)), corner[0, 1] + s * (ay + v * (by - ay))
         target -= area
     return corner[0, 0], corner[0, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
     """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 square inside."""
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
@@ -100,11 +106,11 @@ def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
             nx = -nx
             ny = -ny
         base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
-        if base + max(nx, 0.0) + max(ny, 0.0) < 0.0:
+        if base + larger(nx, 0.0) + larger(ny, 0.0) < 0.0:
             return 0
         # A triangle without area has no inner side: it touches what its line passes through.
-        if twice == 0.0 and base + min(nx, 0.0) + min(ny, 0.0) > 0.0:
+        if twice == 0.0 and base + smaller(nx, 0.0) + smaller(ny, 0.0) > 0.0:
             return 0
-        if base + min(nx, 0.0) + min(ny, 0.0) < 0.0:
+        if base + smaller(nx, 0.0) + smaller(ny, 0.0) < 0.0:
             inside = False
     return 2 if inside else 1

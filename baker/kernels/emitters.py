@@ -13,12 +13,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.kernels.sampling import triangle_barycentric
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Columns of an emitter's row: three corners, face normal, area, 1 if two-sided, chance inside its cluster,
 # running sum of these chances, cluster, radiance without texture, 1 if textured.
@@ -34,6 +34,7 @@ CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED 
     20,
 )
 ROW_LENGTH = 24
+_three = scratch((3,), np.float64)
 
 
 class Emitters(NamedTuple):
@@ -76,21 +77,22 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def bounding_sphere(origin):  # type: ignore[no-untyped-def]
     """Return x, y, z, radius of a sphere around points (m, w, 3): their box's centre and half diagonal."""
-    low = np.full(3, 1.0e30)
-    high = np.full(3, -1.0e30)
+    low, high = _three(), _three()
+    for a in range(3):
+        low[a], high[a] = 1.0e30, -1.0e30
     for i in range(origin.shape[0]):
         for k in range(origin.shape[1]):
             for a in range(3):
-                low[a] = min(low[a], origin[i, k, a])
-                high[a] = max(high[a], origin[i, k, a])
+                low[a] = smaller(low[a], origin[i, k, a])
+                high[a] = larger(high[a], origin[i, k, a])
     half = 0.5 * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2 + (high[2] - low[2]) ** 2)
     return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]), half
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
     """Return the largest radius / distance of a cluster seen from points (m, w, 3); inf where one is met."""
     x, y, z, radius = bounding_sphere(origin)
@@ -102,11 +104,11 @@ def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
         clear = math.sqrt(dx * dx + dy * dy + dz * dz) - radius
         if clear <= emitters.radius[c]:
             return np.inf
-        widest = max(widest, emitters.radius[c] / clear)
+        widest = larger(widest, emitters.radius[c] / clear)
     return widest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
     """Fill `chance` and `cumulative` (C,) float32 for points (m, w, 3), taken as their bounding sphere.
 
@@ -121,17 +123,21 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
         dz = z - emitters.centre[c, 2]
         distance = math.sqrt(dx * dx + dy * dy + dz * dz)
         reach = radius + emitters.radius[c]
-        weight = emitters.power[c] / max(distance * distance, reach * reach + 1.0e-12)
+        weight = emitters.power[c] / larger(distance * distance, reach * reach + 1.0e-12)
         if distance > reach and emitters.spread[c] < 3.0:
             facing = (
                 dx * emitters.axis[c, 0] + dy * emitters.axis[c, 1] + dz * emitters.axis[c, 2]
             ) / distance
-            angle = math.acos(min(max(facing, -1.0), 1.0)) - emitters.spread[c] - math.asin(reach / distance)
+            angle = (
+                math.acos(smaller(larger(facing, -1.0), 1.0))
+                - emitters.spread[c]
+                - math.asin(reach / distance)
+            )
             if angle >= 0.5 * math.pi:
                 weight = 0.0
             elif angle > 0.0:
                 # Never let a chance fall far below the others': the bound is rough.
-                weight *= max(math.cos(angle), 0.05)
+                weight *= larger(math.cos(angle), 0.05)
         chance[c] = weight
         total += weight
     lit = 0
@@ -145,7 +151,7 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
         cumulative[c] = running
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untyped-def]
     """Return an emitter's number, its density per m2, and what is left of the uniform number u.
 
@@ -163,7 +169,7 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
         else:
             low = middle + 1
     picked = chance[low]
-    u = min(max((u - (cumulative[low] - picked)) / picked, np.float32(0.0)), np.float32(0.9999999))
+    u = smaller(larger((u - (cumulative[low] - picked)) / picked, np.float32(0.0)), np.float32(0.9999999))
     m = first[low]
     high = first[low + 1] - 1
     while m < high:
@@ -173,11 +179,11 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
         else:
             m = middle + 1
     share = row[m, SHARE]
-    u = min(max((u - (row[m, CUMULATIVE] - share)) / share, np.float32(0.0)), np.float32(0.9999999))
+    u = smaller(larger((u - (row[m, CUMULATIVE] - share)) / share, np.float32(0.0)), np.float32(0.9999999))
     return m, picked / total * share / row[m, AREA], u
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
     """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2."""
     m, density, u = choose_emitter(row, first, chance, cumulative, u)
@@ -188,7 +194,7 @@ def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore
     return m, density, b1, b2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
     """Return the density per m2 with which `sample_emitter` picks a point of emitter m."""
     total = cumulative[len(cumulative) - 1]
@@ -197,7 +203,7 @@ def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
     return chance[np.int64(row[m, CLUSTER])] / total * row[m, SHARE] / row[m, AREA]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def emitted_radiance(shading, t, b1, b2, out):  # type: ignore[no-untyped-def]
     """Write the radiance (cd/m2) that triangle t emits at barycentrics to `out` (4,)."""
     m = shading.material[t]

@@ -10,10 +10,10 @@ synthesis, 1993.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.hits import front_facing, hit_pixel
-from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.trace.jit import kernel, larger, smaller
 from baker.trace.packets import (
     DIR_X,
     DIR_Y,
@@ -28,7 +28,7 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, target, tally):  # type: ignore[no-untyped-def]
     """Cast the rays of patches.
 
@@ -42,9 +42,9 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
-    seeds, frame = new_lanes()
+    seeds, frame = new_seeds(), new_frame()
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 30, seeds)
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
@@ -71,24 +71,7 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
                     tally[begin + p, 1] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def count_targets(target, columns, counts, lengths):  # type: ignore[no-untyped-def]
-    """Merge equal targets of rows that are sorted: which, how often each, and how many differ."""
-    for i in range(len(target)):
-        m = 0
-        for r in range(target.shape[1]):
-            if target[i, r] < 0:
-                continue
-            if m and columns[i, m - 1] == target[i, r]:
-                counts[i, m - 1] += 1
-            else:
-                columns[i, m] = target[i, r]
-                counts[i, m] = 1
-                m += 1
-        lengths[i] = m
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-untyped-def]
     """Write irradiance = F exitance, both (P, 3) float64."""
     for i in range(len(first) - 1):
@@ -104,27 +87,21 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
         irradiance[i, 2] = blue
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def transpose(first, column, value):  # type: ignore[no-untyped-def]
-    """Return the transpose of a square CSR matrix as first (P + 1,), column, value; columns rise."""
-    n = len(first) - 1
-    out_first = np.zeros(n + 1, np.int64)
-    for j in column:
-        out_first[j + 1] += 1
-    for j in range(n):
-        out_first[j + 1] += out_first[j]
-    at = out_first[:-1].copy()
-    out_column, out_value = np.zeros(len(column), np.int32), np.zeros(len(value), np.float32)
-    for i in range(n):
+@kernel
+def transpose(first, column, value, at, out_column, out_value):  # type: ignore[no-untyped-def]
+    """Write column and value of the transpose of a square CSR matrix; columns rise.
+
+    at : (P,) int64, where each row of the transpose begins; moved to where it ends
+    """
+    for i in range(len(first) - 1):
         for k in range(first[i], first[i + 1]):
             j = column[k]
             out_column[at[j]] = i
             out_value[at[j]] = value[k]
             at[j] += 1
-    return out_first, out_column, out_value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def weigh_reciprocal(  # type: ignore[no-untyped-def]
     first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
 ):
@@ -144,7 +121,7 @@ def weigh_reciprocal(  # type: ignore[no-untyped-def]
         while a < first[i + 1] or b < other_first[i + 1]:
             ca = column[a] if a < first[i + 1] else 2147483647
             cb = other_column[b] if b < other_first[i + 1] else 2147483647
-            j = min(ca, cb)
+            j = smaller(ca, cb)
             both = area[i] + area[j]
             own = 0.0
             other = 0.0
@@ -163,7 +140,7 @@ def weigh_reciprocal(  # type: ignore[no-untyped-def]
     return exchanged, unlike
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: ignore[no-untyped-def]
     """Find factors d (P,) so that d_i F_ij d_j has row sums `goal`, keeping A_i F_ij symmetric.
 
@@ -181,7 +158,7 @@ def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: 
                 total += value[k] * factor[column[k]]
             if total > 0.0:
                 new = (goal[i] + slack[i]) / (total + slack[i])
-                most = max(most, abs(new - factor[i]))
+                most = larger(most, abs(new - factor[i]))
                 factor[i] = new
         if most < 1.0e-6:
             break

@@ -8,8 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from baker.trace.jit import inner, larger, smaller
 
 # Answer of `hit_pixel` for the black back of a one-sided surface.
 BACK_FACE = -1
@@ -30,13 +31,13 @@ class HitTable(NamedTuple):
 
 # The functions below take the table's arrays one by one: handing a tuple of arrays to a function costs
 # Numba an atomic reference count per array and call, which tripled the time of a hit.
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def front_facing(row, prim, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Tell whether a ray of direction d meets the front of the triangle."""
     return row[prim, 8] * dx + row[prim, 9] * dy + row[prim, 10] * dz < np.float32(0.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def hit_pixel(row, size, n_pixels, prim, u, v, front):  # type: ignore[no-untyped-def]
     """Return the flat pixel at barycentrics (u, v) of a triangle (+ n_pixels on its back), or BACK_FACE."""
     if not front and row[prim, 7] == np.float32(0.0):
@@ -44,7 +45,7 @@ def hit_pixel(row, size, n_pixels, prim, u, v, front):  # type: ignore[no-untype
     x = (row[prim, 0] + u * row[prim, 2] + v * row[prim, 4]) * np.float32(size)
     y = (row[prim, 1] + u * row[prim, 3] + v * row[prim, 5]) * np.float32(size)
     last = np.int32(size - 1)
-    column = np.int64(min(max(np.int32(x), np.int32(0)), last))
-    line = np.int64(min(max(np.int32(y), np.int32(0)), last))
+    column = np.int64(smaller(larger(np.int32(x), np.int32(0)), last))
+    line = np.int64(smaller(larger(np.int32(y), np.int32(0)), last))
     pixel = (np.int64(row[prim, 6]) * size + line) * size + column
     return pixel if front else pixel + n_pixels

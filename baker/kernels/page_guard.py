@@ -7,8 +7,11 @@ is mixed with the samples by inverse variance, so that a converged page stays as
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import njit
+
+from baker.trace.jit import kernel, larger, scratch, smaller
 
 RADIUS = 2
 # Size of the window's mean difference that is believed to be noise, in its standard errors.
@@ -19,9 +22,10 @@ TEXEL_SIGMAS = 5.0
 OWN_ERROR = 0.005
 # The same within two texels of a chart's border, where partly covered texels step from row to row.
 OWN_ERROR_BORDER = 0.02
+_three = scratch((3,), np.float64)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no-untyped-def]
     """Filter a page by the kernel that is blind to planes, [1 -2 1; -2 4 -2; 1 -2 1] / 6.
 
@@ -40,7 +44,7 @@ def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no
     Immerkaer, Fast Noise Variance Estimation, 1996.
     """
     height, width = grey.shape
-    for r in range(max(first_row, 1), min(end_row, height - 1)):
+    for r in range(larger(first_row, 1), smaller(end_row, height - 1)):
         for c in range(1, width - 1):
             inside = True
             total = 0.0
@@ -54,7 +58,7 @@ def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no
                 out[r, c] = total / 6.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):  # type: ignore[no-untyped-def]
     """Correct a denoised page where it leaves the noisy one by more than noise explains.
 
@@ -68,16 +72,16 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
     out : (H, W, 3) float32, changed at covered texels of rows first_row to end_row - 1
     """
     height, width = chart.shape
-    residual = np.zeros(3, np.float64)
+    residual = _three()
     for r in range(first_row, end_row):
         for c in range(width):
             if not covered[r, c]:
                 continue
             sw = sww = se = 0.0
             n = 0
-            residual[:] = 0.0
-            for rr in range(max(r - RADIUS, 0), min(r + RADIUS + 1, height)):
-                for cc in range(max(c - RADIUS, 0), min(c + RADIUS + 1, width)):
+            residual[0] = residual[1] = residual[2] = 0.0
+            for rr in range(larger(r - RADIUS, 0), smaller(r + RADIUS + 1, height)):
+                for cc in range(larger(c - RADIUS, 0), smaller(c + RADIUS + 1, width)):
                     if not covered[rr, cc] or chart[rr, cc] != chart[r, c]:
                         continue
                     w = 1.0 / (1.0 + float((rr - r) * (rr - r) + (cc - c) * (cc - c)))
@@ -89,9 +93,9 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                     for j in range(3):
                         residual[j] += w * (float(noisy[rr, cc, j]) - float(denoised[rr, cc, j]))
             # Pooled over the window: a texel that missed all rare bright samples underrates its own error.
-            texel_error = np.sqrt(max(se / sw, float(error[r, c]) ** 2))
+            texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
-            mean_error = texel_error * np.sqrt(sww) / sw
+            mean_error = texel_error * math.sqrt(sww) / sw
             grey = (
                 0.2126 * float(denoised[r, c, 0])
                 + 0.7152 * float(denoised[r, c, 1])
@@ -101,14 +105,14 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                 # A channel's noise stands to its value as the luminance's does to the luminance.
                 scale = 1.0
                 if grey > 0.0:
-                    scale = min(max(float(denoised[r, c, j]) / grey, 0.0), 8.0)
+                    scale = smaller(larger(float(denoised[r, c, j]) / grey, 0.0), 8.0)
                 believed = MEAN_SIGMAS * mean_error * scale
                 mean = residual[j] / sw
-                excess = max(abs(mean) - believed, 0.0)
+                excess = larger(abs(mean) - believed, 0.0)
                 value = float(denoised[r, c, j]) + (excess if mean > 0.0 else -excess)
                 far = TEXEL_SIGMAS * texel_error * scale
                 own = float(noisy[r, c, j])
-                value = min(max(value, own - far), own + far)
+                value = smaller(larger(value, own - far), own + far)
                 noise = (texel_error * scale) ** 2
                 bias = (own_error * value) ** 2
                 if noise + bias > 0.0:

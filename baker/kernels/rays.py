@@ -7,10 +7,13 @@ offsets, or the compiler could not know that they do not overlap.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
 
 from baker.kernels.sampling import cosine_direction, hash_combine, tangent_frame, texel_scramble
+from baker.trace.jit import inner, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, ORG_X, TFAR
 
 FAR = np.float32(1.0e30)
@@ -18,13 +21,18 @@ FAR = np.float32(1.0e30)
 FRAME_ROWS = 9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def new_lanes():  # type: ignore[no-untyped-def]
-    """Return working memory for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32."""
-    return np.zeros(2 * LANES, np.uint32), np.zeros(FRAME_ROWS * LANES, np.float32)
+# Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
+new_seeds = scratch((2 * LANES,), np.uint32)
+new_frame = scratch((FRAME_ROWS * LANES,), np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@register_jitable(inline="always")
+def new_lanes() -> Any:
+    """Return both."""
+    return new_seeds(), new_frame()
+
+
+@inner
 def lane_seeds(first, lanes, salt, seeds):  # type: ignore[no-untyped-def]
     """Write the two scramble seeds of items first to first + lanes to `seeds` (2 * 16,) uint32."""
     for lane in range(lanes):
@@ -32,7 +40,7 @@ def lane_seeds(first, lanes, salt, seeds):  # type: ignore[no-untyped-def]
         seeds[LANES + lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt + 1))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_frames(rays, frame, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
     """Write origins of point k of texels group to group + lanes to `rays`, tangent frames to `frame`.
 
@@ -50,7 +58,7 @@ def load_frames(rays, frame, origin, normal, group, lanes, k):  # type: ignore[n
         frame[3 * LANES + lane], frame[4 * LANES + lane], frame[5 * LANES + lane] = bx, by, bz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def aim_lanes(rays, words, frame, seeds, first, second, shared, far):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted directions of one sample into all lanes.
 

@@ -16,15 +16,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from baker.trace.jit import inner, larger
 
 # Numba widens uint32 arithmetic to 64 bits: every step is wrapped again.
 _u = np.uint32
 _INV_2_24 = np.float32(5.9604645e-08)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def hash_u32(x):  # type: ignore[no-untyped-def]
     """Return a well-mixed uint32 of a uint32 (Wellons' lowbias32)."""
     x = _u(x ^ (x >> _u(16)))
@@ -34,13 +35,13 @@ def hash_u32(x):  # type: ignore[no-untyped-def]
     return _u(x ^ (x >> _u(16)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def hash_combine(a, b):  # type: ignore[no-untyped-def]
     """Return a uint32 that depends on both uint32 arguments."""
     return hash_u32(_u(hash_u32(_u(a)) ^ _u(_u(b) * _u(0x9E3779B9) + _u(0x7F4A7C15))))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def reverse_bits(x):  # type: ignore[no-untyped-def]
     """Return the uint32 with its bits in reverse order."""
     x = _u(((x >> _u(1)) & _u(0x55555555)) | ((x & _u(0x55555555)) << _u(1)))
@@ -50,7 +51,7 @@ def reverse_bits(x):  # type: ignore[no-untyped-def]
     return _u((x >> _u(16)) | (x << _u(16)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
     """Owen-scramble a bit-reversed uint32: each bit is flipped by a hash of the bits below it."""
     x = _u(x + seed)
@@ -60,7 +61,7 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
     return _u(x ^ _u(x * _u(0x8D22F6E6)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     """Return a number in [0, 1): the shared bits kept, the rest scrambled with the texel's seed.
 
@@ -73,27 +74,19 @@ def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     return np.float32(reverse_bits(y) >> _u(8)) * _INV_2_24
 
 
-@njit(cache=True, error_model="numpy")
-def sobol_reversed(n, seed, dimension_pair):  # type: ignore[no-untyped-def]
+def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]:
     """Return (n, 2) uint32: a globally scrambled (0,2)-sequence, bit-reversed.
 
     Different `dimension_pair` numbers give independently scrambled sequences, in the same order.
     """
-    out = np.zeros((n, 2), np.uint32)
-    seed_x = hash_combine(_u(seed), _u(3 * dimension_pair))
-    seed_y = hash_combine(_u(seed), _u(3 * dimension_pair + 1))
-    for i in range(n):
-        out[i, 0] = scramble_reversed(_u(i), seed_x)
-        y = _u(0)
-        v = _u(1) << _u(31)
-        j = i
-        while j:
-            if j & 1:
-                y = _u(y ^ v)
-            j >>= 1
-            v = _u(v ^ (v >> _u(1)))
-        out[i, 1] = scramble_reversed(reverse_bits(y), seed_y)
-    return out
+    number = np.arange(n, dtype=np.uint32)
+    seeds = np.array([[_u(3 * dimension_pair)], [_u(3 * dimension_pair + 1)]])
+    seed_x, seed_y = hash_combine(np.array([_u(seed)]), seeds)
+    y, v = np.zeros(n, np.uint32), _u(1 << 31)
+    for bit in range(int(n).bit_length()):
+        y ^= np.where(number >> _u(bit) & _u(1), v, _u(0))
+        v ^= v >> _u(1)
+    return np.stack([scramble_reversed(number, seed_x), scramble_reversed(reverse_bits(y), seed_y)], axis=1)
 
 
 def shared_bits_mask(n_samples: int) -> np.uint32:
@@ -101,7 +94,7 @@ def shared_bits_mask(n_samples: int) -> np.uint32:
     return np.uint32((1 << min(int(math.log2(max(n_samples, 1))) // 2, 4)) - 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     """Map the unit square to the cosine-weighted hemisphere about +z; pdf = cos / pi.
 
@@ -125,10 +118,10 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     )
     x = r * (c if wide else s)
     y = r * (s if wide else c)
-    return x, y, math.sqrt(max(np.float32(0.0), np.float32(1.0) - r * r))
+    return x, y, math.sqrt(larger(np.float32(0.0), np.float32(1.0) - r * r))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     """Return two unit vectors (six floats) that make a right-handed frame with the unit normal."""
     sign = np.float32(1.0) if nz >= np.float32(0.0) else np.float32(-1.0)
@@ -140,7 +133,7 @@ def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
     """Map the unit square to uniform barycentrics (b1, b2) of a triangle, keeping strata compact.
 
@@ -153,8 +146,3 @@ def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
         b2 = v * np.float32(0.5)
         b1 = u - b2
     return b1, b2
-
-
-def cosine_directions(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return `cosine_direction` of (n, 2) points of the unit square as (n, 3) float32."""
-    return np.array([cosine_direction(u, v) for u, v in points], np.float32).reshape(-1, 3)

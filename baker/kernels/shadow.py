@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.sampling import hash_u32
 from baker.kernels.surface import N_POINTS
+from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, ID, LANES, ORG_X, TFAR, trace_lanes
 
 _f = np.float32
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-untyped-def]
     """Add colour * mean over a texel's 16 points of weight * visibility to `out`, both column blocks.
 
@@ -25,7 +25,7 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
     spare_on, spare = caster.valid, caster.floats
     bits = origin.view(np.uint32)
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         for k in range(N_POINTS):
             any_lane = False
             for lane in range(LANES):

@@ -14,11 +14,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, polygon_point
+from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygon_area, polygon_point
 from baker.kernels.sampling import hash_combine, texel_scramble
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
 # Ray origins leave the surface by this share of the largest coordinate: a few dozen float32 steps.
@@ -30,6 +30,7 @@ BORDER = 0.01
 # Vertices whose normal leans further from the face (cosine) lift nothing: that is no smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
+_flat_row = scratch((4, 3), np.float64)
 
 
 class Surface(NamedTuple):
@@ -57,7 +58,7 @@ class Surface(NamedTuple):
     least: np.float32
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
     """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f of triangle t for texel-space (x, y)."""
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
@@ -73,14 +74,14 @@ def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  # type: ignore[no-untyped-def]
     """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
 
     p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; least : see `Surface`
     """
-    b1 = min(max(b1, 0.0), 1.0)
-    b2 = min(max(b2, 0.0), 1.0 - b1)
+    b1 = smaller(larger(b1, 0.0), 1.0)
+    b2 = smaller(larger(b2, 0.0), 1.0 - b1)
     b0 = 1.0 - b1 - b2
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     px = b0 * p[i0, 0] + b1 * p[i1, 0] + b2 * p[i2, 0]
@@ -107,14 +108,14 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
                 lx -= weight * below * vx
                 ly -= weight * below * vy
                 lz -= weight * below * vz
-    step = OFFSET * max(abs(px), abs(py), abs(pz), least)
+    step = OFFSET * larger(larger(larger(abs(px), abs(py)), abs(pz)), least)
     away = sign * step
-    if min(b0, b1, b2) < BORDER:
+    if smaller(smaller(b0, b1), b2) < BORDER:
         # Also along the face: rounding must not put a point of its border behind the wall that meets it.
         mx = (p[i0, 0] + p[i1, 0] + p[i2, 0]) / 3.0 - px
         my = (p[i0, 1] + p[i1, 1] + p[i2, 1]) / 3.0 - py
         mz = (p[i0, 2] + p[i1, 2] + p[i2, 2]) / 3.0 - pz
-        inward = min(INWARD * step / max(math.sqrt(mx * mx + my * my + mz * mz), 1.0e-30), 0.5)
+        inward = smaller(INWARD * step / larger(math.sqrt(mx * mx + my * my + mz * mz), 1.0e-30), 0.5)
         lx += inward * mx
         ly += inward * my
         lz += inward * mz
@@ -127,7 +128,7 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
     normal[n, k, 2] = scale * nz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-def]
     """Tell if all of triangle t is shaded with its face normal.
 
@@ -143,16 +144,16 @@ def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-de
         row[1, a] = float(p[i1, a]) - p[i0, a]
         row[2, a] = float(p[i2, a]) - p[i0, a]
         row[3, a] = sign * face[t, a]
-    return min(along0, along1, along2) > 0.999999
+    return smaller(smaller(along0, along1), along2) > 0.999999
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-untyped-def]
     """Do the work of `place` for a point inside a flat triangle, away from its border."""
     px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
     py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
     pz = row[0, 2] + b1 * row[1, 2] + b2 * row[2, 2]
-    step = OFFSET * max(abs(px), abs(py), abs(pz), least)
+    step = OFFSET * larger(larger(larger(abs(px), abs(py)), abs(pz)), least)
     origin[n, k, 0] = px + step * row[3, 0]
     origin[n, k, 1] = py + step * row[3, 1]
     origin[n, k, 2] = pz + step * row[3, 2]
@@ -161,7 +162,7 @@ def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-unt
     normal[n, k, 2] = row[3, 2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
     """Write points of texel entries: origin and normal (m, w, 3) float32, world.
 
@@ -171,10 +172,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
     hit_triangle (m, w) int32 and bary (m, w, 2) float32 say where on which triangle each lies; with no rows
     they are left alone
     """
-    corner = np.zeros((3, 2))
-    cut = np.zeros((MAX_CORNERS, 2))
-    spare = np.zeros((MAX_CORNERS, 2))
-    flat_row = np.zeros((4, 3))
+    corner, cut, spare, flat_row = new_triangle(), new_polygon(), new_polygon(), _flat_row()
     located = len(hit_triangle) > 0
     # Out of the tuple once: every access to a tuple's array costs an atomic reference count.
     position, shading, face = surface.position, surface.normal, surface.face_normal
@@ -226,18 +224,18 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
                     corner[j, 0] = uv[triangle[t, j], 0] * size
                     corner[j, 1] = uv[triangle[t, j], 1] * size
                 m = clip_to_square(corner, x0, y0, cut, spare)
-                inside = max(float(entry_area[e]), 1.0e-30)
+                inside = larger(float(entry_area[e]), 1.0e-30)
                 if m == 0:
                     x, y = 0.5, 0.5
                 elif m < 3 or polygon_area(cut, m) <= 0.0:
                     x, y = cut[0, 0], cut[0, 1]
                 else:
-                    x, y = polygon_point(cut, m, min(max((u * total - done) / inside, 0.0), 1.0), v)
+                    x, y = polygon_point(cut, m, smaller(larger((u * total - done) / inside, 0.0), 1.0), v)
             x += x0
             y += y0
             b1 = a * x + b * y + c
             b2 = d * x + g * y + h
-            if flat and min(b1, b2, 1.0 - b1 - b2) >= BORDER:
+            if flat and smaller(smaller(b1, b2), 1.0 - b1 - b2) >= BORDER:
                 place_flat(flat_row, least, b1, b2, origin, normal, n, w)
             else:
                 place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, w)
@@ -247,7 +245,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
                 bary[n, w, 1] = b2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def free_point(bits, k):  # type: ignore[no-untyped-def]
     """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
     bits = np.int64(bits)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import njit
 
 from baker.kernels.alpha import presence_at
-from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area
+from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygon_area
 from baker.kernels.surface import N_POINTS, inverse_uv, place, place_points
 from baker.kernels.textures import sample_texture
+from baker.trace.jit import inner, kernel, larger, scratch
+
+# Memory of the kernels below.
+_vector, _vectors = scratch((1, 1, 3), np.float32), scratch((1, N_POINTS, 3), np.float32)
+_triangles, _barycentrics = scratch((1, N_POINTS), np.int32), scratch((1, N_POINTS, 2), np.float32)
+_rgba, _every, _chosen = scratch((4,), np.float64), scratch((1, N_POINTS), np.uint8), scratch((1,), np.int64)
+_shares = scratch((N_POINTS,), np.float64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):  # type: ignore[no-untyped-def]
     """Fill the geometry of front entries begin to end.
 
@@ -19,11 +27,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
     area : (n,) float32, m2; centroid : (n, 2) float32, of the covered part, texels from the centre
     position, normal : (n, 3) float32, world, at that centroid
     """
-    corner = np.zeros((3, 2))
-    cut = np.zeros((MAX_CORNERS, 2))
-    spare = np.zeros((MAX_CORNERS, 2))
-    spot = np.zeros((1, 1, 3), np.float32)
-    facing = np.zeros((1, 1, 3), np.float32)
+    corner, cut, spare, spot, facing = new_triangle(), new_polygon(), new_polygon(), _vector(), _vector()
     for i in range(begin, end):
         rest = surface.pixel[i] % (surface.size * surface.size)
         x0 = rest % surface.size
@@ -43,7 +47,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
                     corner[j, 0] = surface.uv[surface.triangle[t, j], 0] * surface.size
                     corner[j, 1] = surface.uv[surface.triangle[t, j], 1] * surface.size
                 mx, my = _centroid(cut, clip_to_square(corner, x0, y0, cut, spare))
-            weight = max(inside, 1.0e-12)
+            weight = larger(inside, 1.0e-12)
             total += weight
             cx += weight * mx
             cy += weight * my
@@ -61,7 +65,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
             normal[i, axis] = facing[0, 0, axis]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _centroid(polygon, n):  # type: ignore[no-untyped-def]
     """Return the area centroid of a convex polygon; the mean of its corners if it has no area."""
     total = polygon_area(polygon, n)
@@ -83,7 +87,7 @@ def _centroid(polygon, n):  # type: ignore[no-untyped-def]
     return x, y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
     """Interpolate a per-vertex (V, 2) uv at barycentrics of triangle t."""
     b0 = 1.0 - b1 - b2
@@ -91,7 +95,7 @@ def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
     return b0 * uv[i, 0] + b1 * uv[j, 0] + b2 * uv[k, 0], b0 * uv[i, 1] + b1 * uv[j, 1] + b2 * uv[k, 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
     """Return the width in image uv of the part of a texel that one of its points stands for."""
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
@@ -103,26 +107,23 @@ def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
         (image_uv[j, 0] - image_uv[i, 0]) * (image_uv[k, 1] - image_uv[i, 1])
         - (image_uv[k, 0] - image_uv[i, 0]) * (image_uv[j, 1] - image_uv[i, 1])
     )
-    return np.sqrt(image / max(lightmap, 1.0e-12) / N_POINTS)
+    return math.sqrt(image / larger(lightmap, 1.0e-12) / N_POINTS)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def texel_albedo(surface, shading, begin, end, albedo, area):  # type: ignore[no-untyped-def]
+@kernel
+def texel_albedo(surface, shading, free, begin, end, albedo, area):  # type: ignore[no-untyped-def]
     """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32.
 
     Of surfaces that let light through, only what is there counts: `area` (n,) float32 is cut to its share.
+    free : (n,) uint16, all bits set
     """
-    origin = np.zeros((1, N_POINTS, 3), np.float32)
-    normal = np.zeros((1, N_POINTS, 3), np.float32)
-    hit = np.zeros((1, N_POINTS), np.int32)
-    bary = np.zeros((1, N_POINTS, 2), np.float32)
-    rgba = np.zeros(4)
-    free = np.full(len(surface.pixel), 0xFFFF, np.uint16)
-    every = np.arange(N_POINTS).astype(np.uint8).reshape(1, N_POINTS)
-    chosen = np.zeros(1, np.int64)
+    origin, normal, hit, bary = _vectors(), _vectors(), _triangles(), _barycentrics()
+    rgba, every, chosen, share = _rgba(), _every(), _chosen(), _shares()
+    for k in range(N_POINTS):
+        every[0, k] = k
+        share[k] = 1.0
     coloured = len(shading.colour) > 1
     any_alpha = len(shading.alpha.slot) > 0
-    share = np.ones(N_POINTS)
     for i in range(begin, end):
         first = shading.material[surface.entry[surface.first[i]]]
         plain = not coloured

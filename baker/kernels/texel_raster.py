@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
-from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, square_touches
+from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygon_area, square_touches
+from baker.trace.jit import inner, kernel, larger, smaller
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
     low_x = low_y = 1.0e30
     high_x = high_y = -1.0e30
@@ -23,21 +24,21 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
         y = uv[triangle[t, i], 1] * size
         corner[i, 0] = x
         corner[i, 1] = y
-        low_x, high_x = min(low_x, x), max(high_x, x)
-        low_y, high_y = min(low_y, y), max(high_y, y)
+        low_x, high_x = smaller(low_x, x), larger(high_x, x)
+        low_y, high_y = smaller(low_y, y), larger(high_y, y)
     # A border exactly on a texel's edge belongs to the texel that is filled, not to its neighbour.
     tiny = 1.0e-4
-    first_x = max(math.floor(low_x + tiny), 0)
-    first_y = max(math.floor(low_y + tiny), 0)
-    last_x = min(max(math.ceil(high_x - tiny) - 1, first_x), size - 1)
-    last_y = min(max(math.ceil(high_y - tiny) - 1, first_y), size - 1)
-    return min(first_x, size - 1), min(first_y, size - 1), last_x, last_y
+    first_x = larger(math.floor(low_x + tiny), 0)
+    first_y = larger(math.floor(low_y + tiny), 0)
+    last_x = smaller(larger(math.ceil(high_x - tiny) - 1, first_x), size - 1)
+    last_y = smaller(larger(math.ceil(high_y - tiny) - 1, first_y), size - 1)
+    return smaller(first_x, size - 1), smaller(first_y, size - 1), last_x, last_y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def count_overlaps(uv, triangle, page, size, count):  # type: ignore[no-untyped-def]
     """Add to `count` (P * H * W,) int32 how many triangles touch each texel's square."""
-    corner = np.zeros((3, 2))
+    corner = new_triangle()
     for t in range(len(triangle)):
         x0, y0, x1, y1 = _corners(uv, triangle, t, size, corner)
         base = np.int64(page[t]) * size * size
@@ -47,15 +48,13 @@ def count_overlaps(uv, triangle, page, size, count):  # type: ignore[no-untyped-
                     count[base + y * size + x] += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore[no-untyped-def]
     """Write each texel's triangles and their areas (in texels) behind `start` (P * H * W,) int64.
 
     `start` is moved to the end of each texel's list. Triangles come in rising order.
     """
-    corner = np.zeros((3, 2))
-    cut = np.zeros((MAX_CORNERS, 2))
-    spare = np.zeros((MAX_CORNERS, 2))
+    corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
         x0, y0, x1, y1 = _corners(uv, triangle, t, size, corner)
         base = np.int64(page[t]) * size * size
@@ -72,7 +71,7 @@ def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore
                     start[base + y * size + x] = at + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def keep_main_chart(first, entry, area, chart, texel_chart, kept):  # type: ignore[no-untyped-def]
     """Choose for each texel the chart with the largest area; mark its entries in `kept`.
 
@@ -104,20 +103,11 @@ def keep_main_chart(first, entry, area, chart, texel_chart, kept):  # type: igno
                     break
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def morton_code(x, y):  # type: ignore[no-untyped-def]
-    """Interleave the bits of two numbers below 65536 (Morton, 1966)."""
-    code = np.uint64(0)
+def morton_keys(pixel: NDArray[np.int64], size: int) -> NDArray[np.uint64]:
+    """Return the (n,) uint64 Morton order of flat pixel numbers, page first (Morton, 1966)."""
+    number, spread = np.arange(size, dtype=np.uint64), np.zeros(size, np.uint64)
     for bit in range(16):
-        code |= (np.uint64(x >> bit) & np.uint64(1)) << np.uint64(2 * bit)
-        code |= (np.uint64(y >> bit) & np.uint64(1)) << np.uint64(2 * bit + 1)
-    return code
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def morton_keys(pixel, size, key):  # type: ignore[no-untyped-def]
-    """Write to `key` (n,) uint64 the Morton order of flat pixel numbers (page first)."""
-    for i in range(len(pixel)):
-        page = pixel[i] // (size * size)
-        rest = pixel[i] - page * size * size
-        key[i] = (np.uint64(page) << np.uint64(32)) | morton_code(rest % size, rest // size)
+        spread |= (number >> np.uint64(bit) & np.uint64(1)) << np.uint64(2 * bit)
+    page, rest = np.divmod(pixel, size * size)
+    row, column = np.divmod(rest, size)
+    return page.astype(np.uint64) << np.uint64(32) | spread[row] << np.uint64(1) | spread[column]

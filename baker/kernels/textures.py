@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
+from baker.trace.jit import inner, larger, smaller
 
 MAX_LEVELS = 16
 _WRAP = {"repeat": 0, "mirror": 1, "clamp": 2}
@@ -83,22 +83,22 @@ def pack_textures(images: Sequence[tuple[NDArray[Any], tuple[str, str]]]) -> Tex
     return TexturePack(pixels, level, n_levels, wrap)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
     if mode == 0:
         return i % n
     if mode == 1:
         j = i % (2 * n)
         return j if j < n else 2 * n - 1 - j
-    return min(max(i, 0), n - 1)
+    return smaller(larger(i, 0), n - 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
     """Return the bilinear alpha of texture k at (u, v) in its finest level; arrays as of `TexturePack`."""
     offset, w, h = level[k, 0, 0], level[k, 0, 1], level[k, 0, 2]
-    x = (u - math.floor(u / 2.0) * 2.0 if wrap[k, 0] != 2 else min(max(u, -1.0), 2.0)) * w - 0.5
-    y = (v - math.floor(v / 2.0) * 2.0 if wrap[k, 1] != 2 else min(max(v, -1.0), 2.0)) * h - 0.5
+    x = (u - math.floor(u / 2.0) * 2.0 if wrap[k, 0] != 2 else smaller(larger(u, -1.0), 2.0)) * w - 0.5
+    y = (v - math.floor(v / 2.0) * 2.0 if wrap[k, 1] != 2 else smaller(larger(v, -1.0), 2.0)) * h - 0.5
     x0 = np.int64(math.floor(x))
     y0 = np.int64(math.floor(y))
     fx = x - x0
@@ -111,20 +111,20 @@ def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
     return (1.0 - fy) * above + fy * below
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-def]
     """Write the linear RGBA of texture k at (u, v) to `out` (4,).
 
     `footprint` is the width in uv (of the whole image) that the answer should average over.
     """
-    width = max(pack.level[k, 0, 1], pack.level[k, 0, 2])
+    width = larger(pack.level[k, 0, 1], pack.level[k, 0, 2])
     n = 0
     if footprint * width > 1.0:
-        n = min(int(math.log2(footprint * width) + 0.5), pack.n_levels[k] - 1)
+        n = smaller(int(math.log2(footprint * width) + 0.5), pack.n_levels[k] - 1)
     offset, w, h = pack.level[k, n, 0], pack.level[k, n, 1], pack.level[k, n, 2]
     # A uv of many repeats keeps its fraction only.
-    x = (u - math.floor(u / 2.0) * 2.0 if pack.wrap[k, 0] != 2 else min(max(u, -1.0), 2.0)) * w - 0.5
-    y = (v - math.floor(v / 2.0) * 2.0 if pack.wrap[k, 1] != 2 else min(max(v, -1.0), 2.0)) * h - 0.5
+    x = (u - math.floor(u / 2.0) * 2.0 if pack.wrap[k, 0] != 2 else smaller(larger(u, -1.0), 2.0)) * w - 0.5
+    y = (v - math.floor(v / 2.0) * 2.0 if pack.wrap[k, 1] != 2 else smaller(larger(v, -1.0), 2.0)) * h - 0.5
     x0 = math.floor(x)
     y0 = math.floor(y)
     fx = x - x0

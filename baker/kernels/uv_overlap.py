@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
+
+from baker.trace.jit import kernel, larger, smaller
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):  # type: ignore[no-untyped-def]
     """Mark the samples each triangle covers and count those that were covered before.
 
@@ -37,15 +38,15 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
         if turn < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
         # Signed distance to an edge: n . (p - a), n pointing inwards.
-        l0 = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-        l1 = np.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
-        l2 = np.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
+        l0 = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        l1 = math.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
+        l2 = math.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
         if l0 == 0.0 or l1 == 0.0 or l2 == 0.0:
             continue
-        r_low = max(0, int(np.floor(min(ay, by, cy) - 0.5)))
-        r_high = min(rows[g] - 1, int(np.ceil(max(ay, by, cy) - 0.5)))
-        c_low = max(0, int(np.floor(min(ax, bx, cx) - 0.5)))
-        c_high = min(stride[g] - 1, int(np.ceil(max(ax, bx, cx) - 0.5)))
+        r_low = larger(0, math.floor(smaller(smaller(ay, by), cy) - 0.5))
+        r_high = smaller(rows[g] - 1, math.ceil(larger(larger(ay, by), cy) - 0.5))
+        c_low = larger(0, math.floor(smaller(smaller(ax, bx), cx) - 0.5))
+        c_high = smaller(stride[g] - 1, math.ceil(larger(larger(ax, bx), cx) - 0.5))
         for r in range(r_low, r_high + 1):
             y = r + 0.5
             row = base[g] + r * stride[g]
@@ -64,7 +65,7 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
                         doubled[g] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
     """Write chart + 1 into each free texel whose square a triangle enters.
 
@@ -79,10 +80,10 @@ def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
     # What only touches a texel's border does not enter it.
     slack = 1e-4
     for t in range(len(corner)):
-        y_low = min(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1])
-        y_high = max(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1])
+        y_low = smaller(smaller(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1])
+        y_high = larger(larger(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1])
         for r in range(
-            max(0, int(np.floor(y_low + slack))), min(height - 1, int(np.ceil(y_high - slack)) - 1) + 1
+            larger(0, math.floor(y_low + slack)), smaller(height - 1, math.ceil(y_high - slack) - 1) + 1
         ):
             x_low, x_high = 1e30, -1e30
             for k in range(3):
@@ -90,21 +91,21 @@ def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
                 m = k + 1 if k < 2 else 0
                 bx, by = corner[t, m, 0], corner[t, m, 1]
                 if r <= ay <= r + 1:
-                    x_low, x_high = min(x_low, ax), max(x_high, ax)
+                    x_low, x_high = smaller(x_low, ax), larger(x_high, ax)
                 for line in (r, r + 1):
                     if (ay < line) != (by < line):
                         x = ax + (bx - ax) * (line - ay) / (by - ay)
-                        x_low, x_high = min(x_low, x), max(x_high, x)
+                        x_low, x_high = smaller(x_low, x), larger(x_high, x)
             c_low, c_high = (
-                max(0, int(np.floor(x_low + slack))),
-                min(width - 1, int(np.ceil(x_high - slack)) - 1),
+                larger(0, math.floor(x_low + slack)),
+                smaller(width - 1, math.ceil(x_high - slack) - 1),
             )
             for c in range(c_low, c_high + 1):
                 if owner[r, c] == 0:
                     owner[r, c] = chart[t] + 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_close(owner, gap):  # type: ignore[no-untyped-def]
     """Count owned texels that have another owner's texel within `gap` rows and columns."""
     height, width = owner.shape
@@ -115,8 +116,8 @@ def count_close(owner, gap):  # type: ignore[no-untyped-def]
             if own == 0:
                 continue
             found = False
-            for y in range(max(0, r - gap), min(height, r + gap + 1)):
-                for x in range(max(0, c - gap), min(width, c + gap + 1)):
+            for y in range(larger(0, r - gap), smaller(height, r + gap + 1)):
+                for x in range(larger(0, c - gap), smaller(width, c + gap + 1)):
                     if owner[y, x] != 0 and owner[y, x] != own:
                         found = True
                         break

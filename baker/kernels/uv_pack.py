@@ -9,11 +9,12 @@ Generation*, 2002 (packing along outlines); here on runs of rows, so that holes 
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+import math
+
+from baker.trace.jit import inner, kernel, larger, smaller
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):  # type: ignore[no-untyped-def]
     """Write the span of texels that each row of each shape touches.
 
@@ -35,10 +36,10 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):  
         n_rows = first_row[s + 1] - row0
         su, sv = scale[s, 0], scale[s, 1]
         for t in range(first_triangle[s], first_triangle[s + 1]):
-            y_low = min(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1]) * sv
-            y_high = max(corner[t, 0, 1], corner[t, 1, 1], corner[t, 2, 1]) * sv
-            r_low = max(0, int(np.ceil(y_low - 0.5)))
-            r_high = min(n_rows - 1, int(np.floor(y_high + 0.5)))
+            y_low = smaller(smaller(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1]) * sv
+            y_high = larger(larger(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1]) * sv
+            r_low = larger(0, math.ceil(y_low - 0.5))
+            r_high = smaller(n_rows - 1, math.floor(y_high + 0.5))
             for r in range(r_low, r_high + 1):
                 bottom, top = r - 0.5, r + 0.5
                 x_low, x_high = 1e30, -1e30
@@ -47,20 +48,20 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):  
                     m = k + 1 if k < 2 else 0
                     bx, by = corner[t, m, 0] * su, corner[t, m, 1] * sv
                     if bottom <= ay <= top:
-                        x_low, x_high = min(x_low, ax), max(x_high, ax)
+                        x_low, x_high = smaller(x_low, ax), larger(x_high, ax)
                     # Where the edge crosses the two borders of the row.
                     for border in (bottom, top):
                         if (ay < border) != (by < border):
                             x = ax + (bx - ax) * (border - ay) / (by - ay)
-                            x_low, x_high = min(x_low, x), max(x_high, x)
+                            x_low, x_high = smaller(x_low, x), larger(x_high, x)
                 if x_high < x_low:
                     continue
-                c_low, c_high = int(np.ceil(x_low - 0.5)), int(np.floor(x_high + 0.5))
-                low[row0 + r] = min(low[row0 + r], max(c_low, 0))
-                high[row0 + r] = max(high[row0 + r], c_high)
+                c_low, c_high = math.ceil(x_low - 0.5), math.floor(x_high + 0.5)
+                low[row0 + r] = smaller(low[row0 + r], larger(c_low, 0))
+                high[row0 + r] = larger(high[row0 + r], c_high)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _fill(next_used, next_free, y, start, end):  # type: ignore[no-untyped-def]
     """Mark texels `start` to `end` of row `y` as used."""
     width = next_used.shape[1] - 1
@@ -78,14 +79,14 @@ def _fill(next_used, next_free, y, start, end):  # type: ignore[no-untyped-def]
         x -= 1
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):  # type: ignore[no-untyped-def]
     """Return (x, y) of the lowest, then leftmost free place, or (-1, -1)."""
     height = next_used.shape[0]
     width = next_used.shape[1] - 1
     most = 0
     for r in range(n_rows):
-        most = max(most, high[row0 + r])
+        most = larger(most, high[row0 + r])
     for y in range(y_start, height - margin - n_rows + 1):
         x = margin
         r, checked = 0, 0
@@ -105,7 +106,7 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):  # ty
     return -1, -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def place(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):  # type: ignore[no-untyped-def]
     """Place items one after the other; stop at the first that has no place.
 
@@ -146,9 +147,9 @@ def place(next_used, next_free, order, item_shape, first_row, low, high, gap, ma
             if not 0 <= y + r < height:
                 continue
             a, b = 1 << 30, -1
-            for k in range(max(0, r - gap), min(n_rows, r + gap + 1)):
+            for k in range(larger(0, r - gap), smaller(n_rows, r + gap + 1)):
                 if high[row0 + k] >= low[row0 + k]:
-                    a, b = min(a, low[row0 + k]), max(b, high[row0 + k])
+                    a, b = smaller(a, low[row0 + k]), larger(b, high[row0 + k])
             if b >= a:
-                _fill(next_used, next_free, y + r, max(0, x + a - gap), min(width - 1, x + b + gap))
+                _fill(next_used, next_free, y + r, larger(0, x + a - gap), smaller(width - 1, x + b + gap))
     return len(order)

@@ -8,11 +8,11 @@ Based on: KHR_lights_punctual, "Directional".
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight
 from baker.lights.family import LIGHT_FAMILIES
+from baker.trace.jit import kernel, larger
 
 
 @LIGHT_FAMILIES.register("directional")
@@ -27,7 +27,7 @@ def directional_light(
     _parallel(np.array(light.direction, np.float64), normal, ray, weight)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
     for i in range(ray.shape[0]):
         for k in range(ray.shape[1]):
@@ -39,4 +39,4 @@ def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
                 + direction[1] * normal[i, k, 1]
                 + direction[2] * normal[i, k, 2]
             )
-            weight[i, k] = max(cosine, 0.0)
+            weight[i, k] = larger(cosine, 0.0)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
@@ -28,12 +27,14 @@ from baker.kernels.emitters import (
     Emitters,
     emitted_radiance,
 )  # fmt: skip
+from baker.trace.jit import kernel, scratch
 
 # At most so many clusters are weighed for every tile of texels.
 MAX_CLUSTERS = 256
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Points a side of the grid that averages a textured emission over a triangle.
 _GRID = 16
+_rgba = scratch((4,), np.float64)
 
 
 def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
@@ -120,10 +121,10 @@ def _bounds(
     return centre, radius, axis, spread
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _mean_luminance(shading, chosen, weights, out):  # type: ignore[no-untyped-def]
     """Average the luminance that textured triangles emit over a grid of points."""
-    radiance = np.zeros(4)
+    radiance = _rgba()
     for i in range(len(chosen)):
         t = chosen[i]
         total = 0.0

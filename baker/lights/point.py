@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight
 from baker.lights.family import LIGHT_FAMILIES
+from baker.trace.jit import kernel, larger
 
 # Shadow rays end this share of their length before the light's position.
 _SHORT = np.float32(0.99999)
@@ -32,7 +32,7 @@ def point_light(
     inverse_square(np.array(light.position, np.float64), origin, normal, ray, weight)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def inverse_square(position, origin, normal, ray, weight):  # type: ignore[no-untyped-def]
     """Fill rays to a position and weights cos / r^2."""
     for i in range(origin.shape[0]):
@@ -40,7 +40,7 @@ def inverse_square(position, origin, normal, ray, weight):  # type: ignore[no-un
             dx = position[0] - origin[i, k, 0]
             dy = position[1] - origin[i, k, 1]
             dz = position[2] - origin[i, k, 2]
-            square = max(dx * dx + dy * dy + dz * dz, 1.0e-20)
+            square = larger(dx * dx + dy * dy + dz * dz, 1.0e-20)
             cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / math.sqrt(square)
             ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3] = dx, dy, dz, _SHORT
-            weight[i, k] = max(cosine, 0.0) / square
+            weight[i, k] = larger(cosine, 0.0) / square

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight
 from baker.lights.family import LIGHT_FAMILIES
 from baker.lights.point import inverse_square
+from baker.trace.jit import kernel, larger, smaller
 
 
 @LIGHT_FAMILIES.register("spot")
@@ -33,13 +33,13 @@ def spot_light(
     _cone(np.array(light.direction, np.float64), outer, scale, ray, weight)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
     """Multiply weights by the cone's fall-off."""
     for i in range(ray.shape[0]):
         for k in range(ray.shape[1]):
             dx, dy, dz = ray[i, k, 0], ray[i, k, 1], ray[i, k, 2]
-            length = math.sqrt(max(dx * dx + dy * dy + dz * dz, 1.0e-20))
+            length = math.sqrt(larger(dx * dx + dy * dy + dz * dz, 1.0e-20))
             cosine = -(dx * direction[0] + dy * direction[1] + dz * direction[2]) / length
-            share = min(max((cosine - outer) * scale, 0.0), 1.0)
+            share = smaller(larger((cosine - outer) * scale, 0.0), 1.0)
             weight[i, k] *= share * share

@@ -17,7 +17,6 @@ from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.form_factor import (
     cast_form_factors,
-    count_targets,
     scale_symmetric,
     transpose,
     weigh_reciprocal,
@@ -175,18 +174,30 @@ def cast_rows(
         cast_form_factors(
             origin, normal, table, hit_patch, new_caster(tracer), begin, net, shared, target, tally
         )
-        target.sort(axis=1)
-        column, count = np.zeros_like(target), np.zeros_like(target)
-        length = np.zeros(end - begin, np.int32)
-        count_targets(target, column, count, length)
-        used = np.arange(n_rays) < length[:, None]
-        return column[used], count[used], length, tally[begin:end]
+        column, count, length = count_targets(target)
+        return column, count, length, tally[begin:end]
 
     def keep(begin: int, end: int, part: Part) -> None:
         rows[begin] = part
 
     run(n, _TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_rays)
     return rows
+
+
+def count_targets(
+    target: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Return which patches (k,) the rays of each row (m, R) hit, rising, how often, and how many (m,)."""
+    target.sort(axis=1)
+    new = np.ones(target.shape, bool)
+    new[:, 1:] = target[:, 1:] != target[:, :-1]
+    # Rays that hit no patch stand first in their row.
+    start = np.flatnonzero(new)
+    count = np.diff(start, append=target.size)
+    column = target.reshape(-1)[start]
+    hit = column >= 0
+    length = (new & (target >= 0)).sum(axis=1, dtype=np.int32)
+    return column[hit], count[hit].astype(np.int32), length
 
 
 def _balanced(
@@ -200,7 +211,10 @@ def _balanced(
 ) -> FormFactorMatrix:
     """Merge both estimates of each pair, then restore the row sums that the rays measured."""
     n = len(area)
-    other_first, other_column, other_value = transpose(first, column, value)
+    other_first = np.zeros(n + 1, np.int64)
+    np.cumsum(np.bincount(column, minlength=n), out=other_first[1:])
+    other_column, other_value = np.zeros_like(column), np.zeros_like(value)
+    transpose(first, column, value, other_first[:-1].copy(), other_column, other_value)
     merged_first = np.zeros(n + 1, np.int64)
     merged_column = np.zeros(2 * len(column), np.int32)
     merged = np.zeros(2 * len(column), np.float32)

@@ -63,6 +63,7 @@ def build_texels(
     normal = np.zeros((n_front, 3), np.float32)
     albedo = np.zeros((n_front, 3), np.float32)
     scale = _metres2_per_texel(geometry, size)
+    free = np.full(len(pixel), 0xFFFF, np.uint16)
     varied = len(shading.colour) > 1 or (shading.base_texture >= 0).any() or len(shading.alpha.row) > 0
     if not varied:
         albedo = _plain_albedo(shading, first, entry, entry_area)
@@ -70,7 +71,7 @@ def build_texels(
     def work(begin: int, end: int) -> None:
         texel_geometry(surface, scale, begin, end, area, centroid, position, normal)
         if varied:
-            texel_albedo(surface, shading, begin, end, albedo, area)
+            texel_albedo(surface, shading, free, begin, end, albedo, area)
 
     run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
     back_entry = np.full(n_front, -1, np.int32)
@@ -105,9 +106,7 @@ def _overlaps(
     count = np.zeros(n_pages * size * size, np.int32)
     count_overlaps(geometry.uv, geometry.triangle, geometry.page, size, count)
     pixel = np.flatnonzero(count)
-    key = np.zeros(len(pixel), np.uint64)
-    morton_keys(pixel, size, key)
-    pixel = pixel[np.argsort(key, kind="stable")]
+    pixel = pixel[np.argsort(morton_keys(pixel, size), kind="stable")]
     first = np.zeros(len(pixel) + 1, np.int64)
     np.cumsum(count[pixel], out=first[1:])
     start = np.zeros(len(count), np.int64)

@@ -104,8 +104,9 @@ def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-un
 
 def _salt(seed: int, number: int) -> np.uint64:
     """Return what makes the numbers of a seed and pass differ from all others."""
-    word = int(hash_u32(np.uint32((seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF)))
-    return np.uint64(word << 17)
+    word = (seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF
+    # An array: arithmetic on single numbers warns of overflow.
+    return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from baker.kernels.rays import aim_lanes, load_frames, new_lanes
+from baker.kernels.rays import aim_lanes, load_frames, new_frame, new_seeds
 from baker.reference.randomness import path_state
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, TFAR, trace_lanes
 
@@ -24,7 +24,7 @@ def open_rays(  # type: ignore[no-untyped-def]
     """
     scene, occluded, width = caster.scene, caster.occluded, caster.width
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    seeds, frame = new_lanes()
+    seeds, frame = new_seeds(), new_frame()
     place, facing = np.zeros((LANES, 1, 3), np.float32), np.zeros((LANES, 1, 3), np.float32)
     samples, places = len(net), position.shape[1]
     for group in range(0, len(position), LANES):

@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from baker.trace.embree import Tracer
+from baker.trace.jit import inner
 
 # Rows of a packet, in units of its width.
 ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = range(12)
@@ -33,19 +34,45 @@ LANES = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
 
 
-@intrinsic
-def call_embree(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
-    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)` at an address."""
-    signature = types.void(types.int64, types.int64, types.int64, types.int64, types.int64)
+def _call_embree(typing_context, address, valid, scene, ray):  # type: ignore[no-untyped-def]
+    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)` at an address; valid, ray: arrays."""
+    signature = types.void(types.int64, valid, types.int64, ray)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         byte_pointer = ir.IntType(8).as_pointer()
         function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
         function = builder.inttoptr(args[0], function_type.as_pointer())
-        builder.call(function, [builder.inttoptr(a, byte_pointer) for a in args[1:]])
+        valid_data, ray_data = (
+            builder.bitcast(context.make_array(sig.args[k])(context, builder, args[k]).data, byte_pointer)
+            for k in (1, 3)
+        )
+        scene_pointer = builder.inttoptr(args[2], byte_pointer)
+        builder.call(function, [valid_data, scene_pointer, ray_data, byte_pointer(None)])
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+call_embree: Any = intrinsic(_call_embree)
+
+
+def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-untyped-def]
+    """Copy source[start : start + 4] to target[to : to + 4]; four bytes an item, no bounds are checked."""
+    signature = types.void(target, types.intp, source, types.intp)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        four = ir.VectorType(ir.IntType(32), 4).as_pointer()
+        target_data, source_data = (
+            context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 2)
+        )
+        loaded = builder.load(builder.bitcast(builder.gep(source_data, [args[3]]), four), align=4)
+        builder.store(loaded, builder.bitcast(builder.gep(target_data, [args[1]]), four), align=4)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+copy_four: Any = intrinsic(_copy_four)
 
 
 class Caster(NamedTuple):
@@ -89,7 +116,7 @@ def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     return valid, floats
 
 
-@njit(cache=True, nogil=True)
+@inner
 def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ignore[no-untyped-def]
     """Write one ray into a lane of the packet."""
     floats[ORG_X * width + lane] = x
@@ -102,13 +129,13 @@ def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ign
     words[GEOM_ID * width + lane] = np.uint32(0xFFFFFFFF)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
     """Trace the lanes whose `valid` is -1; results are written into the packet."""
-    call_embree(function, valid.ctypes.data, scene, floats.ctypes.data, 0)  # type: ignore[call-arg]
+    call_embree(function, valid, scene, floats)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
@@ -117,23 +144,24 @@ def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats):
     if width == LANES:
         trace(function, scene, lane_valid, lane_floats)
         return
+    # Four at a time by hand: what the compiler makes of loops over lanes here is twenty times as long.
     for first in range(0, LANES, width):
-        some = np.int32(0)
-        for lane in range(width):
-            valid[lane] = lane_valid[first + lane]
-            some |= valid[lane]
-        if some == 0:
+        lane = first
+        while lane < first + width and lane_valid[lane] == 0:
+            lane += 1
+        if lane == first + width:
             continue
-        for row in range(DIR_Z + 1):
-            for lane in range(width):
-                floats[row * width + lane] = lane_floats[row * LANES + first + lane]
-        for lane in range(width):
-            floats[TFAR * width + lane] = lane_floats[TFAR * LANES + first + lane]
-            floats[ID * width + lane] = lane_floats[ID * LANES + first + lane]
-            floats[GEOM_ID * width + lane] = lane_floats[GEOM_ID * LANES + first + lane]
+        for to in range(0, width, 4):
+            at = first + to
+            copy_four(valid, to, lane_valid, at)
+            for row in range(DIR_Z + 1):
+                copy_four(floats, row * width + to, lane_floats, row * LANES + at)
+            copy_four(floats, TFAR * width + to, lane_floats, TFAR * LANES + at)
+            copy_four(floats, ID * width + to, lane_floats, ID * LANES + at)
+            copy_four(floats, GEOM_ID * width + to, lane_floats, GEOM_ID * LANES + at)
         trace(function, scene, valid, floats)
-        for lane in range(width):
-            lane_floats[TFAR * LANES + first + lane] = floats[TFAR * width + lane]
-        for row in range(HIT_U, GEOM_ID + 1):
-            for lane in range(width):
-                lane_floats[row * LANES + first + lane] = floats[row * width + lane]
+        for to in range(0, width, 4):
+            at = first + to
+            copy_four(lane_floats, TFAR * LANES + at, floats, TFAR * width + to)
+            for row in range(HIT_U, GEOM_ID + 1):
+                copy_four(lane_floats, row * LANES + at, floats, row * width + to)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from inner import compiled
 
 from baker.trace.embree import Tracer
 from baker.trace.packets import GEOM_ID, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
+
+set_ray, trace = compiled(set_ray, trace)
 
 
 def closest_hits(tracer: Tracer, origin: Any, direction: Any) -> tuple[np.ndarray, np.ndarray]:

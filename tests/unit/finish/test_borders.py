@@ -6,8 +6,8 @@ import pytest
 
 from baker.finish.border import recentre
 from baker.finish.dilate import dilate
+from baker.finish.slope import fit_planes
 from baker.kernels.page_fill import nearest_texel
-from baker.kernels.page_slope import fit_plane
 
 
 @pytest.mark.parametrize("density", [0.0, 0.002, 0.05, 0.5, 1.0])
@@ -30,11 +30,12 @@ def test_nearest_texel_is_exactly_nearest(density):
 def test_planes_agree_with_a_dense_solve():
     value, chart, offset = pages.make_page(pages.contact)
     covered = chart >= 0
-    plane = np.zeros((5, 1))
-    for r, c in np.argwhere(covered)[::37]:
-        fit_plane(value, chart, covered, offset, r, c, plane)
+    some = np.flatnonzero(covered)[::37]
+    plane = fit_planes(value, chart, covered, some, offset)
+    fitted = np.concatenate([plane.centre, plane.across, plane.down], axis=1)
+    for ours, (r, c) in zip(fitted, np.argwhere(covered)[::37], strict=True):
         slow = pages.slow_plane(value[..., 0].astype(float), chart, covered, offset.astype(float), r, c)
-        np.testing.assert_allclose(plane[:3, 0], slow, rtol=1e-6, atol=1e-7)
+        np.testing.assert_allclose(ours, slow, rtol=1e-6, atol=1e-7)
 
 
 def test_each_empty_texel_within_reach_belongs_to_the_nearest_chart():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from inner import compiled
 from packet_driver import cast
 from tiny_scenes import Quad, grey, quad_scene
 
@@ -18,6 +19,10 @@ from baker.kernels.textures import pack_textures, sample_alpha, sample_texture
 from baker.shading.alpha import see_through
 from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
+
+_one_of_sixteen, presence_at, sample_alpha, sample_texture = compiled(
+    _one_of_sixteen, presence_at, sample_alpha, sample_texture
+)
 
 
 def shaded(quads):

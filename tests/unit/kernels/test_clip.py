@@ -5,8 +5,13 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 
 from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, polygon_point, square_touches
+
+clip_to_square, polygon_area, polygon_point, square_touches = compiled(
+    clip_to_square, polygon_area, polygon_point, square_touches
+)
 
 
 def cut(corner, x0=0, y0=0):

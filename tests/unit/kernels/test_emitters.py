@@ -5,6 +5,7 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.geometry import Geometry, face_normals
@@ -21,6 +22,11 @@ from baker.kernels.emitters import (
 from baker.kernels.textures import pack_textures
 from baker.lights.emissive import MAX_CLUSTERS, build_emitters
 from baker.shading.materials import Shading
+
+bounding_sphere, emitted_radiance, emitter_density = compiled(
+    bounding_sphere, emitted_radiance, emitter_density
+)
+emitter_hit, mis_weighted, sample_emitter = compiled(emitter_hit, mis_weighted, sample_emitter)
 
 
 def lamps(n, seed, two_sided=0.2):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from baker.kernels.form_factor import count_targets, multiply, scale_symmetric, weigh_reciprocal
+from baker.kernels.form_factor import multiply, scale_symmetric, weigh_reciprocal
+from baker.radiosity.form_factors import count_targets
 
 
 def random_rows(n, rng, density=0.2):
@@ -30,14 +31,13 @@ def test_targets_are_counted(n_rays):
     rng = np.random.default_rng(n_rays)
     target = rng.integers(-1, 12, (40, n_rays)).astype(np.int32)
     target[0], target[1], target[2] = -1, 5, np.arange(n_rays)
-    ordered = np.sort(target, axis=1)
-    columns, counts = np.zeros_like(target), np.zeros_like(target)
-    lengths = np.zeros(40, np.int32)
-    count_targets(ordered, columns, counts, lengths)
-    for i in range(40):
+    columns, counts, lengths = count_targets(target.copy())
+    assert len(columns) == len(counts) == lengths.sum()
+    for i, end in enumerate(np.cumsum(lengths)):
+        row = slice(end - lengths[i], end)
         truth = Counter(target[i][target[i] >= 0].tolist())
-        assert columns[i, : lengths[i]].tolist() == sorted(truth)
-        assert counts[i, : lengths[i]].tolist() == [truth[c] for c in sorted(truth)]
+        assert columns[row].tolist() == sorted(truth)
+        assert counts[row].tolist() == [truth[c] for c in sorted(truth)]
 
 
 @pytest.mark.parametrize("n", [0, 1, 4, 60])

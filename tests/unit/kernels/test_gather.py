@@ -5,6 +5,7 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
 from baker.core.progress import silent
@@ -19,6 +20,8 @@ from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import ambient_occlusion, final_gather
 from baker.radiosity.points import points_of
 from baker.trace.packets import new_caster
+
+emitter_density, lane_seeds, texel_scramble = compiled(emitter_density, lane_seeds, texel_scramble)
 
 SKY = np.float32([0.5, 1.0, 2.0])
 REACH = 0.7

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import naive
 import numpy as np
+from inner import compiled
 from tiny_scenes import Quad, grey, quad_world
 
 from baker.kernels.hits import BACK_FACE, front_facing, hit_pixel
+
+front_facing, hit_pixel = compiled(front_facing, hit_pixel)
 
 
 def test_hits_find_the_texel_that_lies_there():

@@ -5,10 +5,11 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 
 from baker.kernels.rays import lane_seeds
 from baker.kernels.sampling import (
-    cosine_directions,
+    cosine_direction,
     hash_combine,
     hash_u32,
     reverse_bits,
@@ -19,6 +20,17 @@ from baker.kernels.sampling import (
     texel_scramble,
     triangle_barycentric,
 )
+
+cosine_direction, tangent_frame = compiled(cosine_direction, tangent_frame)
+hash_combine, hash_u32, lane_seeds = compiled(hash_combine, hash_u32, lane_seeds)
+reverse_bits, scramble_reversed = compiled(reverse_bits, scramble_reversed)
+texel_scramble, triangle_barycentric = compiled(texel_scramble, triangle_barycentric)
+
+
+def cosine_directions(points):
+    """Return `cosine_direction` of (n, 2) points of the unit square as (n, 3) float32."""
+    return np.array([cosine_direction(u, v) for u, v in points], np.float32).reshape(-1, 3)
+
 
 NO_BITS = np.uint32(0)
 EDGES = np.float32([0.0, 2**-24, 0.25, 0.5, 0.5 + 2**-24, 0.75, 1 - 2**-24])

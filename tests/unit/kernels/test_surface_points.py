@@ -7,12 +7,15 @@ from itertools import pairwise
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.progress import silent
 from baker.kernels.sampling import sobol_reversed
 from baker.kernels.surface import BORDER, INWARD, N_POINTS, OFFSET, free_point, place, place_points
 from baker.radiosity.texels import build_texels
+
+free_point, place = compiled(free_point, place)
 
 EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 

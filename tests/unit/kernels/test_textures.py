@@ -5,6 +5,7 @@ from __future__ import annotations
 import naive
 import numpy as np
 import pytest
+from inner import compiled
 from tiny_scenes import Quad, quad_world
 
 from baker.core.colour import linear_from_srgb
@@ -12,6 +13,8 @@ from baker.core.scene import Material, Texture
 from baker.kernels.surface import N_POINTS, place_points
 from baker.kernels.texel_info import texel_footprint, uv_at
 from baker.kernels.textures import pack_textures, sample_texture
+
+sample_texture, texel_footprint, uv_at = compiled(sample_texture, texel_footprint, uv_at)
 
 MODES = ("repeat", "mirror", "clamp")
 
