@@ -132,7 +132,7 @@ def bake(
         with record.stage("load"):
             if not isinstance(scene, Scene):
                 scene = load_scene(scene, up=settings.up, scale=settings.scale)
-        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings)])
+        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend(atlas.warnings)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from baker.core.progress import Progress, report, silent
+from baker.core.scene import SceneWarning
 
 STAGE = "compile"
 _LOOK = 0.1
@@ -25,12 +26,26 @@ def start() -> subprocess.Popen[bytes] | None:
     """Start compiling in the background, if the kernels are not on disk yet."""
     from baker.kernels.page_guard import hold_to_samples
 
-    folder = Path(hold_to_samples._cache.cache_path)
-    if any(folder.glob("page_guard.hold_to_samples-*.nbi")):
+    folder = hold_to_samples._cache.cache_path
+    # Where nothing can be kept, another process cannot help.
+    if folder is None or any(Path(folder).glob("page_guard.hold_to_samples-*.nbi")):
         return None
     command = [sys.executable, "-m", "baker.warm"]
     silence = subprocess.DEVNULL
     return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
+
+
+def cache_warnings() -> list[SceneWarning]:
+    """Return a warning if compiled kernels cannot be kept for the next run."""
+    from baker.kernels.page_guard import hold_to_samples
+
+    if hold_to_samples._cache.cache_path is not None:
+        return []
+    message = (
+        "no folder can be written to keep compiled kernels in, so each run compiles them anew, for up to a"
+        " minute; make one writable: ~/.cache, or any, named by NUMBA_CACHE_DIR"
+    )
+    return [SceneWarning("kernels-not-kept", message)]
 
 
 def finish(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:

@@ -21,6 +21,7 @@ from baker.rendering.baked import BakedLight, other_scene
 from baker.rendering.cameras import named_camera
 from baker.rendering.passes import Run, first_layers, lit_by, openness, traced
 from baker.rendering.settings import RenderSettings
+from baker.warm import cache_warnings
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def render(
         scene, sky = baked.bake.scene, baked.bake.sky if settings.sky is None else sky
     elif not isinstance(scene, Scene):
         scene = load_scene(scene, reflections=True)
-    warnings += scene.warnings
+    warnings += [*scene.warnings, *cache_warnings()]
     if text is not None and camera is None:
         camera = named_camera(scene.cameras, text)
     with build_reference(scene, sky=sky, threads=settings.threads) as reference:

@@ -38,6 +38,7 @@ from baker.verification.tracing import (
     trace_irradiance,
     trace_openness,
 )
+from baker.warm import cache_warnings
 
 CHANNELS = ("irradiance", "ao")
 PLACES = 64
@@ -224,7 +225,7 @@ def verify(
         crops=crops,
         rays=sum(estimate.rays for estimate in estimates.values()),
         seconds=time.monotonic() - start,
-        warnings=list(bake.warnings),
+        warnings=[*bake.warnings, *cache_warnings()],
     )
 
 
