@@ -55,7 +55,11 @@ def command() -> Any:
         flag(
             "rates",
             Path | None,
-            typer.Option("--rates", metavar="OUT", help="Reckon time with the speed of this earlier bake."),
+            typer.Option(
+                "--rates",
+                metavar="OUT",
+                help="Reckon time with the speed of this earlier bake (else of one beside SCENE).",
+            ),
         ),
         flag(
             "cost",

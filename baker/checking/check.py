@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from baker.checking.ignore import Ignore, parse_ignore
+from baker.checking.rates import rates_beside, rates_of
 from baker.checking.settings import CheckSettings, with_extras
-from baker.core.errors import IndexRangeError, SettingsError
+from baker.core.errors import IndexRangeError
 from baker.core.progress import Progress, silent
 from baker.core.progress import report as tell_progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.io.load import load_scene
-from baker.io.output_folder import MANIFEST_NAME
-from baker.lint.cost import Rates, rates_of_bake
 from baker.lint.finding import SEVERITIES, Finding, Found, Place
 from baker.lint.registry import CHECKS, all_checks, run_check
 from baker.lint.subject import Subject
@@ -84,7 +82,7 @@ def check_scene(
     else:
         timings["load"] = time.perf_counter() - start
         settings = with_extras(settings, scene)
-        found = _run(scene, settings, bake_settings, progress, timings)
+        found = _run(path, scene, settings, bake_settings, progress, timings)
     found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
     ignore = parse_ignore(settings.ignore)
     counted = tuple(finding for finding in found if not _ignored(ignore, finding))
@@ -94,13 +92,14 @@ def check_scene(
 
 
 def _run(
+    path: Path,
     scene: Scene,
     settings: CheckSettings,
     bake_settings: BakeSettings,
     progress: Progress,
     timings: dict[str, float],
 ) -> list[Finding]:
-    rates = None if settings.rates is None else _rates(Path(settings.rates))
+    rates = rates_beside(path) if settings.rates is None else rates_of(Path(settings.rates))
     subject = Subject(scene, bake_settings, mip=settings.mip, rates=rates, probe=settings.cost)
     found: list[Finding] = []
     entries = all_checks()
@@ -110,15 +109,6 @@ def _run(
         found += run_check(entry, subject)
         timings[entry.code] = time.perf_counter() - begin
     return found
-
-
-def _rates(folder: Path) -> Rates:
-    """Return the speed of the bake in a folder."""
-    try:
-        return rates_of_bake(json.loads((folder / MANIFEST_NAME).read_text("utf-8")))
-    except (OSError, ValueError, KeyError, TypeError):
-        why = f"the folder holds no bake whose {MANIFEST_NAME} tells its rays and timings; name another one"
-        raise SettingsError(why, file=str(folder), object="rates") from None
 
 
 def _index_range(error: IndexRangeError) -> Finding:

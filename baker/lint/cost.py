@@ -163,10 +163,10 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
 def cost_of_bake(subject: Subject) -> Iterator[Found]:
     """What a bake with these settings will take: texels, pages, rays, memory, and time if it is known.
 
-    Time comes from an earlier bake (`--rates OUT` reads its manifest) or, with `--cost`, from rays cast
-    for one second; without either it is left out. It does not hold the unwrap, whose time hangs on the
-    shapes. `objects` lists the 20 largest with their share of surface, which is their share of texels and
-    nearly of the time.
+    Time comes from an earlier bake: the one that `--rates OUT` names, else the latest of this scene in a
+    folder beside it; or, with `--cost` and no bake, from rays cast for one second. Else it is left out. It
+    does not hold the unwrap, whose time hangs on the shapes. `objects` lists the 20 largest with their
+    share of surface, which is their share of texels and nearly of the time.
     """
     if not subject.world.area.sum() > 0:
         return

@@ -196,3 +196,43 @@ def test_cost_by_the_speed_of_a_bake(tmp_path):
     assert cost["rays"] == {"buried texels": 4 * texels, "ambient occlusion": 10 * texels}
     # 2 s a million rays, 1 s ten thousand texels.
     assert cost["seconds"] == pytest.approx(14 * texels * 2e-6 + texels * 1e-4, abs=0.01)
+
+
+def bake_beside(scene, name, seconds, *, of=None, created="2026-01-01T00:00:00Z", **more):
+    folder = scene.parent / name
+    folder.mkdir()
+    manifest = {
+        "input": {"path": f"../{of or scene.name}"},
+        "created": created,
+        "timings": {"ambient occlusion": seconds},
+        "rays": {"ambient occlusion": 1_000_000},
+        "instances": [{"texels": 10_000}],
+    }
+    (folder / "bake.json").write_text(json.dumps(manifest | more))
+
+
+def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):
+    path = write(tmp_path / "scene.glb", quad_builder())
+    arguments = ["--resolution", 64, "--channels", "ao", "--ao-samples", 10]
+
+    def cost(*more):
+        _, result = check(path, *arguments, *more)
+        return next(f for f in result["findings"] if f["code"] == "cost")
+
+    # Other scenes' bakes, broken ones and folders that are none.
+    bake_beside(path, "other", 9.0, of="other.glb")
+    bake_beside(path, "hollow", 9.0, timings=None)
+    bake_beside(path, "odd", 9.0, input=[])
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "bake.json").write_text("{")
+    assert "seconds" not in cost()
+    bake_beside(path, "first", 9.0, created="2025-01-01T00:00:00Z")
+    bake_beside(path, "later", 2000.0)
+    bake_beside(path, "before", 9.0, created="2025-01-01T00:00:00Z")
+    found = cost()
+    assert found["basis"] == "the bake in 'later'"
+    assert found["seconds"] == pytest.approx(14 * round(0.8 * 64 * 64) * 2e-3, rel=0.01)
+    # With it nothing is measured, and a bake that is named counts before one that is found.
+    assert cost("--cost")["basis"] == "the bake in 'later'"
+    assert cost("--rates", tmp_path / "first")["seconds"] < found["seconds"] / 100
