@@ -142,14 +142,21 @@ def weigh_reciprocal(  # type: ignore[no-untyped-def]
 
 @kernel
 def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: ignore[no-untyped-def]
-    """Find factors d (P,) so that d_i F_ij d_j has row sums `goal`, keeping A_i F_ij symmetric.
+    """Turn F_ij into d_i F_ij d_j, with factors d (P,) that make row sums `goal`; A_i F_ij stays symmetric.
 
     `slack` (P,) is how uncertain a goal is: d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without it a
     large patch whose few rays all missed a small one would take from the small one what that saw well.
     In log d this is the minimum of a convex function, sum A_i F_ij d_i d_j / 2 - ..., and each step the exact
     minimum along one coordinate: it needs no damping (15 passes where damped ones took over 30).
+    `value` is changed in place. Returns the largest distance of a row sum from its goal before that.
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008.
     """
+    error = 0.0
+    for i in range(len(first) - 1):
+        total = 0.0
+        for k in range(first[i], first[i + 1]):
+            total += value[k]
+        error = max(error, abs(total - goal[i]))
     for _ in range(steps):
         most = 0.0
         for i in range(len(first) - 1):
@@ -162,3 +169,7 @@ def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: 
                 factor[i] = new
         if most < 1.0e-6:
             break
+    for i in range(len(first) - 1):
+        for k in range(first[i], first[i + 1]):
+            value[k] *= factor[i] * factor[column[k]]
+    return error

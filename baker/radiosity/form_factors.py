@@ -225,14 +225,9 @@ def _balanced(
     merged_column, merged = merged_column[: merged_first[-1]], merged[: merged_first[-1]]
     reciprocity = unlike / max(exchanged, 1e-300)
     goal = 1.0 - sky.astype(np.float64) - lost
-    factor = np.ones(n)
-    running = np.concatenate([[0.0], np.cumsum(merged, dtype=np.float64)])
-    row_error = float(np.abs(running[merged_first[1:]] - running[merged_first[:-1]] - goal).max(initial=0.0))
     # The goal's own noise: nothing in a closed room, a few rays where most leave the scene.
     slack = _SLACK * (1.0 - goal) * n / max(rays, 1)
-    scale_symmetric(merged_first, merged_column, merged, goal, slack, factor, _BALANCE_STEPS)
-    row = np.repeat(np.arange(n), np.diff(merged_first))
-    balanced = (merged * factor[row] * factor[merged_column]).astype(np.float32)
+    row_error = scale_symmetric(merged_first, merged_column, merged, goal, slack, np.ones(n), _BALANCE_STEPS)
     return FormFactorMatrix(
-        merged_first, merged_column, balanced, sky, lost, row_error, reciprocity, rays
+        merged_first, merged_column, merged, sky, lost, float(row_error), reciprocity, rays
     )  # fmt: skip

@@ -82,8 +82,12 @@ def test_rows_are_balanced_and_stay_reciprocal():
     goal = rng.uniform(0.6, 1.0, n)
     rows = csr_matrix(dense)
     factor = np.ones(n)
-    scale_symmetric(*parts(rows), goal, np.zeros(n), factor, 100)
+    first, column, value = parts(rows)
+    error = scale_symmetric(first, column, value, goal, np.zeros(n), factor, 100)
+    assert error == pytest.approx(np.abs(dense.sum(axis=1, dtype=float) - goal).max(), rel=1e-6)
     balanced = factor[:, None] * dense * factor
+    scaled = csr_matrix((value, column, first), shape=(n, n))
+    np.testing.assert_allclose(scaled.toarray(), balanced, rtol=1e-6)
     keep = np.arange(n) != 7
     np.testing.assert_allclose(balanced.sum(axis=1)[keep], goal[keep], rtol=1e-6)
     assert factor[7] == 1
