@@ -82,20 +82,28 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
                         found[c * LANES + lane] += scale * turned * (small if small >= _f(0.0) else light)
 
 
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _reach_for(work, j, x, y, z):  # type: ignore[no-untyped-def]
+    """Write the arms to corner j of a triangle and its heights above the surfaces."""
+    for lane in range(LANES):
+        ax, ay, az = x - work[lane], y - work[LANES + lane], z - work[2 * LANES + lane]
+        work[(_ARM + 3 * j) * LANES + lane] = ax
+        work[(_ARM + 3 * j + 1) * LANES + lane] = ay
+        work[(_ARM + 3 * j + 2) * LANES + lane] = az
+        height = ax * work[_NORMAL * LANES + lane] + ay * work[(_NORMAL + 1) * LANES + lane]
+        work[(_HEIGHT + j) * LANES + lane] = height + az * work[(_NORMAL + 2) * LANES + lane]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
     """Write the arms to the corners of what of triangle m lies above each surface.
 
     Returns how many corners that are at most, 3 or 4, and 0 if no lane sees any of it.
     """
-    for j in range(3):
-        for lane in range(LANES):
-            height = _f(0.0)
-            for a in range(3):
-                arm = row[m, 3 * j + a] - work[(_ORIGIN + a) * LANES + lane]
-                work[(_ARM + 3 * j + a) * LANES + lane] = arm
-                height += arm * work[(_NORMAL + a) * LANES + lane]
-            work[(_HEIGHT + j) * LANES + lane] = height
+    # Out of the row first, and offsets as constants: else the loops over lanes are no vector code.
+    _reach_for(work, 0, row[m, 0], row[m, 1], row[m, 2])
+    _reach_for(work, 1, row[m, 3], row[m, 4], row[m, 5])
+    _reach_for(work, 2, row[m, 6], row[m, 7], row[m, 8])
     longest = _f(0.0)
     for j in range(3):
         edge = _f(0.0)
@@ -103,17 +111,28 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
             step = row[m, 3 * ((j + 1) % 3) + a] - row[m, 3 * j + a]
             edge += step * step
         longest = max(longest, edge)
+    nx, ny, nz = row[m, NORMAL], row[m, NORMAL + 1], row[m, NORMAL + 2]
     two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
+    third = _f(1.0 / 3.0)
     for lane in range(LANES):
-        facing, square = _f(0.0), _f(1.0e-30)
-        for a in range(3):
-            centre = work[(_ARM + a) * LANES + lane] + work[(_ARM + 3 + a) * LANES + lane]
-            centre = (centre + work[(_ARM + 6 + a) * LANES + lane]) * _f(1.0 / 3.0)
-            facing -= centre * row[m, NORMAL + a]
-            square += centre * centre
-            work[(_ARM + 9 + a) * LANES + lane] = work[(_ARM + 6 + a) * LANES + lane]
+        x = work[_ARM * LANES + lane] + work[(_ARM + 3) * LANES + lane] + work[(_ARM + 6) * LANES + lane]
+        y = (
+            work[(_ARM + 1) * LANES + lane]
+            + work[(_ARM + 4) * LANES + lane]
+            + work[(_ARM + 7) * LANES + lane]
+        )
+        z = (
+            work[(_ARM + 2) * LANES + lane]
+            + work[(_ARM + 5) * LANES + lane]
+            + work[(_ARM + 8) * LANES + lane]
+        )
+        work[(_ARM + 9) * LANES + lane] = work[(_ARM + 6) * LANES + lane]
+        work[(_ARM + 10) * LANES + lane] = work[(_ARM + 7) * LANES + lane]
+        work[(_ARM + 11) * LANES + lane] = work[(_ARM + 8) * LANES + lane]
+        facing = -third * (x * nx + y * ny + z * nz)
+        square = max(third * third * (x * x + y * y + z * z), _f(1.0e-30))
         low = work[_HEIGHT * LANES + lane] + work[(_HEIGHT + 1) * LANES + lane]
-        height = max(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * _f(1.0 / 3.0)
+        height = max(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * third
         small = longest < _SMALL_VIEW * square
         work[_SMALL * LANES + lane] = area * height * abs(facing) / (square * square) if small else _f(-1.0)
         work[_TURNED * LANES + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
@@ -125,10 +144,9 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         if above == 0:
             work[_TURNED * LANES + lane] = _f(0.0)
         if work[_TURNED * LANES + lane] > _f(0.0):
-            corners = max(corners, 3)
+            corners = max(corners, 3 if above == 3 else 4)
             if above < 3:
                 _cut(work, lane)
-                corners = 4
     return corners
 
 
@@ -156,23 +174,33 @@ def _cut(work, lane):  # type: ignore[no-untyped-def]
             work[(_ARM + 3 * j + a) * LANES + lane] = corner[3 * min(j, n - 1) + a]
 
 
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _add_edge(work, first, second):  # type: ignore[no-untyped-def]
+    """Add the edge between two corners of every lane to its sum; one without length adds nothing."""
+    for lane in range(LANES):
+        ax, bx = work[(_ARM + 3 * first) * LANES + lane], work[(_ARM + 3 * second) * LANES + lane]
+        ay, by = work[(_ARM + 3 * first + 1) * LANES + lane], work[(_ARM + 3 * second + 1) * LANES + lane]
+        az, bz = work[(_ARM + 3 * first + 2) * LANES + lane], work[(_ARM + 3 * second + 2) * LANES + lane]
+        ex, ey, ez = bx - ax, by - ay, bz - az
+        cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
+        squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
+        inverse = _f(1.0) / math.sqrt(max(squares, _f(1.0e-30)))
+        cosine = min(max((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
+        sine = math.sqrt(cx * cx + cy * cy + cz * cz) * inverse
+        spread = cx * work[_NORMAL * LANES + lane] + cy * work[(_NORMAL + 1) * LANES + lane]
+        spread += cz * work[(_NORMAL + 2) * LANES + lane]
+        work[_SUM * LANES + lane] += spread * inverse * angle_over_sine(cosine, sine)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_edges(work, corners):  # type: ignore[no-untyped-def]
-    """Write the sum over the edges between the corners of every lane; one without length adds nothing."""
+    """Write the sum over the edges between the corners of every lane."""
     for lane in range(LANES):
         work[_SUM * LANES + lane] = _f(0.0)
-    for j in range(corners):
-        here, there = _ARM + 3 * j, _ARM + 3 * ((j + 1) % corners)
-        for lane in range(LANES):
-            ax, bx = work[here * LANES + lane], work[there * LANES + lane]
-            ay, by = work[(here + 1) * LANES + lane], work[(there + 1) * LANES + lane]
-            az, bz = work[(here + 2) * LANES + lane], work[(there + 2) * LANES + lane]
-            nx, ny, nz = work[_NORMAL * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
-            ex, ey, ez = bx - ax, by - ay, bz - az
-            cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
-            squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
-            inverse = _f(1.0) / math.sqrt(max(squares, _f(1.0e-30)))
-            cosine = min(max((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
-            sine = math.sqrt(cx * cx + cy * cy + cz * cz) * inverse
-            spread = (cx * nx + cy * ny + cz * nz) * inverse
-            work[_SUM * LANES + lane] += spread * angle_over_sine(cosine, sine)
+    _add_edge(work, 0, 1)
+    _add_edge(work, 1, 2)
+    if corners == 3:
+        _add_edge(work, 2, 0)
+    else:
+        _add_edge(work, 2, 3)
+        _add_edge(work, 3, 0)
