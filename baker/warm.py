@@ -131,5 +131,8 @@ def finish_pages() -> None:
 
 
 if __name__ == "__main__":
+    from baker.kernels.start import skip_blas
+
+    skip_blas()
     cast_rays()
     finish_pages()

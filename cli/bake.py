@@ -69,6 +69,9 @@ def work(
     with session.reporter(quiet=quiet) as progress:
         # Inside: importing the kernels takes a moment, and the bar is there meanwhile.
         progress("start", 0.0)
+        from baker.kernels.start import skip_blas
+
+        skip_blas()
         from baker.batch.lock import held
         from baker.pipeline import bake
 

@@ -113,7 +113,7 @@ def direct_light(
                 origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], done, out, second
             )
             spread = batch_variance(out[:, :3].sum(axis=1), second)
-        if near:
+        if near and not done.all():
             n_cast += N_HEMISPHERE * (end - begin)
             found = np.zeros((end - begin, N_COLUMNS), np.float32)
             gather(
