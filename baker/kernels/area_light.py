@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.alpha import presence_at
 from baker.kernels.emitters import (
@@ -26,9 +25,10 @@ from baker.kernels.emitters import (
 )  # fmt: skip
 from baker.kernels.hits import front_facing
 from baker.kernels.polygon_light import clear_light
-from baker.kernels.rays import lane_seeds, new_lanes
+from baker.kernels.rays import lane_seeds, new_seeds
 from baker.kernels.sampling import texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR, trace_lanes
 
 _f = np.float32
@@ -37,15 +37,19 @@ _INV_PI = np.float32(1.0 / math.pi)
 _SHORT = np.float32(0.9999)
 # The closed form is used for up to one emitter for so many samples.
 _SAMPLES_AN_EMITTER = 8
+# Memory of `light_samples`.
+_rgba, _numbers, _lamps = scratch((4,), np.float64), scratch((LANES,), np.int64), scratch((17 * LANES,), _f)
+_pairs, _vectors = scratch((2 * LANES,), _f), scratch((3 * LANES,), _f)
+_parts = scratch((N_POINTS, 6 * LANES), _f)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
     """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
     return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
     """Write origins of point k of texels group to group + lanes to `rays`, normals to `facing` (3 * 16,)."""
     for lane in range(lanes):
@@ -54,7 +58,7 @@ def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[
             facing[a * LANES + lane] = normal[group + lane, k, a]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):  # type: ignore[no-untyped-def]
     """Choose an emitter for every lane and copy what is needed of it.
 
@@ -97,7 +101,7 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
         lamp[13 * LANES + lane] = row[m, TWO_SIDED]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  # type: ignore[no-untyped-def]
     """Write the shadow ray of every lane and its two weights; lanes that see no light get weight 0.
 
@@ -113,14 +117,14 @@ def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  #
         dx -= rays[ORG_X * LANES + lane]
         dy -= rays[ORG_Y * LANES + lane]
         dz -= rays[ORG_Z * LANES + lane]
-        square = max(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
+        square = larger(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
         length = math.sqrt(square)
         cosine = (dx * facing[lane] + dy * facing[LANES + lane] + dz * facing[2 * LANES + lane]) / length
         light = dx * lamp[9 * LANES + lane] + dy * lamp[10 * LANES + lane] + dz * lamp[11 * LANES + lane]
         light = -light / length
         light = abs(light) if lamp[13 * LANES + lane] > _f(0.0) else light
         seen = cosine > _f(0.0) and light > _f(1.0e-6)
-        steradian = lamp[12 * LANES + lane] * square / max(light, _f(1.0e-6))
+        steradian = lamp[12 * LANES + lane] * square / larger(light, _f(1.0e-6))
         cosine = cosine if seen else _f(0.0)
         share = n_light * steradian
         weight[lane] = cosine / (share + first_n * cosine * _INV_PI)
@@ -133,7 +137,7 @@ def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  #
         rays[TFAR * LANES + lane] = _SHORT
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, exact, out, second):  # type: ignore[no-untyped-def]
     """Add the light-sampled share of irradiance of texels, and return the number of shadow rays cast.
 
@@ -143,6 +147,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     sampled either: they shine by their closed form, and hemisphere rays have nothing to add.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
+    shading : from `emitters.needed_shading`
     net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
     hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
     exact : (m,) uint8, set to 1 for texels whose light is complete in both estimates
@@ -155,29 +160,39 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     spare_on, spare = caster.valid, caster.floats
     row, triangle, starts = lamps.row, lamps.triangle, lamps.first
     chance, cumulative = lamps.chance, lamps.cumulative
-    any_alpha = len(shading.alpha.slot) > 0
+    any_alpha = False
+    if shading is not None:
+        any_alpha = len(shading.alpha.slot) > 0
     # One emitter in closed form at all points costs as much as some samples.
-    plain = not any_alpha and len(row) * _SAMPLES_AN_EMITTER <= n_samples and not row[:, TEXTURED].any()
-    found = np.zeros(3 * LANES, np.float32)
-    radiance = np.zeros(4)
+    plain = not any_alpha and len(row) * _SAMPLES_AN_EMITTER <= n_samples
+    for m in range(len(row)):
+        plain = plain and row[m, TEXTURED] == _f(0.0)
+    found = _vectors()
+    radiance = _rgba()
     # Sums of one point's samples are short: float32; those of all points are not.
-    part = np.zeros((N_POINTS, 6 * LANES), np.float32)
-    uv, weight = np.zeros(2 * LANES, np.float32), np.zeros(2 * LANES, np.float32)
-    chosen, lamp = np.zeros(LANES, np.int64), np.zeros(17 * LANES, np.float32)
-    facing = np.zeros(3 * LANES, np.float32)
-    seeds, _ = new_lanes()
+    part = _parts()
+    uv, weight = _pairs(), _pairs()
+    chosen, lamp = _numbers(), _lamps()
+    facing = _vectors()
+    seeds = new_seeds()
     n_light, first_n, second_n = _f(n_samples), _f(hemisphere[0]), _f(hemisphere[1])
     cast = 0
     rounds = 2 if n_samples >= 2 * N_POINTS else 1
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 15, seeds)
-        part[:] = _f(0.0)
+        for k in range(N_POINTS):
+            for j in range(6 * LANES):
+                part[k, j] = _f(0.0)
         looked = blocked = 0
         if plain:
             clear_light(origin, normal, group, lanes, row, found)
-            if not found.any():
-                exact[group : group + lanes] = 1
+            lit = False
+            for j in range(3 * LANES):
+                lit = lit or found[j] != _f(0.0)
+            if not lit:
+                for lane in range(lanes):
+                    exact[group + lane] = 1
                 continue
         for turn in range(rounds):
             clear = turn == 1 and blocked == 0 and looked >= 8 * lanes
@@ -201,9 +216,9 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     for lane in range(LANES):
                         on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
                         asked -= on[lane]
-                    if any_alpha:
+                    if shading is not None:
                         # What is not there does not shine; rays that find an emitter know that already.
-                        for lane in range(lanes):
+                        for lane in range(lanes if any_alpha else 0):
                             there = _f(
                                 presence_at(shading, triangle[chosen[lane]], uv[lane], uv[LANES + lane])
                             )
@@ -219,21 +234,22 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                             hidden = on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                    for lane in range(lanes):
-                        m = chosen[lane]
-                        if on[lane] and row[m, TEXTURED] > _f(0.0):
-                            emitted_radiance(shading, triangle[m], uv[lane], uv[LANES + lane], radiance)
-                            for c in range(3):
-                                lamp[(14 + c) * LANES + lane] = radiance[c]
+                    if shading is not None:
+                        for lane in range(lanes):
+                            m = chosen[lane]
+                            if on[lane] and row[m, TEXTURED] > _f(0.0):
+                                emitted_radiance(shading, triangle[m], uv[lane], uv[LANES + lane], radiance)
+                                for c in range(3):
+                                    lamp[(14 + c) * LANES + lane] = radiance[c]
                     for c in range(3):
                         for lane in range(LANES):
                             light = lamp[(14 + c) * LANES + lane] if on[lane] else _f(0.0)
                             part[k, c * LANES + lane] += light * weight[lane]
                             part[k, (3 + c) * LANES + lane] += light * weight[LANES + lane]
         if plain and blocked == 0 and looked >= 8 * lanes and n_samples >= N_POINTS:
-            exact[group : group + lanes] = 1
             # No squares: there is no variance.
             for lane in range(lanes):
+                exact[group + lane] = 1
                 for c in range(3):
                     out[group + lane, c] += found[c * LANES + lane]
                     out[group + lane, 3 + c] += found[c * LANES + lane]
@@ -254,7 +270,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     return cast
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def emitter_hit(  # type: ignore[no-untyped-def]
     row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
 ):

@@ -10,7 +10,7 @@ Conty Estevez and Kulla, Importance sampling of many lights with adaptive tree s
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,15 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     if len(chance) and len(origin):
         cluster_chances(emitters, origin, chance, cumulative)
     return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
+
+
+def needed_shading(emitters: Emitters, shading: Any) -> Any:
+    """Return what kernels have to know of materials: None if no emitter is textured and nothing has holes.
+
+    Numba compiles them for None without what looks up textures.
+    """
+    varied = len(shading.alpha.slot) > 0 or (emitters.row[:, TEXTURED] > 0).any()
+    return shading if varied else None
 
 
 @inner

@@ -12,13 +12,13 @@ Christensen, Faster photon map global illumination, 1999.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.area_light import emitter_hit
 from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
 from baker.kernels.hits import front_facing, hit_pixel
-from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.surface import N_POINTS
+from baker.trace.jit import kernel, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
     DIR_Y,
@@ -37,9 +37,13 @@ _f = np.float32
 # Columns of `out`: indirect RGB, sky and emitted RGB, AO, sum of squares over 16 batches.
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
+# Memory of the kernels below.
+_parts, _floats = scratch((7 * LANES,), np.float32), scratch((LANES,), np.float32)
+_totals, _doubles = scratch((7 * LANES,), np.float64), scratch((LANES,), np.float64)
+_numbers, _counts, _rgba = scratch((LANES,), np.int64), scratch((LANES,), np.int32), scratch((4,), np.float64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def gather(  # type: ignore[no-untyped-def]
     origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
 ):
@@ -48,6 +52,7 @@ def gather(  # type: ignore[no-untyped-def]
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
     exitance : (sides * P * H * W, 4) float32, lx, light that the texel at each pixel reflects (RGB,
         spare); no rows if nothing does
+    shading : from `emitters.needed_shading`
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
     exact : (m,) uint8, 1 for texels that have all light of emitters already
@@ -59,30 +64,33 @@ def gather(  # type: ignore[no-untyped-def]
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
     lamp, chance, cumulative = lamps.row, lamps.chance, lamps.cumulative
-    radiance = np.zeros(4)
+    radiance = _rgba()
     # Sums of one point's samples are short: float32; those of all points are not.
-    part, missed = np.zeros(7 * LANES, np.float32), np.zeros(LANES, np.float32)
-    total, squares = np.zeros(7 * LANES), np.zeros(LANES)
-    pixel = np.zeros(LANES, np.int64)
-    seeds, frame = new_lanes()
+    part, missed = _parts(), _floats()
+    total, squares = _totals(), _doubles()
+    pixel = _numbers()
+    seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
     # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
             squares[lane] = 0.0
-        total[:] = 0.0
+        for j in range(7 * LANES):
+            total[j] = 0.0
         for s in range(n_samples):
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
-                part[:] = _f(0.0)
-                missed[:] = _f(0.0)
+                for j in range(7 * LANES):
+                    part[j] = _f(0.0)
+                for lane in range(LANES):
+                    missed[lane] = _f(0.0)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
             trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
             for lane in range(LANES):
@@ -111,7 +119,7 @@ def gather(  # type: ignore[no-untyped-def]
                     if weight > 0.0:
                         for c in range(3):
                             radiance[c] = lamp[m, RADIANCE + c]
-                        if lamp[m, TEXTURED] > _f(0.0):
+                        if shading is not None and lamp[m, TEXTURED] > _f(0.0):
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
                             part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight)
@@ -143,7 +151,7 @@ def gather(  # type: ignore[no-untyped-def]
             out[i, SQUARE] = squares[lane] * scale * scale
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def open_share(origin, normal, caster, begin, net, shared, distance, look, out):  # type: ignore[no-untyped-def]
     """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
 
@@ -155,11 +163,11 @@ def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
     scene, occluded, width = caster.scene, caster.occluded, caster.width
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
-    count = np.zeros(LANES, np.int32)
-    seeds, frame = new_lanes()
+    count = _counts()
+    seeds, frame = new_seeds(), new_frame()
     cast = 0
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0

@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.emitters import AREA, NORMAL, RADIANCE, TWO_SIDED
 from baker.kernels.surface import N_POINTS
+from baker.trace.jit import inner, larger, pasted, scratch, smaller
 from baker.trace.packets import LANES
 
 _f = np.float32
@@ -26,12 +26,13 @@ _f = np.float32
 # what a triangle that looks small gives (-1: it does not), 1 if the triangle's shining side is turned here.
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _TURNED = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
+_work, _corners = scratch((_ROWS * LANES,), _f), scratch((15,), _f)
 # Triangles whose longest edge is under a hundredth of their distance shine from their centroid: the sum over
 # edges would lose digits, and the error is of the order of the square, 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def angle_over_sine(x, sine):  # type: ignore[no-untyped-def]
     """Return an angle over its sine from its cosine x in [-1, 1], float32; relative error under 1e-6.
 
@@ -52,10 +53,10 @@ def angle_over_sine(x, sine):  # type: ignore[no-untyped-def]
         )
     )  # fmt: skip
     acute = series / math.sqrt(_f(1.0) + y)
-    return acute if x >= _f(0.0) else _f(math.pi) / max(sine, _f(1.0e-12)) - acute
+    return acute if x >= _f(0.0) else _f(math.pi) / larger(sine, _f(1.0e-12)) - acute
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-untyped-def]
     """Write the irradiance of sixteen texels from all emitters, as if nothing stood in between.
 
@@ -63,8 +64,9 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
     row : (M, 24) float32, see `emitters`; none textured
     found : (3 * 16,) float32, lx: RGB by lane, means over the texels' points
     """
-    work = np.zeros(_ROWS * LANES, np.float32)
-    found[:] = _f(0.0)
+    work = _work()
+    for j in range(3 * LANES):
+        found[j] = _f(0.0)
     for k in range(N_POINTS):
         for lane in range(lanes):
             for a in range(3):
@@ -82,7 +84,7 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
                         found[c * LANES + lane] += scale * turned * (small if small >= _f(0.0) else light)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@pasted
 def _reach_for(work, j, x, y, z):  # type: ignore[no-untyped-def]
     """Write the arms to corner j of a triangle and its heights above the surfaces."""
     for lane in range(LANES):
@@ -94,7 +96,7 @@ def _reach_for(work, j, x, y, z):  # type: ignore[no-untyped-def]
         work[(_HEIGHT + j) * LANES + lane] = height + az * work[(_NORMAL + 2) * LANES + lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
     """Write the arms to the corners of what of triangle m lies above each surface.
 
@@ -110,7 +112,7 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         for a in range(3):
             step = row[m, 3 * ((j + 1) % 3) + a] - row[m, 3 * j + a]
             edge += step * step
-        longest = max(longest, edge)
+        longest = larger(longest, edge)
     nx, ny, nz = row[m, NORMAL], row[m, NORMAL + 1], row[m, NORMAL + 2]
     two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
     third = _f(1.0 / 3.0)
@@ -130,9 +132,9 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         work[(_ARM + 10) * LANES + lane] = work[(_ARM + 7) * LANES + lane]
         work[(_ARM + 11) * LANES + lane] = work[(_ARM + 8) * LANES + lane]
         facing = -third * (x * nx + y * ny + z * nz)
-        square = max(third * third * (x * x + y * y + z * z), _f(1.0e-30))
+        square = larger(third * third * (x * x + y * y + z * z), _f(1.0e-30))
         low = work[_HEIGHT * LANES + lane] + work[(_HEIGHT + 1) * LANES + lane]
-        height = max(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * third
+        height = larger(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * third
         small = longest < _SMALL_VIEW * square
         work[_SMALL * LANES + lane] = area * height * abs(facing) / (square * square) if small else _f(-1.0)
         work[_TURNED * LANES + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
@@ -144,16 +146,16 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
         if above == 0:
             work[_TURNED * LANES + lane] = _f(0.0)
         if work[_TURNED * LANES + lane] > _f(0.0):
-            corners = max(corners, 3 if above == 3 else 4)
+            corners = larger(corners, 3 if above == 3 else 4)
             if above < 3:
                 _cut(work, lane)
     return corners
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _cut(work, lane):  # type: ignore[no-untyped-def]
     """Cut off what of a lane's triangle lies below its surface: three or four corners remain."""
-    corner = np.zeros(15, np.float32)
+    corner = _corners()
     n = 0
     for j in range(3):
         after = (j + 1) % 3
@@ -171,10 +173,10 @@ def _cut(work, lane):  # type: ignore[no-untyped-def]
             n += 1
     for j in range(4):
         for a in range(3):
-            work[(_ARM + 3 * j + a) * LANES + lane] = corner[3 * min(j, n - 1) + a]
+            work[(_ARM + 3 * j + a) * LANES + lane] = corner[3 * smaller(j, n - 1) + a]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@pasted
 def _add_edge(work, first, second):  # type: ignore[no-untyped-def]
     """Add the edge between two corners of every lane to its sum; one without length adds nothing."""
     for lane in range(LANES):
@@ -184,15 +186,15 @@ def _add_edge(work, first, second):  # type: ignore[no-untyped-def]
         ex, ey, ez = bx - ax, by - ay, bz - az
         cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
         squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
-        inverse = _f(1.0) / math.sqrt(max(squares, _f(1.0e-30)))
-        cosine = min(max((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
+        inverse = _f(1.0) / math.sqrt(larger(squares, _f(1.0e-30)))
+        cosine = smaller(larger((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
         sine = math.sqrt(cx * cx + cy * cy + cz * cz) * inverse
         spread = cx * work[_NORMAL * LANES + lane] + cy * work[(_NORMAL + 1) * LANES + lane]
         spread += cz * work[(_NORMAL + 2) * LANES + lane]
         work[_SUM * LANES + lane] += spread * inverse * angle_over_sine(cosine, sine)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _add_edges(work, corners):  # type: ignore[no-untyped-def]
     """Write the sum over the edges between the corners of every lane."""
     for lane in range(LANES):

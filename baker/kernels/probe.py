@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.hits import front_facing
-from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_lanes
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, NO_HIT, PRIM_ID, trace_lanes
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_point, most, hits):  # type: ignore[no-untyped-def]
     """Count rays that hit the back of a one-sided surface, until it is clear whether more than `most` do.
 
@@ -24,10 +24,10 @@ def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_p
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row = table.row
-    seeds, frame = new_lanes()
+    seeds, frame = new_seeds(), new_frame()
     cast = 0
     for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+        lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 10, seeds)
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0

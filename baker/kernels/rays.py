@@ -7,10 +7,7 @@ offsets, or the compiler could not know that they do not overlap.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba.extending import register_jitable
 
 from baker.kernels.sampling import cosine_direction, hash_combine, tangent_frame, texel_scramble
 from baker.trace.jit import inner, scratch
@@ -24,12 +21,6 @@ FRAME_ROWS = 9
 # Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
 new_seeds = scratch((2 * LANES,), np.uint32)
 new_frame = scratch((FRAME_ROWS * LANES,), np.float32)
-
-
-@register_jitable(inline="always")
-def new_lanes() -> Any:
-    """Return both."""
-    return new_seeds(), new_frame()
 
 
 @inner

@@ -16,7 +16,7 @@ from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
 from baker.kernels.area_light import light_samples
-from baker.kernels.emitters import Emitters, lamps_for, widest_view
+from baker.kernels.emitters import Emitters, lamps_for, needed_shading, widest_view
 from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
@@ -100,6 +100,7 @@ def direct_light(
     few_shared = shared_bits_mask(N_HEMISPHERE)
 
     cast = np.zeros(-(-n // TILE), np.int64)
+    shading = needed_shading(emitters, shading)
 
     def work(begin: int, end: int) -> Part:
         caster = new_caster(tracer)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
-from baker.kernels.emitters import Emitters, lamps_for
+from baker.kernels.emitters import Emitters, lamps_for, needed_shading
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
@@ -84,6 +84,7 @@ def final_gather(
     shared = shared_bits_mask(n_samples)
     limits = np.array([ao_distance, n_light], np.float64)
     radiance = np.array(sky, np.float32)
+    shading = needed_shading(emitters, shading)
 
     def work(begin: int, end: int) -> Part:
         origin, normal = tile_points(surface, mask, begin, end, kept)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
-from numba.core.cgutils import alloca_once
+from numba.core.cgutils import alloca_once, memset
 from numba.extending import intrinsic, register_jitable
 from numba.np.arrayobj import populate_array
 from numba.np.numpy_support import from_dtype
@@ -27,6 +27,8 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wra
 kernel: Any = njit(cache=True, **_OPTIONS)
 # Decorator of a function that kernels call: it stays a Python function, and is compiled into each kernel.
 inner: Any = register_jitable(**_OPTIONS)
+# The same, copied to wherever it is called: numbers that it is called with become part of its code.
+pasted: Any = register_jitable(forceinline=True, **_OPTIONS)
 
 
 def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
@@ -43,7 +45,8 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
             size = context.get_abi_sizeof(item)
             block = ir.ArrayType(item, math.prod(shape))
             memory = alloca_once(builder, block)  # type: ignore[no-untyped-call]
-            builder.store(ir.Constant(block, None), memory)
+            length = context.get_constant(types.intp, size * math.prod(shape))
+            memset(builder, memory, length, 0)  # type: ignore[no-untyped-call]
             made = context.make_array(array)(context, builder)
             steps = [size * math.prod(shape[axis + 1 :]) for axis in range(len(shape))]
             populate_array(  # type: ignore[no-untyped-call]

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inner import compiled
 
 from baker.kernels.emitters import AREA, NORMAL, RADIANCE, ROW_LENGTH, TWO_SIDED
 from baker.kernels.polygon_light import angle_over_sine, clear_light
 from baker.trace.packets import LANES
+
+angle_over_sine, clear_light = compiled(angle_over_sine, clear_light)
 
 
 def emitter(corners, radiance=(1.0, 1.0, 1.0), two_sided=False):
