@@ -18,6 +18,9 @@ from baker.reference.view import Reference, build_reference
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002
 COPIES = 256
+# Of some 190 places one in 370 is beyond three standard errors by chance. With seed 0 one was, by 3.2: over
+# 200 other seeds the same place is 0.003 % +- 0.003 % away.
+SEED = 1
 
 
 def copies_of(place: Any, normal: Any = UP, copies: int = COPIES) -> tuple[np.ndarray, np.ndarray]:
@@ -55,13 +58,15 @@ def traced(
 ) -> PointEstimate:
     """Return path-traced irradiance: `where` is position and normal, or a function of the pass that tells."""
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
-        return _passes(irradiance_pass, reference, where, 3, passes, samples, how)
+        return _passes(irradiance_pass, reference, where, 3, passes, samples, {"seed": SEED, **how})
 
 
 def opened(scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64) -> PointEstimate:
     """Return the ambient occlusion of the reference, 1 = open."""
     with build_reference(scene, threads=2) as reference:
-        return _passes(openness_pass, reference, where, 1, passes, samples, {"distance": distance})
+        return _passes(
+            openness_pass, reference, where, 1, passes, samples, {"seed": SEED, "distance": distance}
+        )
 
 
 def _passes(
@@ -83,8 +88,8 @@ def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, ro
     Away by at most three of the standard errors that the reference itself tells, and by 0.2 %; the errors
     small enough that three of them are below 0.2 %; and as large as the spread of the copies is.
     rounding : share of the truth that is no noise: float32, and rays that leave surfaces by 1e-5 of the scene
-    Seeds are fixed. After a change of random numbers one place in 370 may be beyond three errors by chance:
-    one that stays there with other seeds is wrong.
+    Seeds are fixed. After a change of random numbers a place may be beyond three errors by chance: one that
+    stays there with other seeds is wrong.
     """
     truth = np.atleast_1d(np.asarray(truth, float))
     mean = found.mean[:, channel].reshape(len(truth), -1)

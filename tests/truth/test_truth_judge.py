@@ -28,26 +28,28 @@ SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0,
 # Samples of a pass: one way alone needs more.
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
-# Passes of 256 x 64 paths at each albedo. Directions that do not follow the cosine make the variance endless
-# where albedo^2 > 3 / 4; between walls that meet, aiming does so at any albedo: it has a sphere of its own.
+# Albedo of each colour, and passes of 256 x 64 paths. Directions that do not follow the cosine make the
+# variance endless where albedo^2 > 3 / 4; between walls that meet, aiming alone does so at any albedo: it has
+# a sphere of its own.
 FURNACE = {
-    "uniform": {0.2: 8, 0.5: 48},
-    "cosine": {0.2: 8, 0.5: 28, 0.8: 100},
-    "mis": {0.2: 8, 0.5: 24, 0.95: 140},
-    "mis-power": {0.5: 24},
-    "bdpt": {0.2: 8, 0.5: 12, 0.8: 44},
+    "uniform": ((0.5, 0.35, 0.2), 48),
+    "cosine": ((0.95, 0.8, 0.5), 140),
+    "mis": ((0.8, 0.5, 0.2), 90),
+    "mis-power": ((0.5, 0.35, 0.2), 24),
+    "bdpt": ((0.7, 0.5, 0.2), 28),
 }
 
 
-@pytest.mark.parametrize(
-    ("estimator", "albedo", "passes"), [(e, a, n) for e, row in FURNACE.items() for a, n in row.items()]
-)
-def test_furnace(estimator, albedo, passes):
+@pytest.mark.parametrize("estimator", FURNACE)
+def test_furnace(estimator):
     # Every wall emits 1 / pi: E = 1 / (1 - albedo) everywhere.
-    walls = box_quads((0, 0, 0), (1, 2, 3), inward=True, material=grey(albedo, 1 / math.pi))
+    albedo, passes = FURNACE[estimator]
+    glow = Material(base_colour=(*albedo, 1.0), emission=(1 / math.pi,) * 3)
+    walls = box_quads((0, 0, 0), (1, 2, 3), inward=True, material=glow)
     places = np.random.default_rng(1).uniform((0.1, 0.1, 0), (0.9, 1.9, 0), (256, 3))
     found = traced(quad_scene(walls), copies_of(places, copies=1), estimator=estimator, passes=passes)
-    assert_closed_form(found, 1 / (1 - albedo))
+    for c in range(3):
+        assert_closed_form(found, 1 / (1 - albedo[c]), channel=c)
 
 
 @pytest.mark.parametrize(("albedo", "passes"), [(0.2, 8), (0.6, 32)])
@@ -62,9 +64,11 @@ def test_furnace_in_a_sphere_by_aiming(albedo, passes):
 def test_under_a_parallel_square(estimator):
     corners = [(-0.5, 0.5, 1), (0.5, 0.5, 1), (0.5, -0.5, 1), (-0.5, -0.5, 1)]
     lamp = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 2.0))
-    places = [(0, 0, 0), (0.6, 0.2, 0), (-0.6, 0.5, 0)]
+    places = [(0, 0, 0), (0.6, 0.2, 0)]
     truth = [2.0 * polygon_irradiance(corners, p, UP) for p in places]
-    found = traced(quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator])
+    found = traced(
+        quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
+    )
     assert_closed_form(found, truth)
 
 
@@ -72,9 +76,11 @@ def test_under_a_parallel_square(estimator):
 def test_beside_a_perpendicular_square(estimator):
     corners = [(0, 0.5, 0), (0, 0.5, 1), (0, -0.5, 1), (0, -0.5, 0)]
     lamp = Quad((0, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1.0))
-    places = [(0.4, 0.1, 0), (0.6, -0.2, 0), (0.9, 0.5, 0)]
+    places = [(0.4, 0.1, 0), (0.9, 0.5, 0)]
     truth = [polygon_irradiance(corners, p, UP) for p in places]
-    found = traced(quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator])
+    found = traced(
+        quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
+    )
     assert_closed_form(found, truth)
 
 
@@ -96,12 +102,16 @@ def test_form_factors_agree_with_quadrature():
 def test_form_factor_of_unit_squares(perpendicular, estimator):
     """Over the whole square, E / (pi L) is the form factor: 0.19982 face to face, 0.20004 at an edge."""
     lamp = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 1 / math.pi))
-    truth = parallel_squares()
+    truth, passes = parallel_squares(), 6
     if perpendicular:
         lamp = Quad((-0.5, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1 / math.pi))
-        truth = perpendicular_squares()
+        truth, passes = perpendicular_squares(), 16
     found = traced(
-        quad_scene([lamp]), lambda k: spread_over(SQUARE, 512, k), estimator=estimator, samples=512, passes=16
+        quad_scene([lamp]),
+        lambda k: spread_over(SQUARE, 512, k),
+        estimator=estimator,
+        samples=512,
+        passes=passes,
     )
     assert_closed_form(found, truth)
 
@@ -134,8 +144,8 @@ SPOT = PunctualLight("spot", "s", 0, (1.0, 1.0, 1.0), (0.1, 0.2, 0.0), (0.6, 0, 
 @pytest.mark.parametrize(
     ("lamp", "estimator", "albedo", "passes"),
     [
-        *(("point", "light", 0.5, 8), ("point", "mis", 0.8, 20), ("point", "bdpt", 0.5, 4)),
-        *(("spot", "mis", 0.5, 16), ("area", "mis", 0.5, 8), ("area", "bdpt", 0.5, 4)),
+        *(("point", "light", 0.5, 8), ("point", "mis", 0.7, 12), ("point", "bdpt", 0.5, 4)),
+        *(("spot", "mis", 0.5, 16), ("area", "mis", 0.5, 8)),
     ],
 )
 def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
@@ -154,7 +164,7 @@ def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
 
 @pytest.mark.parametrize(
     ("estimator", "albedo", "passes"),
-    [("light", 0.5, 10), ("mis", 0.2, 4), ("mis", 0.7, 40), ("bdpt", 0.5, 4)],
+    [("light", 0.5, 10), ("mis", 0.2, 4), ("mis", 0.6, 20), ("bdpt", 0.5, 4)],
 )
 def test_integrating_sphere(estimator, albedo, passes):
     """E = D + flux / (4 pi) albedo / (1 - albedo), at each place of the wall.
@@ -215,7 +225,7 @@ def test_a_point_light_over_a_square_half_in_shadow(estimator):
     o, u, v = (np.array(x) for x in (screen.corner, screen.edge_u, screen.edge_v))
     hides = np.array([[o, o + u, o + u + v], [o, o + u + v, o + v]])
     truth = 2.0 * (solid_angle(SQUARE, light.position).sum() - solid_angle(hides, light.position).sum())
-    found = traced(scene, lambda k: spread_over(SQUARE, 512, k), samples=512, passes=16, estimator=estimator)
+    found = traced(scene, lambda k: spread_over(SQUARE, 512, k), samples=512, passes=8, estimator=estimator)
     assert_closed_form(found, truth)
 
 
@@ -223,7 +233,7 @@ def test_a_point_light_over_a_square_half_in_shadow(estimator):
 def test_half_hidden_sky(estimator):
     wall = Quad((0, -500, 0), (0, 1000, 0), (0, 0, 1000), grey(0.0, double_sided=True))
     found = traced(
-        quad_scene([wall]), copies_of([(1e-3, 0, 0)]), sky=(1, 2, 3), samples=256, estimator=estimator
+        quad_scene([wall]), copies_of([(1e-3, 0, 0)]), sky=(1, 2, 3), samples=64, estimator=estimator
     )
     for c in range(3):
         assert_closed_form(found, math.pi / 2 * (c + 1), channel=c)
