@@ -138,6 +138,8 @@ def bake(
         record.warnings.extend(atlas.warnings)
         farm.open(scene, atlas, settings)
         world = prepare(scene, atlas, settings, record)
+        if any(channel.needs_light for channel in channels.values()):
+            warm.wait_for_rays(compiling, progress)
         transport = trace_transport(scene, world, channels, settings, record, farm)
         world.rays.close()
         farm.close()

@@ -1,14 +1,15 @@
 """Compiles kernels in a second process while the first bake after an install begins its work.
 
 Numba compiles one function at a time in a process, and keeps what it compiled on disk: what this process
-compiles, the bake finds. It is run as `python -m baker.warm`, runs the ray kernels on a single lamp and
-finishes a small page, and writes nothing but that cache. The bake itself compiles uv, texels and the rest.
+compiles, the bake finds. It is run as `python -m baker.warm`, lights and gathers from a single lamp, finishes
+a small page, and writes nothing but that cache. The bake itself compiles uv, texels and the rest.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -48,9 +49,22 @@ def cache_warnings() -> list[SceneWarning]:
     return [SceneWarning("kernels-not-kept", message)]
 
 
+def wait_for_rays(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
+    """Wait until the background compilation has its ray kernels: else both processes compiled the same."""
+    from baker.kernels.gather import gather
+
+    # The last one that `cast_rays` compiles.
+    folder, name = gather._cache.cache_path, "gather.gather-*.nbc"
+    _wait(process, progress, lambda: folder is None or any(Path(folder).glob(name)))
+
+
 def finish(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
     """Wait for the background compilation; if it failed, the kernels are compiled where they are used."""
-    while process is not None:
+    _wait(process, progress, lambda: False)
+
+
+def _wait(process: subprocess.Popen[bytes] | None, progress: Progress, enough: Callable[[], bool]) -> None:
+    while process is not None and not enough():
         try:
             process.wait(_LOOK)
         except subprocess.TimeoutExpired:
@@ -67,14 +81,13 @@ def stop(process: subprocess.Popen[bytes] | None) -> None:
 
 
 def cast_rays() -> None:
-    """Run the ray kernels on texels of one lamp that shines into the open."""
+    """Light texels by one lamp that shines into the open, and gather from them."""
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
     from baker.core.scene import Instance, Material, Mesh, Scene
     from baker.kernels.area_light import light_samples
     from baker.kernels.emitters import lamps_for, widest_view
-    from baker.kernels.form_factor import cast_form_factors
-    from baker.kernels.gather import N_COLUMNS, gather, open_share
+    from baker.kernels.gather import N_COLUMNS, gather
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
     from baker.lights.emissive import build_emitters
@@ -99,7 +112,8 @@ def cast_rays() -> None:
     origin[..., 2], normal[..., 2] = 1.0, -1.0
     caster, net, shared = new_caster(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
     lamps, exact = lamps_for(emitters, origin), np.zeros(_TEXELS, np.uint8)
-    # In the order in which a bake needs them; what comes before direct light it compiles itself meanwhile.
+    # In the order in which a bake needs them. As long again takes what it compiles itself: everything before
+    # direct light, the rays of gaps and form factors, and the matrix.
     weigh, two = np.array([16.0, 4.0]), np.array([1.0, 16.0])
     widest_view(emitters, origin)
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
@@ -107,10 +121,6 @@ def cast_rays() -> None:
     dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
     gather(origin, normal, table, dark, lamps, None, caster, 0, net, shared, black, two, exact, out)
-    open_share(origin, normal, caster, 0, net, shared, np.float32(1.0), 0, squares)
-    target, tally = np.zeros((_TEXELS, 16), np.int32), np.zeros((_TEXELS, 2), np.int32)
-    patch = np.zeros(256, np.int32)
-    cast_form_factors(origin, normal, table, patch, caster, 0, net, shared, target, tally)
     rays.close()
 
 

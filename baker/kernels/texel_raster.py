@@ -36,23 +36,12 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_overlaps(uv, triangle, page, size, count):  # type: ignore[no-untyped-def]
-    """Add to `count` (P * H * W,) int32 how many triangles touch each texel's square."""
-    corner = new_triangle()
-    for t in range(len(triangle)):
-        x0, y0, x1, y1 = _corners(uv, triangle, t, size, corner)
-        base = np.int64(page[t]) * size * size
-        for y in range(y0, y1 + 1):
-            for x in range(x0, x1 + 1):
-                if square_touches(corner, x, y):
-                    count[base + y * size + x] += 1
+def list_overlaps(uv, triangle, page, size, at, entry, area):  # type: ignore[no-untyped-def]
+    """Write each texel's triangles and their areas (in texels) to `entry` and `area`, from `at` on.
 
-
-@kernel
-def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore[no-untyped-def]
-    """Write each texel's triangles and their areas (in texels) behind `start` (P * H * W,) int64.
-
-    `start` is moved to the end of each texel's list. Triangles come in rising order.
+    at : (P * H * W,) int64, moved by the number of triangles that touch each texel's square
+    entry, area : without items nothing is written, only counted
+    Triangles come in rising order.
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
@@ -61,14 +50,16 @@ def fill_overlaps(uv, triangle, page, size, start, entry, area):  # type: ignore
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
                 how = square_touches(corner, x, y)
-                if how:
+                if how == 0:
+                    continue
+                k = at[base + y * size + x]
+                at[base + y * size + x] = k + 1
+                if len(entry):
                     inside = 1.0
                     if how == 1:
                         inside = polygon_area(cut, clip_to_square(corner, x, y, cut, spare))
-                    at = start[base + y * size + x]
-                    entry[at] = t
-                    area[at] = inside
-                    start[base + y * size + x] = at + 1
+                    entry[k] = t
+                    area[k] = inside
 
 
 @kernel

@@ -13,7 +13,7 @@ from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.texel_info import texel_albedo, texel_geometry
-from baker.kernels.texel_raster import count_overlaps, fill_overlaps, keep_main_chart, morton_keys
+from baker.kernels.texel_raster import keep_main_chart, list_overlaps, morton_keys
 from baker.shading.materials import Shading
 
 _TILE = 4096
@@ -103,17 +103,17 @@ def _overlaps(
     geometry: Geometry, size: int, n_pages: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
     """Return pixel (n,), first (n + 1,), entry and area (m,), chart (n,) of texels in Morton order."""
-    count = np.zeros(n_pages * size * size, np.int32)
-    count_overlaps(geometry.uv, geometry.triangle, geometry.page, size, count)
-    pixel = np.flatnonzero(count)
+    at = np.zeros(n_pages * size * size, np.int64)
+    nothing = np.zeros(0, np.int32), np.zeros(0, np.float32)
+    list_overlaps(geometry.uv, geometry.triangle, geometry.page, size, at, *nothing)
+    pixel = np.flatnonzero(at)
     pixel = pixel[np.argsort(morton_keys(pixel, size), kind="stable")]
     first = np.zeros(len(pixel) + 1, np.int64)
-    np.cumsum(count[pixel], out=first[1:])
-    start = np.zeros(len(count), np.int64)
-    start[pixel] = first[:-1]
+    np.cumsum(at[pixel], out=first[1:])
+    at[pixel] = first[:-1]
     entry = np.zeros(first[-1], np.int32)
     area = np.zeros(first[-1], np.float32)
-    fill_overlaps(geometry.uv, geometry.triangle, geometry.page, size, start, entry, area)
+    list_overlaps(geometry.uv, geometry.triangle, geometry.page, size, at, entry, area)
     chart = np.zeros(len(pixel), np.int32)
     kept = np.zeros(len(entry), bool)
     keep_main_chart(first, entry, area, geometry.chart, chart, kept)

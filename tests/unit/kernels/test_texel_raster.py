@@ -9,21 +9,20 @@ import numpy as np
 import pytest
 
 from baker.kernels.texel_raster import (
-    count_overlaps,
-    fill_overlaps,
     keep_main_chart,
+    list_overlaps,
     morton_keys,
 )
 
 
 def rasterise(uv, triangle, page, size, n_pages):
     """Return {(page, row, column): {triangle: area}} as the two passes list it."""
-    count = np.zeros(n_pages * size * size, np.int32)
-    count_overlaps(uv, triangle, page, size, count)
+    count = np.zeros(n_pages * size * size, np.int64)
+    list_overlaps(uv, triangle, page, size, count, np.zeros(0, np.int32), np.zeros(0, np.float32))
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     entry, area = np.full(first[-1], -1, np.int32), np.full(first[-1], -1, np.float32)
     start = first[:-1].copy()
-    fill_overlaps(uv, triangle, page, size, start, entry, area)
+    list_overlaps(uv, triangle, page, size, start, entry, area)
     np.testing.assert_array_equal(start, first[1:])
     found = {}
     for k in np.flatnonzero(count):
