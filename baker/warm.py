@@ -7,6 +7,7 @@ a small page, and writes nothing but that cache. The bake itself compiles uv, te
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 from collections.abc import Callable
@@ -144,5 +145,7 @@ if __name__ == "__main__":
     from baker.kernels.start import skip_blas
 
     skip_blas()
+    # Compiling makes millions of small objects and hardly a cycle of them: looking for some takes 5 %.
+    gc.disable()
     cast_rays()
     finish_pages()
