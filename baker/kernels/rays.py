@@ -16,8 +16,6 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, ORG_X, TFAR
 FAR = np.float32(1.0e30)
 # Rows of a frame: tangent, bitangent, normal (three each).
 FRAME_ROWS = 9
-
-
 # Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
 new_seeds = scratch((2 * LANES,), np.uint32)
 new_frame = scratch((FRAME_ROWS * LANES,), np.float32)
