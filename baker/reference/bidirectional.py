@@ -36,8 +36,7 @@ from baker.reference.bidirectional_weights import (
 )
 from baker.reference.bsdf import N_PARAMETERS, bsdf_sample
 from baker.reference.lamps import TEXTURED as GLOWS
-from baker.reference.paths import start_path, stratum
-from baker.reference.randomness import draw, path_state
+from baker.reference.randomness import draw, path_state, stratum
 from baker.reference.step import step
 from baker.reference.vertex import (
     BETA,
@@ -54,6 +53,7 @@ from baker.reference.vertex import (
     arrive,
     glow,
     paint,
+    start_path,
 )
 from baker.reference.view import EMITTER, TEXTURED
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace

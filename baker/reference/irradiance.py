@@ -18,10 +18,11 @@ from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.reference.estimators import Estimator, estimator_named
+from baker.reference.lanes import new_path_memory
 from baker.reference.occlusion import open_rays
 from baker.reference.paths import trace_paths
+from baker.reference.randomness import seed_salt
 from baker.reference.view import Reference
-from baker.trace.packets import new_caster
 
 SAMPLES_PER_PASS = 16
 _TILE = 128
@@ -127,7 +128,7 @@ def irradiance_pass(
         else:
             cast = trace_paths(
                 *places, begin, True, reference.surfaces, reference.lamps, reference.shading,
-                new_caster(reference.rays.tracer), net, setting, out,
+                new_path_memory(reference.rays), net, setting, out,
             )  # fmt: skip
             counted[begin // _TILE] = cast
         add_pass(estimate, rows, out * (math.pi / samples))
@@ -160,16 +161,16 @@ def openness_pass(
     net = sobol_reversed(samples, seed, 1 + number)
     shared = shared_bits_mask(samples)
     reach = np.float32(min(distance, 1.0e30))
-    least = reference.surfaces.least
+    least = np.float32(reference.surfaces.least)
+    setting = np.array([number, seed_salt(seed)], np.int64)
 
     def work(begin: int, end: int) -> None:
-        rows = np.arange(begin, end)
         out = np.zeros((end - begin, 1))
         open_rays(
-            position[rows], normal[rows], face_normal[rows], begin, new_caster(reference.rays.tracer), net,
-            shared, reach, least, seed, number, out,
+            position[begin:end], normal[begin:end], face_normal[begin:end], begin,
+            new_path_memory(reference.rays), net, shared, reach, least, setting, out,
         )  # fmt: skip
-        add_pass(estimate, rows, out / samples)
+        add_pass(estimate, slice(begin, end), out / samples)
 
     run_tiles(len(position), 4 * _TILE, work, threads=reference.threads, stage="openness", progress=progress)
     estimate.rounds += 1
@@ -181,11 +182,11 @@ def path_setting(
 ) -> NDArray[np.int64]:
     """Return what `trace_paths` calls `how`."""
     bounces = -1 if max_bounces is None else max_bounces
-    values = [how.hemisphere, how.aim, int(strata), how.power, bounces, seed, number]
+    values = [how.hemisphere, how.aim, int(strata), how.power, bounces, seed, number, seed_salt(seed)]
     return np.array(values, np.int64)
 
 
-def add_pass(estimate: PointEstimate, rows: NDArray[np.int64], mean: NDArray[np.float64]) -> None:
+def add_pass(estimate: PointEstimate, rows: NDArray[np.int64] | slice, mean: NDArray[np.float64]) -> None:
     """Add a pass's means (m, C) of points `rows` to an estimate; `rounds` counts up when all are in."""
     half = estimate.rounds % 2
     estimate.total[half, rows] += mean

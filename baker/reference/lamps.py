@@ -28,6 +28,12 @@ CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 
 # Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer
 # cosine, one over the cone's width, chance.
 KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE = 0, 1, 4, 7, 10, 11, 12
+# Columns of any lamp as `lane_vertex` takes it: a corner (of a light without area its place, of parallel
+# light the way towards it), two edges, normal (a spot's axis), area over chance (or 1 over chance),
+# two-sided, outer cosine, one over the cone's width, radiance or intensity, and what it is: 0 triangle, 1
+# point, 2 spot, 3 directional, 4 sky.
+LANE_CORNER, LANE_EDGE, LANE_NORMAL, LANE_GAIN, LANE_TWO_SIDED = 0, 3, 9, 12, 13
+LANE_OUTER, LANE_SCALE, LANE_RADIANCE, LANE_KIND = 14, 15, 16, 19
 _KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
 # A directional light and the sky end nowhere.
 FAR = 1.0e30
@@ -39,7 +45,8 @@ class LampTable(NamedTuple):
 
     triangle (E, 20), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
     emitter (T,) int32, row of a scene triangle in `triangle` or -1; cumulative (E + P + 1,) float64, last 1
-    (0 if nothing emits); sky (4,) float64: radiance, chance.
+    (0 if nothing emits); sky (4,) float64: radiance, chance; every (E + P + 1, 20) float32, all lamps alike,
+    see the column names; glows int: 1 if any has a texture.
     """
 
     triangle: NDArray[np.float64]
@@ -48,6 +55,8 @@ class LampTable(NamedTuple):
     emitter: NDArray[np.int32]
     cumulative: NDArray[np.float64]
     sky: NDArray[np.float64]
+    every: NDArray[np.float32]
+    glows: int
 
 
 def build_lamps(
@@ -97,7 +106,38 @@ def build_lamps(
     cumulative = np.cumsum(chance)
     if cumulative[-1] > 0:
         cumulative /= cumulative[-1]
-    return LampTable(triangle, point, found.triangle, emitter, cumulative, np.array([*sky, chance[-1]]))
+    last = np.array([*sky, chance[-1]])
+    glows = int((triangle[:, TEXTURED] > 0).any())
+    every = all_alike(triangle, point, last)
+    return LampTable(triangle, point, found.triangle, emitter, cumulative, last, every, glows)
+
+
+def all_alike(
+    triangle: NDArray[np.float64], point: NDArray[np.float64], sky: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Return all lamps as rows of one kind."""
+    n, p = len(triangle), len(point)
+    row = np.zeros((n + p + 1, 20))
+    area, spot, last = row[:n], row[n : n + p], row[n + p]
+    corner = triangle[:, CORNER : CORNER + 9].reshape(n, 3, 3)
+    area[:, LANE_CORNER : LANE_CORNER + 3] = corner[:, 0]
+    area[:, LANE_EDGE : LANE_EDGE + 6] = (corner[:, 1:] - corner[:, :1]).reshape(n, 6)
+    area[:, LANE_NORMAL : LANE_NORMAL + 3] = triangle[:, NORMAL : NORMAL + 3]
+    area[:, LANE_GAIN] = triangle[:, AREA] / np.maximum(triangle[:, CHANCE], 1e-30)
+    area[:, LANE_TWO_SIDED] = triangle[:, TWO_SIDED]
+    area[:, LANE_RADIANCE : LANE_RADIANCE + 3] = triangle[:, RADIANCE : RADIANCE + 3]
+    way = point[:, DIRECTION : DIRECTION + 3]
+    parallel = point[:, KIND, None] == _KINDS["directional"]
+    spot[:, LANE_CORNER : LANE_CORNER + 3] = np.where(parallel, -way, point[:, POSITION : POSITION + 3])
+    spot[:, LANE_NORMAL : LANE_NORMAL + 3] = way
+    spot[:, LANE_GAIN] = 1.0 / np.maximum(point[:, POINT_CHANCE], 1e-30)
+    spot[:, LANE_OUTER], spot[:, LANE_SCALE] = point[:, OUTER], point[:, SCALE]
+    spot[:, LANE_RADIANCE : LANE_RADIANCE + 3] = point[:, INTENSITY : INTENSITY + 3]
+    spot[:, LANE_KIND] = 1.0 + point[:, KIND]
+    last[LANE_GAIN] = 1.0 / max(sky[3], 1e-30)
+    last[LANE_RADIANCE : LANE_RADIANCE + 3] = sky[:3]
+    last[LANE_KIND] = 4.0
+    return row.astype(np.float32)
 
 
 def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.float64]:

@@ -1,59 +1,128 @@
-"""Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion."""
+"""Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
+
+Eight points at a time, each with the same sample: their rays share a packet and its first bits. Loops over
+lanes touch one array each, or they would not become vector code (see `lanes`).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from baker.kernels.rays import aim_lanes, load_frames, new_frame, new_seeds
-from baker.reference.randomness import path_state
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, TFAR, trace_lanes
+from baker.kernels.sampling import cosine_direction, reverse_bits, scramble_reversed
+from baker.reference.lane_vertex import stand_lanes
+from baker.reference.lanes import (
+    ALIVE,
+    BITANGENT,
+    CHOICE,
+    LANES,
+    LOBE,
+    NORMAL,
+    SHADED,
+    TANGENT,
+    U_WAY,
+    VALUE,
+    W_WAY,
+)
+from baker.reference.randomness import mix4
+from baker.reference.step import step
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree
 
-_OFFSET = 1.0e-5
+_f = np.float32
+_w = np.uint32
+_ZERO, _ONE = _f(0.0), _f(1.0)
+_L = LANES
+
+
+@step
+def seed_lanes(words, first, number, salt):  # type: ignore[no-untyped-def]
+    """Write the two scramble seeds of points `first` to `first` + 8."""
+    for lane in range(LANES):
+        x, y, _, _ = mix4(_w(first + lane), _w(0xFFFFFFFE), _w(number), _w(salt))
+        words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
+
+
+@step
+def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
+    """Write the lanes' uniform numbers, in [1, 2): the shared bits of (first, second), the rest scrambled."""
+    one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
+    for lane in range(LANES):
+        x = scramble_reversed(first, words[CHOICE * _L + lane])
+        y = scramble_reversed(second, words[LOBE * _L + lane])
+        x = reverse_bits(_w((x & own) | (first & shared)))
+        y = reverse_bits(_w((y & own) | (second & shared)))
+        words[U_WAY * _L + lane], words[W_WAY * _L + lane] = _w((x >> bits) | one), _w((y >> bits) | one)
+
+
+@step
+def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
+    """Copy place k of points `group` to `group` + 8 into the lanes."""
+    for lane in range(min(LANES, len(position) - group)):
+        for a in range(3):
+            s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
+            s[(SHADED + a) * _L + lane] = normal[group + lane, k, a]
+            s[(NORMAL + a) * _L + lane] = face_normal[group + lane, k, a]
+
+
+@step
+def point_lanes(s, reach):  # type: ignore[no-untyped-def]
+    """Point the lanes' rays, cosine-weighted. What points below the facet is closed by the facet itself."""
+    for lane in range(LANES):
+        a, b, c = cosine_direction(s[U_WAY * _L + lane] - _ONE, s[W_WAY * _L + lane] - _ONE)
+        dx = a * s[TANGENT * _L + lane] + b * s[BITANGENT * _L + lane] + c * s[SHADED * _L + lane]
+        dy = (
+            a * s[(TANGENT + 1) * _L + lane]
+            + b * s[(BITANGENT + 1) * _L + lane]
+            + c * s[(SHADED + 1) * _L + lane]
+        )
+        dz = (
+            a * s[(TANGENT + 2) * _L + lane]
+            + b * s[(BITANGENT + 2) * _L + lane]
+            + c * s[(SHADED + 2) * _L + lane]
+        )
+        above = (
+            dx * s[NORMAL * _L + lane] + dy * s[(NORMAL + 1) * _L + lane] + dz * s[(NORMAL + 2) * _L + lane]
+        )
+        s[DIR_X * _L + lane], s[DIR_Y * _L + lane], s[DIR_Z * _L + lane] = dx, dy, dz
+        s[TFAR * _L + lane] = reach
+        s[ALIVE * _L + lane] = _ONE if above > _ZERO else _ZERO
+
+
+@step
+def count_lanes(s):  # type: ignore[no-untyped-def]
+    """Count the lanes' rays that have met nothing in `VALUE`."""
+    for lane in range(LANES):
+        s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def open_rays(  # type: ignore[no-untyped-def]
-    position, normal, face_normal, begin, caster, net, shared, reach, least, seed, number, out
+    position, normal, face_normal, begin, memory, net, shared, reach, least, how, out
 ):
     """Count the rays of each point that meet nothing within reach.
 
     position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k
-    begin : number of the first point; net : (n, 2) uint32; shared : uint32, bits that all points share
-    reach : float32, metres; least : float; out : (m, 1) float64 output
+    begin : number of the first point; memory : `PathMemory`; net : (n, 2) uint32
+    shared : uint32, bits that all points share; reach, least : float32, metres, see `Surfaces`
+    how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
     """
-    scene, occluded, width = caster.scene, caster.occluded, caster.width
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    seeds, frame = new_seeds(), new_frame()
-    place, facing = np.zeros((LANES, 1, 3), np.float32), np.zeros((LANES, 1, 3), np.float32)
+    scene, occluded = memory.scene, memory.occluded
+    on, s, words = memory.on, memory.s, memory.words
     samples, places = len(net), position.shape[1]
     for group in range(0, len(position), LANES):
         lanes = min(LANES, len(position) - group)
+        seed_lanes(words, begin + group, how[0], how[1])
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
+            s[VALUE * LANES + lane] = _ZERO
+        for sample in range(samples):
+            k = (how[0] * samples + sample) % places
+            if sample == 0 or places > 1:
+                place_lanes(s, position, normal, face_normal, group, k)
+                stand_lanes(s, 0, least)
+            number_lanes(words, net[sample, 0], net[sample, 1], shared)
+            point_lanes(s, reach)
+            call_embree(occluded, on.ctypes.data, scene, s.ctypes.data, 0)  # type: ignore[call-arg]
+            count_lanes(s)
         for lane in range(lanes):
-            bits = path_state(seed, number, begin + group + lane, np.uint64(1) << np.uint64(42))
-            seeds[lane] = np.uint32(bits & np.uint64(0xFFFFFFFF))
-            seeds[LANES + lane] = np.uint32(bits >> np.uint64(32))
-        for s in range(samples):
-            k = (number * samples + s) % places
-            if s == 0 or places > 1:
-                for lane in range(lanes):
-                    i = group + lane
-                    most = max(abs(position[i, k, 0]), abs(position[i, k, 1]), abs(position[i, k, 2]), least)
-                    for a in range(3):
-                        place[lane, 0, a] = position[i, k, a] + _OFFSET * most * face_normal[i, k, a]
-                        facing[lane, 0, a] = normal[i, k, a]
-                load_frames(rays, frame, place, facing, 0, lanes, 0)
-            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, reach)
-            trace_lanes(occluded, scene, width, on, rays, caster.valid, caster.floats)
-            for lane in range(lanes):
-                # Directions below the facet of a smooth surface are closed by the surface itself.
-                i = group + lane
-                above = (
-                    rays[DIR_X * LANES + lane] * face_normal[i, k, 0]
-                    + rays[DIR_Y * LANES + lane] * face_normal[i, k, 1]
-                    + rays[DIR_Z * LANES + lane] * face_normal[i, k, 2]
-                )
-                if rays[TFAR * LANES + lane] >= np.float32(0.0) and above > 0.0:
-                    out[group + lane, 0] += 1.0
+            out[group + lane, 0] += s[VALUE * LANES + lane]

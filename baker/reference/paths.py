@@ -1,12 +1,13 @@
-"""Many paths at once, eight or sixteen to a packet: a lane whose path has ended takes the next one.
+"""Many paths at once, eight side by side: those that end leave no gaps, new ones take their places.
 
     L = L_e + int f L cos        estimated path by path; Russian roulette ends paths without bias
 
-A path's random numbers belong to (seed, pass, point, sample), its result goes to the point's sum in a fixed
-order inside a tile: the same bytes for any number of threads.
+Lambertian vertices are shaded in float32 by vector code (`lane_vertex`), others one by one in float64
+(`vertex`); light is summed in float64. A path's random numbers belong to (seed, pass, point, sample), and
+what it brings goes to the point's sum in a fixed order inside a tile: the same bytes for any number of
+threads.
 
-Based on: Kajiya, The rendering equation, 1986; Veach, 1997, ch. 9 and 10; Laine, Karras and Aila, Megakernels
-considered harmful, 2013 (regeneration of paths).
+Based on: Kajiya, The rendering equation, 1986; Veach, 1997, ch. 9 and 10.
 """
 
 from __future__ import annotations
@@ -16,115 +17,232 @@ import math
 import numpy as np
 from numba import njit
 
-from baker.kernels.sampling import texel_scramble
-from baker.reference.bsdf import METALLIC, N_PARAMETERS, WIDTH
-from baker.reference.lamps import RADIANCE, triangle_density
+from baker.reference.bsdf import N_PARAMETERS, WIDTH
+from baker.reference.lamps import RADIANCE, pick_lamp, triangle_density
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.lamps import TWO_SIDED as LAMP_TWO_SIDED
-from baker.reference.randomness import draw, path_state
-from baker.reference.step import step
-from baker.reference.vertex import (
+from baker.reference.lane_vertex import aim_lanes, arrive_lanes, scatter_lanes, stand_lanes
+from baker.reference.lanes import (
+    ALBEDO,
+    ALIVE,
+    B1,
+    B2,
     BETA,
+    BINS,
+    BLOCK,
+    BLOCKS,
     BOUNCES,
+    CHOICE,
+    COSINE,
+    COUNT,
     DENSITY,
+    KEY,
+    LAMP,
+    LANES,
+    LOBE,
+    NORMAL,
+    POINT,
+    REACH,
+    ROULETTE,
+    SAMPLE,
+    SHADED,
+    TO_LAMP,
+    TRIANGLE,
+    U_LAMP,
+    U_WAY,
+    VALUE,
+    W_LAMP,
+    W_WAY,
+    close_gaps,
+    trace_blocks,
+    unsigned,
+)
+from baker.reference.randomness import random_lanes, spread_lanes
+from baker.reference.shadow_rays import cast_packet, cast_to_lamps
+from baker.reference.step import step
+from baker.reference.vertex import BETA as PATH_BETA
+from baker.reference.vertex import DENSITY as PATH_DENSITY
+from baker.reference.vertex import (
     FRAME,
     GO,
-    LIGHT,
     N_ROWS,
-    NORMAL,
     PLACE,
-    TO,
     aim,
     arrive,
     glow,
     heuristic,
     paint,
-    place_off,
     scatter,
-    set_frame,
+    start_path,
 )
-from baker.reference.view import EMITTER, FACE, TEXTURED
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
+from baker.reference.view import EMITTER, FACE, MATERIAL, TEXTURED, TWO_SIDED
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
-_IDLE, _RAY, _VERTEX = 0, 1, 2
+_f = np.float32
 # Roulette begins after this many bounces and lets at most this share live on.
 _SURE = 3
 _MOST = 0.98
+# Few lamps are counted through, more are searched.
+_FEW = 16
+_INV_2_32 = 1.0 / 4294967296.0
 
 
 @step
-def start_path(path, row, lane, where, toward, normal, at_surface, least):  # type: ignore[no-untyped-def]
-    """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
-
-    where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
-    """
-    for c in range(3):
-        path[BETA + c, lane] = 1.0
-        path[LIGHT + c, lane] = 0.0
-    path[DENSITY, lane] = 0.0
-    path[BOUNCES, lane] = 0.0
-    if not at_surface:
-        for a in range(3):
-            path[PLACE + a, lane] = where[a]
-            path[GO + a, lane] = toward[a]
-        path[BOUNCES, lane] = -1.0
-        return
-    for a in range(3):
-        path[NORMAL + a, lane] = normal[a]
-        row[a, lane] = 1.0
-    row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
-    place_off(path, lane, where[0], where[1], where[2], least)
-    set_frame(path, lane, toward[0], toward[1], toward[2])
-    path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
-
-
-@step
-def see_emitter(path, lane, surface, triangle, prim, distance, mode, power, value):  # type: ignore[no-untyped-def]
+def see_emitter(s, base, lane, surface, triangle, prim, mode, power, value):  # type: ignore[no-untyped-def]
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
     Its texture is not looked up yet.
     """
     value[0] = value[1] = value[2] = 0.0
     e = np.int64(surface[prim, EMITTER])
-    dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
+    dx, dy, dz = (
+        s[base + DIR_X * LANES + lane],
+        s[base + DIR_Y * LANES + lane],
+        s[base + DIR_Z * LANES + lane],
+    )
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
     if facing >= 0.0 and triangle[e, LAMP_TWO_SIDED] == 0.0:
         return
     weight = 1.0
-    if path[DENSITY, lane] > 0.0 and mode > 0:
+    if s[base + DENSITY * LANES + lane] > _f(0.0) and mode > 0:
         if mode == 1:
             return
+        distance = np.float64(s[base + TFAR * LANES + lane])
         other = triangle_density(triangle, e, dx * distance, dy * distance, dz * distance)
-        weight = heuristic(path[DENSITY, lane], other, power)
+        weight = heuristic(np.float64(s[base + DENSITY * LANES + lane]), other, power)
     for c in range(3):
-        value[c] = path[BETA + c, lane] * triangle[e, RADIANCE + c] * weight
+        value[c] = s[base + (BETA + c) * LANES + lane] * triangle[e, RADIANCE + c] * weight
 
 
 @step
-def see_sky(path, lane, sky, mode, power):  # type: ignore[no-untyped-def]
-    """Collect the sky's light at the end of a path that leaves the scene."""
+def see_sky(s, base, lane, sky, mode, power, value):  # type: ignore[no-untyped-def]
+    """Do the same for the sky, where a path leaves the scene."""
+    value[0] = value[1] = value[2] = 0.0
     weight = 1.0
-    if path[DENSITY, lane] > 0.0 and mode > 0 and sky[3] > 0.0:
+    density = np.float64(s[base + DENSITY * LANES + lane])
+    if density > 0.0 and mode > 0 and sky[3] > 0.0:
         if mode == 1:
             return
-        cosine = (
-            path[GO, lane] * path[FRAME + 6, lane]
-            + path[GO + 1, lane] * path[FRAME + 7, lane]
-            + path[GO + 2, lane] * path[FRAME + 8, lane]
-        )
-        weight = heuristic(path[DENSITY, lane], sky[3] * max(cosine, 0.0) / math.pi, power)
+        weight = heuristic(density, sky[3] * max(s[base + COSINE * LANES + lane], 0.0) / math.pi, power)
     for c in range(3):
-        path[LIGHT + c, lane] += path[BETA + c, lane] * sky[c] * weight
+        value[c] = s[base + (BETA + c) * LANES + lane] * sky[c] * weight
+
+
+@step
+def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):  # type: ignore[no-untyped-def]
+    """Begin paths: at white Lambertian points (light leaving them is E / pi), or as rays; see `trace_paths`.
+
+    following : number of the first path; first : number of the first sample of all
+    """
+    base = unsigned(base)
+    m, places = len(toward), toward.shape[1]
+    for lane in range(LANES):
+        if following + lane >= m * samples:
+            s[base + ALIVE * LANES + lane] = _f(0.0)
+            continue
+        # Neighbouring lanes hold neighbouring points with the same sample.
+        sample = (following + lane) // m
+        i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % places)
+        here = i if len(where) == m else 0
+        there = k if where.shape[1] == places else 0
+        s[base + ALIVE * LANES + lane] = _f(1.0)
+        s[base + DENSITY * LANES + lane] = s[base + COSINE * LANES + lane] = _f(0.0)
+        s[base + BOUNCES * LANES + lane] = _f(0.0) if at_surface else _f(-1.0)
+        s[base + POINT * LANES + lane] = i
+        words[base + KEY * LANES + lane], words[base + SAMPLE * LANES + lane] = begin + i, sample
+        words[base + COUNT * LANES + lane] = np.uint32(0)
+        for a in range(3):
+            s[base + (BETA + a) * LANES + lane] = s[base + (ALBEDO + a) * LANES + lane] = _f(1.0)
+            s[base + (ORG_X + a) * LANES + lane] = where[here, there, a]
+            s[base + (DIR_X + a) * LANES + lane] = s[base + (SHADED + a) * LANES + lane] = toward[i, k, a]
+            s[base + (NORMAL + a) * LANES + lane] = normal[i, k, a]
+
+
+@step
+def fetch_lanes(s, words, base, surface, material):  # type: ignore[no-untyped-def]
+    """Copy what Lambertian vertices are made of: the triangles' rows and base colours."""
+    base = unsigned(base)
+    for lane in range(LANES):
+        if s[base + ALIVE * LANES + lane] > _f(0.0):
+            prim = np.int64(words[base + PRIM_ID * LANES + lane])
+            for c in range(TWO_SIDED + 1):
+                s[base + (TRIANGLE + c) * LANES + lane] = surface[prim, c]
+            m = unsigned(surface[prim, MATERIAL])
+            for c in range(3):
+                s[base + (ALBEDO + c) * LANES + lane] = material[m, c]
+
+
+@step
+def choose_lamps(s, words, base, every, cumulative, lamp):  # type: ignore[no-untyped-def]
+    """Choose a lamp for each lane: its number to `lamp` (8,) int64, its row of `every` to `s`."""
+    base = unsigned(base)
+    for lane in range(LANES):
+        choice, e = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32, 0
+        if len(cumulative) > _FEW:
+            e = pick_lamp(cumulative, choice)
+        else:
+            # The same without a branch that nobody can foresee.
+            for k in range(len(cumulative) - 1):
+                e += 1 if cumulative[k] <= choice else 0
+        lamp[lane] = e
+    for lane in range(LANES):
+        e = unsigned(lamp[lane])
+        for c in range(20):
+            s[base + (LAMP + c) * LANES + lane] = every[e, c]
+
+
+@step
+def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ignore[no-untyped-def]
+    """Choose the direction in which one lane's path goes on, or end it."""
+    choice = np.float64(words[base + LOBE * LANES + lane]) * _INV_2_32
+    u, w = np.float64(s[base + U_WAY * LANES + lane]) - 1.0, np.float64(s[base + W_WAY * LANES + lane]) - 1.0
+    alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
+    survive = 1.0
+    if alive and s[base + BOUNCES * LANES + lane] >= _f(_SURE):
+        survive = min(max(path[PATH_BETA, lane], path[PATH_BETA + 1, lane], path[PATH_BETA + 2, lane]), _MOST)
+        alive = s[base + ROULETTE * LANES + lane] - 1.0 < survive
+    s[base + ALIVE * LANES + lane] = _f(1.0) if alive else _f(0.0)
+    cosine = 0.0
+    for a in range(3):
+        s[base + (BETA + a) * LANES + lane] = path[PATH_BETA + a, lane] / survive
+        s[base + (ORG_X + a) * LANES + lane] = path[PLACE + a, lane]
+        s[base + (DIR_X + a) * LANES + lane] = path[GO + a, lane]
+        cosine += path[GO + a, lane] * path[FRAME + 6 + a, lane]
+    s[base + DENSITY * LANES + lane] = path[PATH_DENSITY, lane]
+    s[base + COSINE * LANES + lane] = cosine
+
+
+@step
+def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value, way):  # type: ignore[no-untyped-def]
+    """Aim at one lamp from one lane's vertex; return its number, -1 if it brings nothing."""
+    choice = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32
+    u, w = (
+        np.float64(s[base + U_LAMP * LANES + lane]) - 1.0,
+        np.float64(s[base + W_LAMP * LANES + lane]) - 1.0,
+    )
+    lamp = aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way)
+    for a in range(3):
+        s[base + (VALUE + a) * LANES + lane] = value[a] if lamp >= 0 else 0.0
+        s[base + (TO_LAMP + a) * LANES + lane] = way[a]
+        s[base + (ORG_X + a) * LANES + lane] = path[PLACE + a, lane]
+    s[base + REACH * LANES + lane], s[base + B1 * LANES + lane], s[base + B2 * LANES + lane] = (
+        way[3],
+        way[4],
+        way[5],
+    )
+    return lamp
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, caster, net, how, out):  # type: ignore[no-untyped-def]
+def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, memory, net, how, out):  # type: ignore[no-untyped-def]
     """Add the light that paths bring to each of m points, and count path segments and shadow rays.
 
     where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its
-        point: place, shading normal and geometric normal, or ray origin and direction if not `at_surface`
+        point: place, shading normal and geometric normal, or ray origin and direction if not `at_surface`;
+        one place (1, 1, 3) may be that of all
     begin : number of the first point; net : (n, 2) uint32, n samples of a pass as bit-reversed Sobol numbers
-    how : (7,) int64: `Estimator` (hemisphere, aim, strata, power), most bounces (-1: unlimited), seed, pass
+    how : (8,) int64: `Estimator` (hemisphere, aim, strata, power), most bounces (-1: unlimited), seed, pass,
+        `seed_salt`
     out : (m, 3) float64 sums; at a surface of light leaving a white one, E / pi
 
     Returns
@@ -132,8 +250,8 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     tuple of int
         Closest-hit and shadow rays cast.
     """
-    width, scene, intersect, occluded = caster.width, caster.scene, caster.intersect, caster.occluded
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    scene, intersect, occluded = memory.scene, memory.intersect, memory.occluded
+    on, s, words, bins = memory.on, memory.s, memory.words, memory.bins
     surface, material, least, lambertian = (
         surfaces.row,
         surfaces.material,
@@ -141,149 +259,159 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
         surfaces.lambertian,
     )
     triangle, point, number = lamps.triangle, lamps.point, lamps.number
-    cumulative, sky = lamps.cumulative, lamps.sky
-    alpha = len(shading.alpha.slot) > 0
+    cumulative, sky, every = lamps.cumulative, lamps.sky, lamps.every
+    # What has to be looked up: alpha or emission of lamps, colours of surfaces.
+    glows = len(shading.alpha.slot) > 0 or lamps.glows != 0
+    painted = surfaces.painted != 0
     hemisphere, mode, strata, power = how[0], how[1], how[2], how[3]
-    most_bounces, seed, number_of_pass = how[4], how[5], how[6]
+    most_bounces, number_of_pass, salt = how[4], how[6], how[7]
     lit = cumulative[len(cumulative) - 1] > 0.0
-    path = np.zeros((N_ROWS, MAX_WIDTH))
-    row = np.zeros((N_PARAMETERS, MAX_WIDTH))
-    value = np.zeros(3)
-    values = np.zeros((3, MAX_WIDTH))
-    way = np.zeros(6)
-    rgba = np.zeros(4)
-    stage = np.zeros(MAX_WIDTH, np.int64)
-    job = np.zeros(MAX_WIDTH, np.int64)
-    state = np.zeros(MAX_WIDTH, np.uint64)
-    samples, m, places = len(net), where.shape[0], where.shape[1]
-    following = 0
-    rays = 0
-    shadows = 0
+    path = np.zeros((N_ROWS, LANES))
+    row = np.zeros((N_PARAMETERS, LANES))
+    value, way, rgba = np.zeros(3), np.zeros(6), np.zeros(4)
+    lamp, filled = np.zeros(LANES, np.int64), np.zeros(BINS, np.int64)
+    samples, m, places = len(net), toward.shape[0], toward.shape[1]
+    total = m * samples
+    following = rays = shadows = 0
+    # Blocks in use; the one to be shaded next in this round, which begins when all are traced.
+    blocks = block = 0
+    traced = False
     while True:
-        any_ray = False
-        any_path = False
-        for lane in range(width):
-            if stage[lane] == _IDLE and following < m * samples:
-                # Neighbouring lanes hold neighbouring points with the same sample.
-                i, s = following % m, following // m
-                job[lane] = following
-                following += 1
-                state[lane] = path_state(seed, number_of_pass, begin + i, s)
-                k = (number_of_pass * samples + s) % places
-                start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], at_surface, least)
-                stage[lane] = _VERTEX if at_surface else _RAY
-            any_path = any_path or stage[lane] != _IDLE
-            valid[lane] = 0
-            if stage[lane] == _RAY:
-                set_ray(
-                    floats, words, width, lane,
-                    path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
-                    path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
-                )  # fmt: skip
-                valid[lane] = -1
-                any_ray = True
-                rays += 1
-        if not any_path:
-            break
-        if any_ray:
-            trace(intersect, scene, valid, floats)
-            for lane in range(width):
-                if stage[lane] != _RAY:
-                    continue
-                stage[lane] = _VERTEX
-                if words[GEOM_ID * width + lane] == NO_HIT:
-                    see_sky(path, lane, sky, mode, power)
-                    stage[lane] = _IDLE
-                else:
-                    prim = np.int64(words[PRIM_ID * width + lane])
-                    u = np.float64(floats[HIT_U * width + lane])
-                    v = np.float64(floats[HIT_V * width + lane])
-                    if surface[prim, EMITTER] >= 0.0:
-                        distance = np.float64(floats[TFAR * width + lane])
-                        see_emitter(path, lane, surface, triangle, prim, distance, mode, power, value)
-                        if triangle[np.int64(surface[prim, EMITTER]), GLOWS] > 0.0:
-                            glow(shading, prim, u, v, value, rgba, False)
-                        for c in range(3):
-                            path[LIGHT + c, lane] += value[c]
-                    path[BOUNCES, lane] += 1.0
-                    deep = most_bounces >= 0 and path[BOUNCES, lane] > most_bounces
-                    if deep or not arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
-                        stage[lane] = _IDLE
-                    elif surface[prim, TEXTURED] > 0.0:
-                        paint(row, lane, shading, prim, u, v, material, rgba)
-                if stage[lane] == _IDLE:
-                    for c in range(3):
-                        out[job[lane] % m, c] += path[LIGHT + c, lane]
-        if lit:
-            any_shadow = False
-            for lane in range(width):
-                valid[lane] = 0
-                if stage[lane] == _VERTEX:
-                    choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
-                    if strata and path[BOUNCES, lane] == 0.0:
-                        u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 0)
-                    lamp = aim(
-                        path,
-                        row,
-                        lane,
-                        triangle,
-                        point,
-                        cumulative,
-                        sky,
-                        mode,
-                        power,
-                        choice,
-                        u,
-                        w,
-                        value,
-                        way,
-                    )
-                    if 0 <= lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
-                        glow(shading, number[lamp], way[4], way[5], value, rgba, True)
-                    if lamp >= 0:
-                        set_ray(
-                            floats, words, width, lane,
-                            path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
-                            way[0], way[1], way[2], np.float32(way[3]),
-                        )  # fmt: skip
-                        valid[lane] = -1
-                        any_shadow = True
-                        shadows += 1
-                        for c in range(3):
-                            values[c, lane] = value[c]
-            if any_shadow:
-                trace(occluded, scene, valid, floats)
-                for lane in range(width):
-                    if valid[lane] and floats[TFAR * width + lane] >= np.float32(0.0):
-                        for c in range(3):
-                            path[LIGHT + c, lane] += values[c, lane]
-        for lane in range(width):
-            if stage[lane] != _VERTEX:
+        met = block < blocks
+        if met:
+            base = unsigned(block * BLOCK)
+            block += 1
+        else:
+            if traced:
+                blocks = block = close_gaps(s, blocks)
+                traced = False
+            if following == total or blocks == BLOCKS:
+                if blocks == 0:
+                    break
+                rays += trace_blocks(s, words, blocks, on, intersect, scene, surface)
+                block, traced = 0, True
                 continue
-            choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
-            if strata and path[BOUNCES, lane] == 0.0:
-                u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1)
-            alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
-            if alive and path[BOUNCES, lane] >= _SURE:
-                survive = min(max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane]), _MOST)
-                alive = draw(state, lane) < survive
+            base = unsigned(blocks * BLOCK)
+            blocks += 1
+            block = blocks
+            start_lanes(
+                s,
+                words,
+                base,
+                where,
+                toward,
+                normal,
+                begin,
+                following,
+                samples,
+                number_of_pass * samples,
+                at_surface,
+            )
+            following = min(following + LANES, total)
+            if not at_surface:
+                continue
+        plain = hemisphere != 1 and (lambertian != 0 or not met)
+        any_vertex = not met
+        if met:
+            for lane in range(LANES):
+                if s[base + ALIVE * LANES + lane] == _f(0.0):
+                    continue
+                i = np.int64(s[base + POINT * LANES + lane])
+                if words[base + GEOM_ID * LANES + lane] == NO_HIT:
+                    see_sky(s, base, lane, sky, mode, power, value)
+                    for c in range(3):
+                        out[i, c] += value[c]
+                    s[base + ALIVE * LANES + lane] = _f(0.0)
+                    continue
+                prim = np.int64(words[base + PRIM_ID * LANES + lane])
+                if surface[prim, EMITTER] >= _f(0.0):
+                    see_emitter(s, base, lane, surface, triangle, prim, mode, power, value)
+                    if triangle[np.int64(surface[prim, EMITTER]), GLOWS] > 0.0:
+                        u = np.float64(s[base + HIT_U * LANES + lane])
+                        v = np.float64(s[base + HIT_V * LANES + lane])
+                        glow(shading, prim, u, v, value, rgba, False)
+                    for c in range(3):
+                        out[i, c] += value[c]
+                s[base + BOUNCES * LANES + lane] += _f(1.0)
+                if most_bounces >= 0 and s[base + BOUNCES * LANES + lane] > most_bounces:
+                    s[base + ALIVE * LANES + lane] = _f(0.0)
+                any_vertex = any_vertex or s[base + ALIVE * LANES + lane] > _f(0.0)
+        if not any_vertex:
+            continue
+        random_lanes(words, base, number_of_pass, salt)
+        if strata:
+            spread_lanes(words, base, net, number_of_pass, salt)
+        if met and plain:
+            fetch_lanes(s, words, base, surface, material)
+        if met and (painted or not plain):
+            for lane in range(LANES):
+                if s[base + ALIVE * LANES + lane] == _f(0.0):
+                    continue
+                prim = np.int64(words[base + PRIM_ID * LANES + lane])
+                u, v = np.float64(s[base + HIT_U * LANES + lane]), np.float64(s[base + HIT_V * LANES + lane])
+                if not plain:
+                    for a in range(3):
+                        path[GO + a, lane] = s[base + (DIR_X + a) * LANES + lane]
+                    if not arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
+                        s[base + ALIVE * LANES + lane] = _f(0.0)
+                        continue
+                if surface[prim, TEXTURED] > _f(0.0):
+                    if plain:
+                        for c in range(3):
+                            row[c, lane] = s[base + (ALBEDO + c) * LANES + lane]
+                        row[WIDTH, lane] = -1.0
+                    paint(row, lane, shading, prim, u, v, material, rgba)
+                    for c in range(3):
+                        s[base + (ALBEDO + c) * LANES + lane] = row[c, lane]
+        if plain:
+            if met:
+                arrive_lanes(s, base, _f(least))
+            else:
+                stand_lanes(s, base, _f(least))
+            if lit:
+                choose_lamps(s, words, base, every, cumulative, lamp)
+                aim_lanes(s, base, mode, power)
+        else:
+            for lane in range(LANES):
+                lamp[lane] = -1
+                if s[base + ALIVE * LANES + lane] == _f(0.0):
+                    continue
+                if not met:
+                    i, sample = (
+                        np.int64(s[base + POINT * LANES + lane]),
+                        np.int64(words[base + SAMPLE * LANES + lane]),
+                    )
+                    k = (number_of_pass * samples + sample) % places
+                    start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], True, least)
                 for c in range(3):
-                    path[BETA + c, lane] /= survive
-            stage[lane] = _RAY if alive else _IDLE
-            if not alive:
-                for c in range(3):
-                    out[job[lane] % m, c] += path[LIGHT + c, lane]
+                    path[PATH_BETA + c, lane] = s[base + (BETA + c) * LANES + lane]
+                if lit:
+                    lamp[lane] = aim_alone(
+                        path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value,
+                        way,
+                    )  # fmt: skip
+        if lit:
+            if glows:
+                for lane in range(LANES):
+                    e = lamp[lane]
+                    if s[base + ALIVE * LANES + lane] > _f(0.0) and 0 <= e < len(triangle):
+                        for c in range(3):
+                            value[c] = s[base + (VALUE + c) * LANES + lane]
+                        u, v = (
+                            np.float64(s[base + B1 * LANES + lane]),
+                            np.float64(s[base + B2 * LANES + lane]),
+                        )
+                        glow(shading, number[e], u, v, value, rgba, True)
+                        for c in range(3):
+                            s[base + (VALUE + c) * LANES + lane] = value[c]
+            shadows += cast_to_lamps(s, base, lamp, len(cumulative), bins, filled, occluded, scene, on, out)
+        if plain:
+            scatter_lanes(s, base, _f(_SURE))
+        else:
+            for lane in range(LANES):
+                if s[base + ALIVE * LANES + lane] > _f(0.0):
+                    turn_alone(path, row, lane, s, words, base, hemisphere, value)
+    for k in range(BINS):
+        if filled[k] > 0:
+            cast_packet(bins, filled, k, occluded, scene, on, out)
     return rays, shadows
-
-
-@step
-def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
-    """Return numbers of a scrambled (0,2)-net, scrambled anew for each point, pass and pair."""
-    bits = path_state(seed, number_of_pass, point, np.uint64(1) << np.uint64(40 + pair))
-    first = np.uint32(bits & np.uint64(0xFFFFFFFF))
-    second = np.uint32(bits >> np.uint64(32))
-    none = np.uint32(0)
-    return (
-        np.float64(texel_scramble(net[sample, 0], first, none)),
-        np.float64(texel_scramble(net[sample, 1], second, none)),
-    )

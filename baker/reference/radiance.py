@@ -11,9 +11,9 @@ from baker.kernels.sampling import sobol_reversed
 from baker.reference.camera import camera_rays
 from baker.reference.estimators import estimator_named
 from baker.reference.irradiance import PointEstimate, add_pass, path_setting
+from baker.reference.lanes import new_path_memory
 from baker.reference.paths import trace_paths
 from baker.reference.view import Reference
-from baker.trace.packets import new_caster
 
 _TILE = 512
 
@@ -56,19 +56,18 @@ def radiance_pass(
         picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
         return
     counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
-    eye = np.array(camera.position)
+    eye = np.array([[camera.position]])
 
     def work(begin: int, end: int) -> None:
         pixel = np.arange(begin, end)
         way = camera_rays(camera, width, height, pixel, samples, seed, number)
-        origin = np.broadcast_to(eye, way.shape).copy()
         out = np.zeros((end - begin, 3))
         cast = trace_paths(
-            origin, way, way, begin, False, reference.surfaces, reference.lamps, reference.shading,
-            new_caster(reference.rays.tracer), net, setting, out,
+            eye, way, way, begin, False, reference.surfaces, reference.lamps, reference.shading,
+            new_path_memory(reference.rays), net, setting, out,
         )  # fmt: skip
         counted[begin // _TILE] = cast
-        add_pass(estimate, pixel, out / samples)
+        add_pass(estimate, slice(begin, end), out / samples)
 
     run_tiles(width * height, _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
     estimate.rounds += 1

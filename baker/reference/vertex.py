@@ -76,6 +76,32 @@ def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
 
 
 @step
+def start_path(path, row, lane, where, toward, normal, at_surface, least):  # type: ignore[no-untyped-def]
+    """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
+
+    where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
+    """
+    for c in range(3):
+        path[BETA + c, lane] = 1.0
+        path[LIGHT + c, lane] = 0.0
+    path[DENSITY, lane] = 0.0
+    path[BOUNCES, lane] = 0.0
+    if not at_surface:
+        for a in range(3):
+            path[PLACE + a, lane] = where[a]
+            path[GO + a, lane] = toward[a]
+        path[BOUNCES, lane] = -1.0
+        return
+    for a in range(3):
+        path[NORMAL + a, lane] = normal[a]
+        row[a, lane] = 1.0
+    row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
+    place_off(path, lane, where[0], where[1], where[2], least)
+    set_frame(path, lane, toward[0], toward[1], toward[2])
+    path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
+
+
+@step
 def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v

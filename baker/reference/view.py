@@ -17,25 +17,28 @@ from baker.reference.lamps import LampTable, build_lamps
 from baker.shading.alpha import see_through
 from baker.shading.materials import Shading, resolve_materials
 from baker.trace.embree import RayScene
+from baker.trace.packets import aligned_floats
 
 # Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
 # emitter (or -1), 1 if a texture or a vertex colour changes what the material says.
 CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED = 0, 9, 18, 21, 22, 23, 24
-ROW_LENGTH = 28
+# Two cache lines.
+ROW_LENGTH = 32
 
 
 class Surfaces(NamedTuple):
     """What a path needs at a hit.
 
-    row (T, 28) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
+    row (T, 32) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
     a texture scales the last two; least float, metres: offsets are never computed from smaller coordinates;
-    lambertian int: 1 if everything reflects as Lambert.
+    lambertian int: 1 if everything reflects as Lambert; painted int: 1 if any triangle is textured.
     """
 
     row: NDArray[np.float32]
     material: NDArray[np.float32]
     least: float
     lambertian: int
+    painted: int
 
 
 @dataclass(frozen=True)
@@ -141,7 +144,7 @@ def _sphere(geometry: Geometry) -> NDArray[np.float64]:
 
 def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian: bool) -> Surfaces:
     n, material = len(geometry.triangle), geometry.material
-    row = np.zeros((n, ROW_LENGTH), np.float32)
+    row = aligned_floats(n * ROW_LENGTH).reshape(n, ROW_LENGTH)
     row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
     row[:, SHADING : SHADING + 9] = geometry.normal[geometry.triangle].reshape(n, 9)
     row[:, FACE : FACE + 3] = geometry.face_normal
@@ -156,4 +159,6 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     kinds[:, :3] = shading.base
     kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
     kinds[:, 5] = shading.reflection_texture >= 0
-    return Surfaces(row, kinds, max(1e-3 * geometry.diagonal, 1e-12), int(lambertian))
+    return Surfaces(
+        row, kinds, max(1e-3 * geometry.diagonal, 1e-12), int(lambertian), int(row[:, TEXTURED].any())
+    )

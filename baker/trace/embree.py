@@ -232,11 +232,15 @@ class RayScene:
             if library.rtcGetDeviceProperty(self._device, name):
                 width = candidate
                 break
+        return Tracer(int(self._scene), *self.functions(width), width)
+
+    def functions(self, width: int) -> tuple[int, int]:
+        """Return the addresses of rtcIntersectN and rtcOccludedN for packets of 4, 8 or 16 rays."""
         intersect, occluded = (
-            ctypes.cast(getattr(library, f"{kind}{width}"), ctypes.c_void_p).value or 0
+            ctypes.cast(getattr(self._library, f"{kind}{width}"), ctypes.c_void_p).value or 0
             for kind in ("rtcIntersect", "rtcOccluded")
         )
-        return Tracer(int(self._scene), intersect, occluded, width)
+        return intersect, occluded
 
     def close(self) -> None:
         """Release scene and device; the tracer must not be used any more."""

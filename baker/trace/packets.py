@@ -108,12 +108,16 @@ def new_caster(tracer: Tracer) -> Caster:
 
 
 def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    raw = np.zeros((ROWS + 1) * MAX_WIDTH * 4 + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    valid = raw[start : start + MAX_WIDTH * 4].view(np.int32)
-    floats = raw[start + MAX_WIDTH * 4 : start + (ROWS + 1) * MAX_WIDTH * 4].view(np.float32)
+    valid, floats = aligned_floats(MAX_WIDTH).view(np.int32), aligned_floats(ROWS * MAX_WIDTH)
     floats.view(np.uint32)[MASK * width : (MASK + 1) * width] = NO_HIT
     return valid, floats
+
+
+def aligned_floats(n: int) -> NDArray[np.float32]:
+    """Return n zeros at a multiple of 64 bytes."""
+    raw = np.zeros(4 * n + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + 4 * n].view(np.float32)
 
 
 @inner

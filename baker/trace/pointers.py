@@ -1,4 +1,4 @@
-"""Memory at an address, as compiled callbacks of Embree see it."""
+"""Memory at an address: as compiled callbacks of Embree see it, and fetched before it is needed."""
 
 from __future__ import annotations
 
@@ -20,3 +20,21 @@ def _pointer(typing_context, address):  # type: ignore[no-untyped-def]
 
 
 pointer: Any = intrinsic(_pointer)
+
+
+def _prefetch(typing_context, address):  # type: ignore[no-untyped-def]
+    """Ask for the cache line at an int64 address, to read it soon."""
+    signature = types.void(types.int64)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        byte_pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte_pointer, number, number, number])
+        function = builder.module.declare_intrinsic("llvm.prefetch", [byte_pointer], kind)
+        read, keep, data = number(0), number(3), number(1)
+        builder.call(function, [builder.inttoptr(args[0], byte_pointer), read, keep, data])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+prefetch: Any = intrinsic(_prefetch)
