@@ -119,7 +119,7 @@ def trace_blocks(s, words, blocks, on, intersect, scene, surface):  # type: igno
             n += 1 if alive else 0
             s[base + TFAR * LANES + lane] = _f(1.0e30)
             words[base + GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
-        call_embree(intersect, on.ctypes.data, scene, s.ctypes.data + 4 * base, 0)  # type: ignore[call-arg]
+        call_embree(intersect, on, scene, s[base : base + BLOCK])
         for lane in range(LANES):
             if on[lane] != 0 and words[base + GEOM_ID * LANES + lane] != NO_HIT:
                 row = surface.ctypes.data + 4 * surface.shape[1] * np.int64(

@@ -122,7 +122,7 @@ def open_rays(  # type: ignore[no-untyped-def]
                 stand_lanes(s, 0, least)
             number_lanes(words, net[sample, 0], net[sample, 1], shared)
             point_lanes(s, reach)
-            call_embree(occluded, on.ctypes.data, scene, s.ctypes.data, 0)  # type: ignore[call-arg]
+            call_embree(occluded, on, scene, s)
             count_lanes(s)
         for lane in range(lanes):
             out[group + lane, 0] += s[VALUE * LANES + lane]

@@ -93,7 +93,8 @@ def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
 
 def seed_salt(seed: int) -> int:
     """Return what makes all numbers of a seed differ from those of others."""
-    return int(hash_u32(np.uint32((seed ^ (seed >> 32)) & 0xFFFFFFFF)))
+    # An array: arithmetic on single numbers warns of overflow.
+    return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
 
 
 @step

@@ -32,7 +32,7 @@ def cast_packet(bins, filled, k, occluded, scene, on, out):  # type: ignore[no-u
     n, start = filled[k], unsigned(k * BIN_ROWS * LANES)
     for lane in range(LANES):
         on[lane] = -1 if lane < n else 0
-    call_embree(occluded, on.ctypes.data, scene, bins.ctypes.data + 4 * start, 0)  # type: ignore[call-arg]
+    call_embree(occluded, on, scene, bins[start : start + BIN_ROWS * LANES])
     for lane in range(n):
         if bins[start + TFAR * LANES + lane] >= _f(0.0):
             point = unsigned(bins[start + BIN_POINT * LANES + lane])
