@@ -75,6 +75,19 @@ def relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
     return np.asarray(error / np.maximum(mean.mean(axis=1), max(dark_floor(mean), 1e-12)), np.float64)
 
 
+def first_rays(reference: Reference, places: TexelPlaces, channels: list[str]) -> None:
+    """Cast a few rays of each kind from one texel, before any time limit runs.
+
+    On a machine's first run this compiles the kernels. That may take as long as the limit: a good bake would
+    be judged by hardly any path, and fail.
+    """
+    one = places.position[:1], places.normal[:1], places.face_normal[:1]
+    if "ao" in channels:
+        openness_pass(reference, new_estimate(1, 1), *one, distance=1.0)
+    if "irradiance" in channels:
+        irradiance_pass(reference, new_estimate(1, 3), *one, chosen=np.arange(1))
+
+
 def trace_openness(
     reference: Reference, places: TexelPlaces, distance: float, effort: Effort, progress: Progress
 ) -> PointEstimate:

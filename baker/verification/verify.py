@@ -33,6 +33,7 @@ from baker.verification.free import free_places
 from baker.verification.tracing import (
     OPENNESS_ERROR,
     Effort,
+    first_rays,
     relative_standard_error,
     standard_error,
     trace_irradiance,
@@ -187,10 +188,12 @@ def verify(
     weight = stands_for * places.surface
     baked = bake.manifest.get("settings", {})
     bounces = baked.get("bounces")
-    deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
-    effort = Effort(settings.spp, settings.target_se, deadline, settings.seed)
     with build_reference(bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads) as reference:
         places = free_places(reference, places, settings.seed)
+        report(progress, "start", 0.0, "kernels")
+        first_rays(reference, places, names)
+        deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
+        effort = Effort(settings.spp, settings.target_se, deadline, settings.seed)
         estimates: dict[str, PointEstimate] = {}
         if "ao" in names:
             reach = baked.get("ao_distance_metres")
