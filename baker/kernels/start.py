@@ -15,11 +15,14 @@ def skip_blas() -> None:
     Kernels of this process can then not use `np.dot` and `np.linalg`; a program that merely imports `baker`
     must not be changed like this.
     """
-    if "scipy" in sys.modules:
+    if "scipy.linalg" in sys.modules:
         return
-    # An entry of None makes an import fail at once.
+    # An entry of None makes an import fail at once. `import numba` loads scipy, but not its BLAS.
+    loaded = sys.modules.get("scipy")
     sys.modules["scipy"] = None  # type: ignore[assignment]
     try:
         import numba.np.arraymath  # noqa: F401
     finally:
         del sys.modules["scipy"]
+        if loaded is not None:
+            sys.modules["scipy"] = loaded

@@ -24,7 +24,9 @@ def allow_no_cache(package_file: str) -> None:
     Where the package's own cache folder can be written, which is nearly always, this looks no further. Numba
     has no setting for it: its two kinds of compiled function are told to go on.
     """
-    if os.access(Path(package_file).parent / "__pycache__", os.W_OK):
+    folder = Path(package_file).parent
+    kept = folder / "__pycache__"
+    if os.access(kept if kept.exists() else folder, os.W_OK):
         return
     from numba.core.ccallback import CFunc
     from numba.core.dispatcher import Dispatcher

@@ -9,6 +9,7 @@ import pytest
 
 SHOW = """
 import sys
+{first}
 if {skip}:
     from baker.kernels.start import skip_blas
     skip_blas()
@@ -23,8 +24,10 @@ import scipy.linalg
 """
 
 
+@pytest.mark.parametrize("first", ["", "import numba"])
 @pytest.mark.parametrize("skip", [True, False])
-def test_scipy_is_loaded_only_without_the_skip(skip):
-    shown = subprocess.run([sys.executable, "-c", SHOW.format(skip=skip)], capture_output=True, text=True)
+def test_scipy_is_loaded_only_without_the_skip(skip, first):
+    script = SHOW.format(skip=skip, first=first)
+    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert shown.returncode == 0, shown.stderr
     assert shown.stdout.strip() == str(not skip)

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+
+import pytest
+
+from baker.trace import kernel_cache
 
 # No folder can be written, as in a read-only install without a home.
 NOWHERE = """
@@ -57,3 +62,14 @@ def test_nothing_is_said_where_they_can():
 def test_other_programs_are_left_alone():
     script = NOWHERE + THEIRS
     assert said(script) == "refused"
+
+
+@pytest.mark.parametrize(("made", "writable", "changed"), [("", "package", 0), ("__pycache__", "package", 2), ("", "", 2)])
+def test_a_package_that_was_never_compiled_counts_as_writable(tmp_path, monkeypatch, made, writable, changed):
+    package = tmp_path / "package"
+    (package / made).mkdir(parents=True)
+    monkeypatch.setattr(os, "access", lambda path, mode: path.name == writable)
+    kinds = []
+    monkeypatch.setattr(kernel_cache, "_go_on", lambda kind, function: kinds.append(kind))
+    kernel_cache.allow_no_cache(str(package / "__init__.py"))
+    assert len(kinds) == changed
