@@ -51,7 +51,7 @@ def mend_flags() -> list[inspect.Parameter]:
             "repair",
             bool,
             typer.Option(
-                "--repair", help="--fix, and mend the shape of meshes (needs pip install 'baker[repair]')."
+                "--repair", help="--fix, and mend the shape of meshes (needs pip install pymeshlab)."
             ),
             False,
         ),

@@ -51,7 +51,7 @@ class Cluster:
         try:
             import distributed
         except ImportError:
-            message = "a cluster needs dask.distributed; install it with: pip install 'baker[cluster]'"
+            message = "a cluster needs dask.distributed; install it with: pip install distributed"
             raise ResourceError(message) from None
         dask: Any = distributed  # its functions carry no types
         # What happens to workers is told here, in sentences.

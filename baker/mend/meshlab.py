@@ -189,7 +189,7 @@ def _library() -> Any:
     try:
         import pymeshlab
     except ImportError:
-        message = "repairs are done by pymeshlab, which is not installed; run: pip install 'baker[repair]'"
+        message = "repairs are done by pymeshlab, which is not installed; run: pip install pymeshlab"
         raise ResourceError(message, object="pymeshlab") from None
     return pymeshlab
 
