@@ -64,7 +64,9 @@ def test_other_programs_are_left_alone():
     assert said(script) == "refused"
 
 
-@pytest.mark.parametrize(("made", "writable", "changed"), [("", "package", 0), ("__pycache__", "package", 2), ("", "", 2)])
+@pytest.mark.parametrize(
+    ("made", "writable", "changed"), [("", "package", 0), ("__pycache__", "package", 2), ("", "", 2)]
+)
 def test_a_package_that_was_never_compiled_counts_as_writable(tmp_path, monkeypatch, made, writable, changed):
     package = tmp_path / "package"
     (package / made).mkdir(parents=True)
