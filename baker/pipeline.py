@@ -46,8 +46,8 @@ from baker.radiosity.patches import build_patches
 from baker.radiosity.points import KeptPoints, keep_points
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.texels import build_texels
-from baker.shading.alpha import see_through
 from baker.shading.materials import Shading, resolve_materials
+from baker.shading.ray_tree import build_ray_tree
 from baker.trace.embree import RayScene
 from baker.unwrap.unwrap import unwrap_scene
 
@@ -188,9 +188,7 @@ def prepare(
             geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
         )
     with record.stage("ray tree"):
-        rays = RayScene(
-            geometry.position, geometry.triangle, threads=threads, see_through=see_through(shading)
-        )
+        rays = build_ray_tree(geometry, shading, threads=threads)
         emitters = build_emitters(geometry, shading)
         table = build_hit_table(geometry, texels, emitters)
     if mask is None:
@@ -378,7 +376,7 @@ def _reflected(
     with record.stage("solve"):
         weight = np.maximum(texels.area, 1e-12)
         albedo = patches.mean(texels.albedo, weight)
-        from_sky = np.pi * matrix.sky[:, None] * sky
+        from_sky = np.pi * matrix.open * sky
         direct = patches.mean(complete, weight) + from_sky
         # Direct light meets the albedo of its own texel; the sky's share is known per patch.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky

@@ -28,6 +28,7 @@ from baker.kernels.polygon_light import clear_light
 from baker.kernels.rays import lane_seeds, new_seeds
 from baker.kernels.sampling import texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
+from baker.kernels.tint import count_coloured, follow, light_kept
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR, trace_lanes
 
@@ -234,6 +235,9 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                             hidden = on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
+                        follow(caster.tint, occluded, width, on, rays, None, spare_on, spare)
+                        # Where a pane is in the way, each ray has to be asked for its colour.
+                        blocked += count_coloured(caster.tint)
                     if shading is not None:
                         for lane in range(lanes):
                             m = chosen[lane]
@@ -244,6 +248,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     for c in range(3):
                         for lane in range(LANES):
                             light = lamp[(14 + c) * LANES + lane] if on[lane] else _f(0.0)
+                            light *= light_kept(caster.tint, c, lane)
                             part[k, c * LANES + lane] += light * weight[lane]
                             part[k, (3 + c) * LANES + lane] += light * weight[LANES + lane]
         if plain and blocked == 0 and looked >= 8 * lanes and n_samples >= N_POINTS:

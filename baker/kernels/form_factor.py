@@ -13,7 +13,8 @@ import numpy as np
 
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
-from baker.trace.jit import kernel, larger, smaller
+from baker.kernels.tint import follow, light_kept
+from baker.trace.jit import inner, kernel, larger, smaller
 from baker.trace.packets import (
     DIR_X,
     DIR_Y,
@@ -27,16 +28,22 @@ from baker.trace.packets import (
     trace_lanes,
 )  # fmt: skip
 
+# Targets of rays that hit no patch.
+LOST, SKY = -1, -2
+
 
 @kernel
-def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, target, tally):  # type: ignore[no-untyped-def]
+def cast_form_factors(  # type: ignore[no-untyped-def]
+    origin, normal, table, patch, caster, begin, net, shared, target, tally, colour
+):
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
     patch : (sides * P * H * W,) int32, patch at each pixel (`hits.hit_pixel`), -1: none
     net : (R, 2) uint32
-    target : (m, R) int32 output, patch hit or -1
+    target : (m, R) int32 output, patch hit, LOST or SKY
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
+    colour : (m, R, 3) float32 output, what light along a ray is multiplied by; no rows if nothing colours it
     """
     scene, intersect, width = caster.scene, caster.intersect, caster.width
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
@@ -52,10 +59,13 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
             load_frames(rays, frame, origin, normal, group, lanes, r)
             aim_lanes(rays, words, frame, seeds, net[r, 0], net[r, 1], shared, FAR)
             trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
+            follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
+            _note_colour(caster.tint, colour, group, lanes, r)
             for lane in range(lanes):
                 p = group + lane
-                target[p, r] = -1
+                target[p, r] = LOST
                 if words[GEOM_ID * LANES + lane] == NO_HIT:
+                    target[p, r] = SKY
                     tally[begin + p, 0] += 1
                     continue
                 prim = np.int64(words[PRIM_ID * LANES + lane])
@@ -71,6 +81,15 @@ def cast_form_factors(origin, normal, table, patch, caster, begin, net, shared, 
                     tally[begin + p, 1] += 1
 
 
+@inner
+def _note_colour(tint, colour, group, lanes, r):  # type: ignore[no-untyped-def]
+    if tint is None:
+        return
+    for lane in range(lanes):
+        for c in range(3):
+            colour[group + lane, r, c] = light_kept(tint, c, lane)
+
+
 @kernel
 def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-untyped-def]
     """Write irradiance = F exitance, both (P, 3) float64."""
@@ -82,6 +101,22 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
             red += f * exitance[j, 0]
             green += f * exitance[j, 1]
             blue += f * exitance[j, 2]
+        irradiance[i, 0] = red
+        irradiance[i, 1] = green
+        irradiance[i, 2] = blue
+
+
+@kernel
+def multiply_coloured(first, column, value, tint, exitance, irradiance):  # type: ignore[no-untyped-def]
+    """Write the same where light is multiplied by `tint` (nnz, 3) float32 on its way."""
+    for i in range(len(first) - 1):
+        red = green = blue = 0.0
+        for k in range(first[i], first[i + 1]):
+            j = column[k]
+            f = value[k]
+            red += f * tint[k, 0] * exitance[j, 0]
+            green += f * tint[k, 1] * exitance[j, 1]
+            blue += f * tint[k, 2] * exitance[j, 2]
         irradiance[i, 0] = red
         irradiance[i, 1] = green
         irradiance[i, 2] = blue

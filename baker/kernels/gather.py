@@ -18,7 +18,8 @@ from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.surface import N_POINTS
-from baker.trace.jit import kernel, scratch, smaller
+from baker.kernels.tint import follow, light_kept
+from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
     DIR_Y,
@@ -93,11 +94,13 @@ def gather(  # type: ignore[no-untyped-def]
                     missed[lane] = _f(0.0)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
             trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
+            follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
             for lane in range(LANES):
                 none = words[GEOM_ID * LANES + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)
                 free = none or rays[TFAR * LANES + lane] > distance
                 part[OPEN * LANES + lane] += _f(1.0) if free else _f(0.0)
+            _add_coloured_sky(caster.tint, words, sky, missed, part)
             # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
                 pixel[lane] = -1
@@ -122,16 +125,18 @@ def gather(  # type: ignore[no-untyped-def]
                         if shading is not None and lamp[m, TEXTURED] > _f(0.0):
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
-                            part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight)
+                            kept = light_kept(caster.tint, c, lane)
+                            part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight) * kept
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             if lit:
                 for lane in range(lanes):
                     p = pixel[lane]
                     if p >= 0:
-                        part[lane] += exitance[p, 0] * inverse_pi
-                        part[LANES + lane] += exitance[p, 1] * inverse_pi
-                        part[2 * LANES + lane] += exitance[p, 2] * inverse_pi
+                        tint = caster.tint
+                        part[lane] += exitance[p, 0] * inverse_pi * light_kept(tint, 0, lane)
+                        part[LANES + lane] += exitance[p, 1] * inverse_pi * light_kept(tint, 1, lane)
+                        part[2 * LANES + lane] += exitance[p, 2] * inverse_pi * light_kept(tint, 2, lane)
             if (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(LANES):
                     for c in range(3):
@@ -149,6 +154,24 @@ def gather(  # type: ignore[no-untyped-def]
                 out[i, c] = total[c * LANES + lane] * scale
             out[i, OPEN] = total[OPEN * LANES + lane] / n_samples
             out[i, SQUARE] = squares[lane] * scale * scale
+
+
+@inner
+def _add_coloured_sky(tint, words, sky, missed, part):  # type: ignore[no-untyped-def]
+    """Add the sky's light where it passed coloured surfaces; those rays do not count as `missed`."""
+    if tint is None:
+        return
+    for lane in range(LANES):
+        if words[GEOM_ID * LANES + lane] != NO_HIT:
+            continue
+        red, green, blue = (
+            light_kept(tint, 0, lane), light_kept(tint, 1, lane), light_kept(tint, 2, lane)
+        )  # fmt: skip
+        if red != _f(1.0) or green != _f(1.0) or blue != _f(1.0):
+            missed[lane] -= _f(1.0)
+            part[DIRECT * LANES + lane] += red * sky[0]
+            part[(DIRECT + 1) * LANES + lane] += green * sky[1]
+            part[(DIRECT + 2) * LANES + lane] += blue * sky[2]
 
 
 @kernel

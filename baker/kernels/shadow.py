@@ -6,6 +6,7 @@ import numpy as np
 
 from baker.kernels.sampling import hash_u32
 from baker.kernels.surface import N_POINTS
+from baker.kernels.tint import follow, light_kept
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, ID, LANES, ORG_X, TFAR, trace_lanes
 
@@ -44,11 +45,12 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
             if not any_lane:
                 continue
             trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
+            follow(caster.tint, occluded, width, on, rays, None, spare_on, spare)
             for lane in range(lanes):
                 if on[lane] and rays[TFAR * LANES + lane] >= _f(0.0):
                     i = group + lane
                     for c in range(3):
-                        share = colour[c] * weight[i, k] / _f(N_POINTS)
+                        share = colour[c] * weight[i, k] / _f(N_POINTS) * light_kept(caster.tint, c, lane)
                         out[i, c] += share
                         out[i, 3 + c] += share
     for lane in range(LANES):

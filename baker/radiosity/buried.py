@@ -60,7 +60,7 @@ def find_buried(
         def work(begin: int, end: int) -> None:
             points = points_of(surface, mask, chosen[begin:end], wanted)
             rays[begin // _TILE] = back_face_hits(
-                *points, table, new_caster(tracer), begin, net, shared, rays_per_point, most, hits
+                *points, table, new_caster(tracer.grey()), begin, net, shared, rays_per_point, most, hits
             )
 
         run_tiles(

@@ -66,7 +66,7 @@ def gap_depth(
         points = tile_points(surface, mask, begin, end, kept)
         for share, reach in ((far, _FAR), (near, _NEAR)):
             cast[begin // TILE] += open_share(
-                *points, new_caster(tracer), begin, net, shared, np.float32(reach * side), _LOOK, share
+                *points, new_caster(tracer.grey()), begin, net, shared, np.float32(reach * side), _LOOK, share
             )
             # Whatever lies in a narrow gap lies in a wide one, too.
             if (share[begin:end] >= _OPEN).all():

@@ -147,7 +147,7 @@ def ambient_occlusion(
 
     def work(begin: int, end: int) -> Part:
         points = tile_points(surface, mask, begin, end, kept)
-        open_share(*points, new_caster(tracer), begin, net, shared, reach, 0, out)
+        open_share(*points, new_caster(tracer.grey()), begin, net, shared, reach, 0, out)
         return (out[begin:end],)
 
     def keep(begin: int, end: int, part: Part) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
-from baker.kernels.form_factor import multiply
+from baker.kernels.form_factor import multiply, multiply_coloured
 from baker.radiosity.form_factors import FormFactorMatrix
 
 STAGE = "solve"
@@ -89,7 +89,11 @@ def solve_radiosity(
 def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return F exitance, (P, 3) float64: the irradiance that patches of that exitance give each other."""
     irradiance = np.zeros_like(exitance)
-    multiply(matrix.first, matrix.column, matrix.value, np.ascontiguousarray(exitance), irradiance)
+    rows, exitance = (matrix.first, matrix.column, matrix.value), np.ascontiguousarray(exitance)
+    if matrix.tint is None:
+        multiply(*rows, exitance, irradiance)
+    else:
+        multiply_coloured(*rows, matrix.tint, exitance, irradiance)
     return irradiance
 
 
@@ -143,12 +147,16 @@ def energy_audit(
     -------
     dict
         emitted: arriving at surfaces straight from lights; absorbed: by surfaces, black backs
-        included; escaped: reflected out of the scene. emitted = absorbed + escaped up to the
+        and panes included; escaped: reflected out of the scene. emitted = absorbed + escaped up to the
         solver's residual and the balance of the matrix's rows.
     """
     flux = area[:, None] / 3.0
     leaving = reflected + albedo * indirect
-    escaped = float((flux * leaving * matrix.sky[:, None]).sum())
-    backs = float((flux * leaving * matrix.lost[:, None]).sum())
+    escaped = float((flux * leaving * matrix.open).sum())
+    lost = matrix.lost[:, None] + (matrix.sky[:, None] - matrix.open)
+    if matrix.tint is not None:
+        # Light that a coloured surface took out is in no patch's irradiance.
+        lost = lost + matrix.row_sums()[:, None] - apply(matrix, np.ones_like(leaving))
+    backs = float((flux * leaving * lost).sum())
     absorbed = float((flux * (direct + indirect - leaving)).sum()) + backs
     return {"emitted": float((flux * direct).sum()), "absorbed": absorbed, "escaped": escaped}

@@ -104,16 +104,23 @@ class Tracer(NamedTuple):
         Addresses of rtcIntersectN and rtcOccludedN.
     width : int
         N, the widest packet this CPU traces natively.
+    tint : int or None
+        RTCScene of the triangles that colour what they let through, None if there are none.
     """
 
     scene: int
     intersect: int
     occluded: int
     width: int
+    tint: int | None = None
+
+    def grey(self) -> Tracer:
+        """Return the same for rays that ask only whether and where they end."""
+        return self._replace(tint=None)
 
 
 class SeeThrough(NamedTuple):
-    """Triangles of which a function decides, hit by hit, whether they block.
+    """Triangles of whose hits a function is told, and decides whether they count.
 
     Attributes
     ----------
@@ -146,6 +153,8 @@ class RayScene:
         Threads of the tree's build; 0 means all.
     see_through : SeeThrough, optional
         A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
+    tint : SeeThrough, optional
+        Some of these triangles, which also form a tree of their own: `tracer.tint`.
 
     Raises
     ------
@@ -161,20 +170,21 @@ class RayScene:
         robust: bool = True,
         threads: int = 0,
         see_through: SeeThrough | None = None,
+        tint: SeeThrough | None = None,
     ) -> None:
         library = _library()
         self._library = library
-        self._see_through = see_through
+        self._owners = see_through, tint
         n = len(position)
         # Row n belongs to triangles that a geometry leaves out: Embree skips those with a vertex that is no
         # number. It reads 16 bytes from each vertex: one spare row keeps the last read inside.
         self._position = np.zeros((n + (1 if see_through is None else 2), 3), np.float32)
         self._position[:n] = position
-        self._triangles = [np.ascontiguousarray(triangle, np.uint32)]
+        whole = np.ascontiguousarray(triangle, np.uint32)
+        self._triangles = [whole]
         if see_through is not None:
             self._position[n] = np.nan
             chosen = see_through.chosen[:, None]
-            whole = self._triangles[0]
             self._triangles = [np.where(left_out, np.uint32(n), whole) for left_out in (chosen, ~chosen)]
         config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
         self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
@@ -182,19 +192,32 @@ class RayScene:
             raise ResourceError(
                 f"Embree could not start: {_ERRORS.get(library.rtcGetDeviceError(None), 'unknown')}"
             )
-        self._scene = library.rtcNewScene(self._device)
+        self._scenes: list[int] = []
         if int(library.rtcGetDeviceProperty(self._device, _PROPERTY_VERSION)) // 10000 != 4:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
-        library.rtcSetSceneFlags(self._scene, _SCENE_ROBUST if robust else 0)
-        library.rtcSetSceneBuildQuality(self._scene, _QUALITY_MEDIUM)
-        if len(triangle):
-            for indices, see in zip(self._triangles, (None, see_through), strict=False):
-                self._add_triangles(indices, see)
-        library.rtcCommitScene(self._scene)
+        parts = zip(self._triangles, (None, see_through), strict=False) if len(triangle) else ()
+        scene = self._add_scene(list(parts), robust)
+        tinted = None
+        if tint is not None:
+            self._triangles.append(np.where(tint.chosen[:, None], whole, np.uint32(n)))
+            tinted = self._add_scene([(self._triangles[-1], tint)], robust)
         self._check("building the ray tree")
-        self.tracer = self._tracer()
+        self.tracer = self._tracer(scene, tinted)
 
-    def _add_triangles(self, triangle: NDArray[np.uint32], see_through: SeeThrough | None) -> None:
+    def _add_scene(self, parts: list[tuple[NDArray[np.uint32], SeeThrough | None]], robust: bool) -> int:
+        library = self._library
+        scene = int(library.rtcNewScene(self._device))
+        self._scenes.append(scene)
+        library.rtcSetSceneFlags(scene, _SCENE_ROBUST if robust else 0)
+        library.rtcSetSceneBuildQuality(scene, _QUALITY_MEDIUM)
+        for indices, see in parts:
+            self._add_triangles(scene, indices, see)
+        library.rtcCommitScene(scene)
+        return scene
+
+    def _add_triangles(
+        self, scene: int, triangle: NDArray[np.uint32], see_through: SeeThrough | None
+    ) -> None:
         library = self._library
         geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
         library.rtcSetSharedGeometryBuffer(
@@ -215,7 +238,7 @@ class RayScene:
             library.rtcSetGeometryIntersectFilterFunction(geometry, see_through.function)
             library.rtcSetGeometryOccludedFilterFunction(geometry, see_through.function)
         library.rtcCommitGeometry(geometry)
-        library.rtcAttachGeometry(self._scene, geometry)
+        library.rtcAttachGeometry(scene, geometry)
         library.rtcReleaseGeometry(geometry)
 
     def _check(self, what: str) -> None:
@@ -225,14 +248,14 @@ class RayScene:
         if code:
             raise ResourceError(f"Embree failed while {what}: {_ERRORS.get(code, code)}")
 
-    def _tracer(self) -> Tracer:
+    def _tracer(self, scene: int, tint: int | None) -> Tracer:
         library = self._library
         width = 4
         for candidate, name in ((16, _PROPERTY_RAY16), (8, _PROPERTY_RAY8)):
             if library.rtcGetDeviceProperty(self._device, name):
                 width = candidate
                 break
-        return Tracer(int(self._scene), *self.functions(width), width)
+        return Tracer(scene, *self.functions(width), width, tint)
 
     def functions(self, width: int) -> tuple[int, int]:
         """Return the addresses of rtcIntersectN and rtcOccludedN for packets of 4, 8 or 16 rays."""
@@ -245,7 +268,8 @@ class RayScene:
     def close(self) -> None:
         """Release scene and device; the tracer must not be used any more."""
         if self._device:
-            self._library.rtcReleaseScene(self._scene)
+            for scene in self._scenes:
+                self._library.rtcReleaseScene(scene)
             self._library.rtcReleaseDevice(self._device)
             self._device = None
 

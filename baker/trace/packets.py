@@ -32,28 +32,49 @@ MAX_WIDTH = 16
 # Rays that the kernels of a bake handle together.
 LANES = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
+# Words of what the filter function of coloured triangles finds: context, `Tint.stop`, `Tint.colour`.
+TINT_STOP, TINT_COLOUR, CONTEXT_WORDS = 16, 16 + LANES, 16 + 4 * LANES
+
+
+def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
+    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`; without the last Embree takes its own."""
+    byte_pointer = ir.IntType(8).as_pointer()
+    function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
+    function = builder.inttoptr(args[0], function_type.as_pointer())
+    data = [
+        builder.bitcast(context.make_array(kinds[k])(context, builder, args[k]).data, byte_pointer)
+        for k in (1, *range(3, len(args)))
+    ]
+    scene_pointer = builder.inttoptr(args[2], byte_pointer)
+    arguments = data[2] if len(data) > 2 else byte_pointer(None)
+    builder.call(function, [data[0], scene_pointer, data[1], arguments])
+    return context.get_dummy_value()
 
 
 def _call_embree(typing_context, address, valid, scene, ray):  # type: ignore[no-untyped-def]
-    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)` at an address; valid, ray: arrays."""
+    """Call the function at an address for a scene and the lanes of a packet; valid, ray: arrays."""
     signature = types.void(types.int64, valid, types.int64, ray)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        byte_pointer = ir.IntType(8).as_pointer()
-        function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
-        function = builder.inttoptr(args[0], function_type.as_pointer())
-        valid_data, ray_data = (
-            builder.bitcast(context.make_array(sig.args[k])(context, builder, args[k]).data, byte_pointer)
-            for k in (1, 3)
-        )
-        scene_pointer = builder.inttoptr(args[2], byte_pointer)
-        builder.call(function, [valid_data, scene_pointer, ray_data, byte_pointer(None)])
-        return context.get_dummy_value()
+        return _call(context, builder, sig.args, args)
 
     return signature, codegen
 
 
 call_embree: Any = intrinsic(_call_embree)
+
+
+def _call_embree_with(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
+    """Do the same with arguments that an array holds."""
+    signature = types.void(types.int64, valid, types.int64, ray, arguments)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _call(context, builder, sig.args, args)
+
+    return signature, codegen
+
+
+call_embree_with: Any = intrinsic(_call_embree_with)
 
 
 def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-untyped-def]
@@ -75,12 +96,28 @@ def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-un
 copy_four: Any = intrinsic(_copy_four)
 
 
+class Tint(NamedTuple):
+    """What tells the colour of light along rays; each thread has its own.
+
+    scene : int, see `Tracer.tint`
+    arguments : (5,) int64, RTCOccludedArguments; they hand `stop` and `colour` to the tree's filter function
+    stop : (16,) uint32, triangle at which each of sixteen rays ends: it lets nothing through
+    colour : (3 * 16,) float32, what RGB is multiplied by
+    """
+
+    scene: int
+    arguments: NDArray[np.int64]
+    stop: NDArray[np.uint32]
+    colour: NDArray[np.float32]
+
+
 class Caster(NamedTuple):
     """A tracer with the memory of one packet; each thread has its own.
 
     scene, intersect, occluded, width: see `Tracer`; valid (16,) int32, -1 for lanes to trace;
     floats (21 * 16,) float32 and words, the same memory as uint32: a packet of the native width.
     lane_valid, lane_floats, lane_words: the same for sixteen rays, rows 16 numbers apart.
+    tint: None if nothing colours light; Numba then compiles kernels without it.
     """
 
     scene: int
@@ -93,6 +130,7 @@ class Caster(NamedTuple):
     lane_valid: NDArray[np.int32]
     lane_floats: NDArray[np.float32]
     lane_words: NDArray[np.uint32]
+    tint: Tint | None = None
 
 
 def new_caster(tracer: Tracer) -> Caster:
@@ -103,8 +141,23 @@ def new_caster(tracer: Tracer) -> Caster:
     valid, floats = _packet_memory(tracer.width)
     lane_valid, lane_floats = _packet_memory(LANES)
     return Caster(
-        *tracer, valid, floats, floats.view(np.uint32), lane_valid, lane_floats, lane_floats.view(np.uint32)
+        *tracer[:4],
+        *(valid, floats, floats.view(np.uint32)),
+        *(lane_valid, lane_floats, lane_floats.view(np.uint32)),
+        None if tracer.tint is None else new_tint(tracer.tint),
     )
+
+
+def new_tint(scene: int) -> Tint:
+    """Return the memory that one thread needs to find the colour of light, for `Tracer.tint`."""
+    # RTCRayQueryContext (without instances), and what the filter function finds behind it.
+    memory = aligned_floats(CONTEXT_WORDS)
+    words = memory.view(np.uint32)
+    words[:TINT_STOP] = NO_HIT
+    # RTCOccludedArguments: no flags and all features (32 bits each), context, no functions of its own.
+    arguments = np.array([0xFFFFFFFF << 32, 0, 0, 0, 0], np.uint64).view(np.int64)
+    arguments[1] = memory.ctypes.data
+    return Tint(scene, arguments, words[TINT_STOP:TINT_COLOUR], memory[TINT_COLOUR:])
 
 
 def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
@@ -57,6 +59,42 @@ def test_the_answer_is_that_of_a_dense_solve(albedo, openness):
     np.testing.assert_allclose(solution.irradiance / scale, truth / scale, rtol=2e-3, atol=2e-4)
     assert solution.residual < 20 * TOLERANCE
     assert 0 <= solution.iterations < 60
+
+
+def coloured(matrix, rng):
+    """The same matrix with a colour for each pair, and one for the sky; and it as (3, n, n)."""
+    n = len(matrix.first) - 1
+    shared = rng.random((n, n, 3))
+    shared = (shared + shared.transpose(1, 0, 2)) / 2
+    row = np.repeat(np.arange(n), np.diff(matrix.first))
+    tint = np.float32(shared[row, matrix.column])
+    dense = np.zeros((3, n, n))
+    dense[:, row, matrix.column] = (matrix.value[:, None] * tint).T
+    return replace(matrix, tint=tint, sky_tint=np.float32(rng.random((n, 3)))), dense
+
+
+@pytest.mark.parametrize("bounces", [None, 3])
+def test_coloured_light_between_patches_is_a_solve_for_each_colour(bounces):
+    matrix, _, area, rng = room(50, 7, 0.2)
+    matrix, dense = coloured(matrix, rng)
+    albedo, source = rng.random((50, 3)), rng.random((50, 3))
+    solution = solve_radiosity(matrix, source, albedo, area, bounces=bounces, progress=silent)
+    for c in range(3):
+        step = dense[c] * albedo[:, c]
+        truth = dense[c] @ source[:, c]
+        if bounces is None:
+            truth = np.linalg.solve(np.eye(50) - step, truth)
+        else:
+            truth = truth + step @ truth
+        np.testing.assert_allclose(solution.irradiance[:, c], truth, rtol=2e-3, atol=2e-4)
+    if bounces is None:
+        # Light that nothing lets out or in goes into surfaces and what colours it on its way.
+        direct = source / albedo
+        energy = energy_audit(matrix, area, direct, source, solution.irradiance, albedo)
+        leaving = source + albedo * solution.irradiance
+        share = matrix.sky[:, None] * matrix.sky_tint
+        assert energy["escaped"] == pytest.approx((area[:, None] * leaving * share).sum() / 3, rel=1e-5)
+        assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-4)
 
 
 def test_the_residual_is_what_it_says():

@@ -1,0 +1,122 @@
+"""The colour that light takes on where it passes BLEND surfaces.
+
+    T = (1 - a) lerp(1, c, a)
+
+is what a surface of alpha a and colour c lets through. Whether a ray passes is decided at the hit, with
+probability 1 - a (`alpha_filter`); one that passed is multiplied by lerp(1, c, a) here. Embree asks about
+hits in no particular order, also about some behind the end of a ray: so the surfaces that colour light are a
+tree of their own, through which a second ray follows the first one as far as that got.
+
+c = factor * texture(base uv) * vertex colour, each of its parts between 0 and 1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.alpha import ALPHA, TEXTURE, UV
+from baker.kernels.textures import sample_texture
+from baker.trace.jit import inner, larger, smaller
+from baker.trace.packets import (
+    DIR_Z,
+    GEOM_ID,
+    ID,
+    LANES,
+    NO_HIT,
+    PRIM_ID,
+    TFAR,
+    call_embree_with,
+    copy_four,
+)  # fmt: skip
+
+_f = np.float32
+# Columns of a row: as of `alpha`, then factor times vertex colour at corner 0 and what corners 1 and 2 add
+# to it (3 each).
+COLOUR = 11
+ROW_LENGTH = 20
+
+
+class TintTable(NamedTuple):
+    """The K triangles that colour light.
+
+    slot (T,) int32, row of each triangle of the scene or -1; row (K, 20) float32, see the column names.
+    """
+
+    slot: NDArray[np.int32]
+    row: NDArray[np.float32]
+
+
+@inner
+def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
+    """Write lerp(1, c, a) of row k at barycentrics to `out` (3,); pack: TexturePack; rgba (4,): memory."""
+    rgba[0] = rgba[1] = rgba[2] = rgba[3] = 1.0
+    if row[k, TEXTURE] >= _f(0.0):
+        u = np.float64(row[k, UV]) + b1 * row[k, UV + 2] + b2 * row[k, UV + 4]
+        v = np.float64(row[k, UV + 1]) + b1 * row[k, UV + 3] + b2 * row[k, UV + 5]
+        sample_texture(pack, np.int64(row[k, TEXTURE]), u, v, 0.0, rgba)
+    alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA + 1] + b2 * row[k, ALPHA + 2]
+    alpha = smaller(larger(alpha * rgba[3], 0.0), 1.0)
+    for c in range(3):
+        colour = np.float64(row[k, COLOUR + c])
+        colour += b1 * row[k, COLOUR + 3 + c] + b2 * row[k, COLOUR + 6 + c]
+        out[c] = 1.0 - alpha * (1.0 - smaller(larger(colour * rgba[c], 0.0), 1.0))
+
+
+@inner
+def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Find what the light of sixteen rays is multiplied by, see `light_kept`; for tint None: nothing to do.
+
+    tint, width : of a caster; function : its `occluded`
+    on, rays : (16,) int32 and (21 * 16,) float32, the lanes as they were traced
+    hits : `rays` as uint32 if they were traced to their first hit, None if to any
+    spare_on, spare : packet memory of the native width
+    """
+    if tint is None:
+        return
+    stop, colour, scene, arguments = tint.stop, tint.colour, tint.scene, tint.arguments
+    words = spare.view(np.uint32)
+    for lane in range(LANES):
+        stop[lane] = NO_HIT
+        if hits is not None and hits[GEOM_ID * LANES + lane] != NO_HIT:
+            # Where the ray ends no light passed.
+            stop[lane] = hits[PRIM_ID * LANES + lane]
+    for j in range(3 * LANES):
+        colour[j] = _f(1.0)
+    for first in range(0, LANES, width):
+        some = False
+        for lane in range(width):
+            spare_on[lane] = on[first + lane]
+            some = some or on[first + lane] != 0
+        if not some:
+            continue
+        for to in range(0, width, 4):
+            for row in range(DIR_Z + 1):
+                copy_four(spare, row * width + to, rays, row * LANES + first + to)
+            copy_four(spare, TFAR * width + to, rays, TFAR * LANES + first + to)
+        for lane in range(width):
+            words[ID * width + lane] = np.uint32(first + lane)
+        # No hit counts, so every surface up to the ray's end is asked: the filter function multiplies.
+        call_embree_with(function, spare_on, scene, spare, arguments)
+
+
+@inner
+def light_kept(tint, c, lane):  # type: ignore[no-untyped-def]
+    """Return the share of channel c that the light along a lane's ray kept, after `follow`."""
+    if tint is None:
+        return _f(1.0)
+    return tint.colour[c * LANES + lane]
+
+
+@inner
+def count_coloured(tint):  # type: ignore[no-untyped-def]
+    """Count the colours that lost some of their light, after `follow`; no ray lost any if that is 0."""
+    if tint is None:
+        return 0
+    colour = tint.colour
+    found = 0
+    for j in range(3 * LANES):
+        found += 1 if colour[j] != _f(1.0) else 0
+    return found

@@ -1,0 +1,27 @@
+"""The ray tree of a scene, with what lets light through."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from baker.core.geometry import Geometry
+from baker.shading.alpha import see_through
+from baker.shading.tint import tint
+from baker.trace.embree import RayScene
+
+
+def build_ray_tree(geometry: Geometry, shading: Any, *, threads: int) -> RayScene:
+    """Return the tree of all triangles.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    shading : Shading
+        Materials as kernels see them.
+    threads : int
+        Threads of the build; 0 means all.
+    """
+    passing, colouring = see_through(shading), tint(shading)
+    return RayScene(
+        geometry.position, geometry.triangle, threads=threads, see_through=passing, tint=colouring
+    )

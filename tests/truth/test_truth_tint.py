@@ -1,0 +1,138 @@
+"""Light behind coloured panes: T = (1 - a) lerp(1, c, a), from every kind of light and in all bounces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closed_forms import point_irradiance
+from scenes import SceneBuilder, form_factors
+from test_truth_alpha import floor_under
+
+from baker.core.scene import Texture
+
+COLOUR = np.array([1.0, 0.5, 0.0])
+HALF = 0.5
+LAMP = (0.0, 2.0, 0.0)
+
+
+def glass(builder, colour=COLOUR, alpha=HALF, *, rgba=None):
+    """Add a two-sided BLEND material; `rgba` (H, W, 4) is a linear texture."""
+    number = builder.material(0.0, double_sided=True)
+    texture = None if rgba is None else Texture(np.float32(rgba), wrap=("clamp", "clamp"))
+    builder.materials[number] = replace(
+        builder.materials[number],
+        base_colour=(*colour, alpha),
+        base_colour_texture=texture,
+        alpha_mode="BLEND",
+    )
+    return number
+
+
+def pane(colour=COLOUR, alpha=HALF, **settings):
+    return lambda builder: glass(builder, colour, alpha, **settings)
+
+
+def passed(colour, alpha):
+    """What a surface lets through: the share 1 - alpha, mixed with its colour by alpha."""
+    return (1 - alpha) * (1 - alpha + alpha * np.asarray(colour))
+
+
+@pytest.mark.parametrize("panes", [[(COLOUR, 0.5)], [(COLOUR, 0.5), ((0.2, 0.4, 1.0), 0.25)]])
+def test_each_pane_multiplies_the_light_of_a_lamp(panes):
+    builder, floor = floor_under(*[pane(*p) for p in panes], light="point", position=LAMP)
+    found = floor.values(builder.bake(bounces=0))
+    truth = floor.texel_mean(lambda p: point_irradiance(LAMP, p, (0, 1, 0)))[..., None]
+    share = np.prod([passed(*p) for p in panes], axis=0)
+    # Whether a ray passes is chance, 16 of them a texel; what it keeps of its colours is not.
+    chance = np.prod([1 - alpha for _, alpha in panes])
+    lit = found[..., 0] > 0
+    assert lit.mean() > 0.99
+    assert np.allclose(found[lit] / found[lit][:, :1], share / share[0], rtol=1e-5)
+    error = share * np.sqrt((1 - chance) / chance / found[..., 0].size / 16)
+    assert (abs((found / truth).mean(axis=(0, 1)) - share) < 4 * error).all()
+
+
+@pytest.mark.parametrize("light", ["lamp", "sun"])
+def test_every_kind_of_light_is_coloured(light):
+    def mean(*panes):
+        kind = "directional" if light == "sun" else ""
+        builder, floor = floor_under(*panes, light=kind, direction=(0, -1, 0))
+        if light == "lamp":
+            builder.quad((-1, 1, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 5.0), (8, 8))
+        return floor.values(builder.bake(bounces=0)).mean(axis=(0, 1))
+
+    assert mean(pane()) / mean() == pytest.approx(passed(COLOUR, HALF), rel=0.01)
+
+
+def test_a_lamp_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_a_free_one():
+    """Of 256 rays all pass as a rule; each has to be asked for its colour nevertheless."""
+    builder, floor = floor_under(pane((1.0, 0.0, 0.0), 1 / 1024), light="")
+    builder.quad((-1, 1, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 5.0), (8, 8))
+    found = floor.values(builder.bake(bounces=0, samples=64))
+    np.testing.assert_allclose(found[..., 1] / found[..., 0], 1 - 1 / 1024, rtol=1e-5)
+
+
+def test_what_is_not_there_colours_nothing():
+    def baked(make):
+        builder, _ = floor_under(make, light="point", position=LAMP)
+        return builder.bake(samples=16, sky=(1.0, 1.0, 1.0)).lightmaps["irradiance"].value.tobytes()
+
+    black, white = np.zeros((4, 4, 4)), np.ones((4, 4, 4))
+    white[..., 3] = 0
+    assert baked(pane((1, 1, 1), 1.0, rgba=black)) == baked(pane((1, 1, 1), 1.0, rgba=white))
+
+
+def test_transparent_black_beside_stained_glass():
+    """A texture half opaque red of alpha 0.5, half transparent black: only the red half colours."""
+    rgba = np.zeros((64, 64, 4))
+    rgba[:, 32:] = 1.0, 0.0, 0.0, 0.5
+    builder, floor = floor_under(pane((1, 1, 1), 1.0, rgba=rgba), direction=(0, -1, 0))
+    found = floor.values(builder.bake(bounces=0))
+    # Columns of the floor and of the texture run along z; the pixels in between are blended over one of 64.
+    assert (found[:, :19] == 1).all()
+    assert found[:, 21:].mean(axis=(0, 1)) == pytest.approx(passed((1, 0, 0), 0.5), rel=0.01)
+
+
+def room_with_a_pane(colour=COLOUR, albedo=0.7):
+    """A closed room, 8 x 8 texels a wall, cut in two by glass where texels of the walls meet."""
+    builder = SceneBuilder(64)
+    builder.box((-1, -1, -1), (1, 1, 1), builder.material(albedo), 8, inward=True)
+    builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), glass(builder, colour), (8, 8))
+    return builder
+
+
+def test_exchange_through_a_pane_is_reciprocal_in_each_colour():
+    builder = room_with_a_pane()
+    world, patches, matrix = form_factors(builder)
+    row = np.repeat(np.arange(patches.n), np.diff(matrix.first))
+    flux = np.zeros((3, patches.n, patches.n))
+    for c in range(3):
+        flux[c, row, matrix.column] = patches.area[row] * matrix.value * matrix.tint[:, c]
+    np.testing.assert_allclose(flux, flux.transpose(0, 2, 1), rtol=1e-5)
+    # Texels of the walls lie above or below the pane; light from one half to the other passed it once.
+    high = world.texels.position[:, 1][patches.member[patches.first[:-1]]]
+    wall = abs(high) > 0.01
+    across = wall[row] & wall[matrix.column] & (high[row] * high[matrix.column] < 0)
+    assert across.sum() > 1000
+    np.testing.assert_allclose(
+        matrix.tint[across], np.tile(1 - HALF * (1 - COLOUR), (across.sum(), 1)), rtol=1e-5
+    )
+    assert (matrix.tint[~across] == 1).all()
+
+
+def test_no_light_is_lost_but_in_walls_and_panes():
+    builder = room_with_a_pane()
+    builder.light("point", 10.0, position=(0.0, 0.5, 0.0))
+    energy = builder.bake(samples=64).solve["energy"]
+    assert energy["absorbed"] == pytest.approx(energy["emitted"], rel=1e-3)
+    assert energy["escaped"] == 0
+
+
+def test_same_bytes_on_any_number_of_threads():
+    builder = room_with_a_pane()
+    builder.light("point", 1.0, position=(0.2, 0.5, 0.1))
+    builder.quad((-0.2, 0.9, -0.2), (0.4, 0, 0), (0, 0, 0.4), builder.material(0.0, 5.0), (4, 4))
+    maps = [builder.bake(threads=n, samples=16, sky=(1.0, 1.0, 1.0)).lightmaps for n in (1, 2)]
+    assert maps[0]["irradiance"].value.tobytes() == maps[1]["irradiance"].value.tobytes()
