@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from baker.reference.bidirectional_lamps import aim_both_ways, meet_emitter, meet_sky, start_at_lamp
 from baker.reference.bidirectional_weights import (
@@ -37,7 +36,6 @@ from baker.reference.bidirectional_weights import (
 from baker.reference.bsdf import N_PARAMETERS, bsdf_sample
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.randomness import draw, path_state, stratum
-from baker.reference.step import step
 from baker.reference.vertex import (
     BETA,
     BOUNCES,
@@ -56,6 +54,7 @@ from baker.reference.vertex import (
     start_path,
 )
 from baker.reference.view import EMITTER, TEXTURED
+from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
@@ -63,9 +62,17 @@ _IDLE, _RAY, _VERTEX = 0, 1, 2
 _SURE = 3
 _MOST = 0.98
 _SHORT = 0.9999
+# Working memory of a tile; kept vertices stand in column (vertex * MAX_WIDTH + lane).
+_new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
+_new_row, _new_kept_row = (scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
+_new_numbers, _new_state, _new_flags, _new_first = (
+    scratch((MAX_WIDTH,), kind) for kind in (np.int64, np.uint64, np.bool_, np.float64)
+)
+_new_value, _new_rgba, _new_way, _new_spot = (scratch((n,), np.float64) for n in (3, 4, 6, 2))
+_new_values = scratch((3, MAX_WIDTH), np.float64)
 
 
-@step
+@inner
 def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, least):  # type: ignore[no-untyped-def]
     """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
     at_surface = n_subpaths == 0.0
@@ -81,7 +88,7 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, lea
         path[OPEN, lane] = n_subpaths
 
 
-@step
+@inner
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ignore[no-untyped-def]
     """Choose the direction in which a subpath goes on; return False where it ends.
 
@@ -124,7 +131,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ign
     return most > 0.0
 
 
-@step
+@inner
 def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: ignore[no-untyped-def]
     """Connect an eye subpath's end to vertex k of `kept`, the s-th of a lamp's; return if that brings light.
 
@@ -159,7 +166,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: 
     return total > 0.0
 
 
-@step
+@inner
 def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-untyped-def]
     """Connect a lamp's subpath to the camera; return the pixel it is seen through, or -1.
 
@@ -193,7 +200,7 @@ def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-un
     return pixel if total > 0.0 else -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def trace_both_ways(  # type: ignore[no-untyped-def]
     where, toward, normal, begin, camera, n_subpaths, surfaces, lamps, shading, sphere, caster, net, how, out,
     splat_pixel, splat,
@@ -230,20 +237,15 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
     if most_bounces >= 0:
         most_kept = min(MOST_FROM_LAMP, most_bounces + (2 if n_subpaths > 0.0 else 1))
     lit = cumulative[len(cumulative) - 1] > 0.0
-    path = np.zeros((N_ROWS_BOTH, MAX_WIDTH))
-    row = np.zeros((N_PARAMETERS, MAX_WIDTH))
-    kept = np.zeros((N_ROWS_BOTH, MOST_FROM_LAMP * MAX_WIDTH))
-    kept_row = np.zeros((N_PARAMETERS, MOST_FROM_LAMP * MAX_WIDTH))
+    path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
     # Vertices of the lane's subpath from a lamp, the lamp among them.
-    count = np.zeros(MAX_WIDTH, np.int64)
-    eye = np.zeros(MAX_WIDTH, np.bool_)
-    first = np.zeros(MAX_WIDTH)
-    value, spare, way, rgba, spot = np.zeros(3), np.zeros(3), np.zeros(6), np.zeros(4), np.zeros(2)
-    values = np.zeros((3, MAX_WIDTH))
-    pixel = np.zeros(MAX_WIDTH, np.int64)
-    stage = np.zeros(MAX_WIDTH, np.int64)
-    job = np.full(MAX_WIDTH, -1)
-    state = np.zeros(MAX_WIDTH, np.uint64)
+    count = _new_numbers()
+    eye, first = _new_flags(), _new_first()
+    value, spare, way, rgba, spot = _new_value(), _new_value(), _new_way(), _new_rgba(), _new_spot()
+    values, state = _new_values(), _new_state()
+    pixel, stage, job = _new_numbers(), _new_numbers(), _new_numbers()
+    for lane in range(MAX_WIDTH):
+        job[lane] = -1
     samples, m, places = len(net), where.shape[0], where.shape[1]
     following = rays = shadows = splats = 0
     while True:

@@ -44,22 +44,22 @@ from baker.reference.lamps import (
     spot_share,
 )
 from baker.reference.lamps import NORMAL as LAMP_NORMAL
-from baker.reference.step import step
 from baker.reference.vertex import BETA, DENSITY, GO, NORMAL, PLACE, place_off
+from baker.trace.jit import inner
 
 _INV_4_PI = 0.25 / math.pi
 # Shadow rays end this share of their way before the goal.
 _SHORT = 0.9999
 
 
-@step
+@inner
 def turned(nx, ny, nz, a, b, c):  # type: ignore[no-untyped-def]
     """Return direction (a, b, c) of the frame around the unit normal n, in world space."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     return a * tx + b * bx + c * nx, a * ty + b * by + c * ny, a * tz + b * bz + c * nz
 
 
-@step
+@inner
 def spread(point, e):  # type: ignore[no-untyped-def]
     """Return the density per steradian of directions that start at point or spot light e."""
     if point[e, KIND] == 1.0:
@@ -67,7 +67,7 @@ def spread(point, e):  # type: ignore[no-untyped-def]
     return _INV_4_PI
 
 
-@step
+@inner
 def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, choice, u, w, a, b, spot):  # type: ignore[no-untyped-def]
     """Begin a path at a lamp, ready for its first ray; choice, u, w, a, b : uniform numbers.
 
@@ -156,7 +156,7 @@ def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, c
     return lamp
 
 
-@step
+@inner
 def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):  # type: ignore[no-untyped-def]
     """Put the start of parallel light of direction d on a disc in front of everything."""
     radius = sphere[3]
@@ -172,7 +172,7 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):  # type: ignore[no-unty
     path[LEAVE, lane] = 1.0
 
 
-@step
+@inner
 def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, choice, u, w, value, way):  # type: ignore[no-untyped-def]
     """Aim at one lamp from an eye subpath's end; see `vertex.aim`, whose arguments and answer these are.
 
@@ -230,7 +230,7 @@ def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, cho
     return lamp if value[0] + value[1] + value[2] > 0.0 else -1
 
 
-@step
+@inner
 def lamp_cosine(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return the cosine at emitter e of a ray of unit direction d; below 0 if it meets the dark side."""
     cosine = -(
@@ -239,13 +239,13 @@ def lamp_cosine(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
     return abs(cosine) if triangle[e, TWO_SIDED] > 0.0 else cosine
 
 
-@step
+@inner
 def emission_density(triangle, e):  # type: ignore[no-untyped-def]
     """Return the density per steradian and cosine of directions that start on emitter e."""
     return INV_PI * (0.5 if triangle[e, TWO_SIDED] > 0.0 else 1.0)
 
 
-@step
+@inner
 def meet_emitter(path, lane, triangle, e, seen, value):  # type: ignore[no-untyped-def]
     """Write to `value` (3,) what emitter e, which the eye's subpath has met, sends along the path, weighed.
 
@@ -265,7 +265,7 @@ def meet_emitter(path, lane, triangle, e, seen, value):  # type: ignore[no-untyp
         value[c] = path[BETA + c, lane] * triangle[e, RADIANCE + c] * weight
 
 
-@step
+@inner
 def meet_sky(path, lane, sky, sphere, seen, value):  # type: ignore[no-untyped-def]
     """Do the same for the sky, where the path leaves the scene."""
     weight = 1.0

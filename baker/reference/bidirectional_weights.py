@@ -21,8 +21,8 @@ from __future__ import annotations
 import math
 
 from baker.reference.bsdf import INV_PI, WIDTH, bsdf_cosines, cosines_pdf
-from baker.reference.step import step
 from baker.reference.vertex import DENSITY, GO, GRAZE, N_ROWS, NORMAL, SHADED
+from baker.trace.jit import inner
 
 # Most vertices of a subpath that starts at a lamp, the one on the lamp among them.
 MOST_FROM_LAMP = 8
@@ -34,7 +34,7 @@ BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3
 N_ROWS_BOTH = CHAIN + MOST_FROM_LAMP
 
 
-@step
+@inner
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):  # type: ignore[no-untyped-def]
     """Evaluate the vertex in column k for light that comes from l and goes to e (unit, world, outwards).
 
@@ -72,7 +72,7 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):  # type: ignore[no-untype
     return from_eye, cosines_pdf(row, k, gl, ge, el)
 
 
-@step
+@inner
 def leave_vertex(path, lane, density, reverse, smooth, depth):  # type: ignore[no-untyped-def]
     """Carry the sums past a vertex that the path leaves towards `GO`.
 
@@ -99,14 +99,14 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):  # type: ignore[n
     )
 
 
-@step
+@inner
 def carry(path, lane, factor, depth):  # type: ignore[no-untyped-def]
     """Multiply the sums by what turns a density per steradian at the next vertex into one per area here."""
     for r in range(depth):
         path[CHAIN + r, lane] *= factor
 
 
-@step
+@inner
 def reach_vertex(path, lane, distance, depth):  # type: ignore[no-untyped-def]
     """Do what a vertex asks for on arrival; its geometric normal is in `path`, the ray still in `GO`.
 
@@ -132,7 +132,7 @@ def reach_vertex(path, lane, distance, depth):  # type: ignore[no-untyped-def]
     return cosine
 
 
-@step
+@inner
 def towards_eye(path, lane, density, reverse, left):  # type: ignore[no-untyped-def]
     """Return the sum of p_s' / p_s over more lamp vertices, for an eye subpath that ends in column `lane`.
 
@@ -145,13 +145,13 @@ def towards_eye(path, lane, density, reverse, left):  # type: ignore[no-untyped-
     return density * path[INVERSE, lane] * (path[OPEN, lane] + reverse * path[CHAIN + left - 1, lane])
 
 
-@step
+@inner
 def towards_lamp(path, k, density, reverse):  # type: ignore[no-untyped-def]
     """Return the sum of p_s' / p_s over less lamp vertices, for a lamp's subpath that ends in column k."""
     return density * path[INVERSE, k] * (path[OPEN, k] + reverse * path[CHAIN, k])
 
 
-@step
+@inner
 def pixel_density(camera, way):  # type: ignore[no-untyped-def]
     """Return the density per steradian of a pixel's own rays in unit direction `way` (3,); 0 from behind."""
     cosine = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]
@@ -161,7 +161,7 @@ def pixel_density(camera, way):  # type: ignore[no-untyped-def]
     return 1.0 / (side * side * cosine * cosine * cosine)
 
 
-@step
+@inner
 def pixel_of(camera, way):  # type: ignore[no-untyped-def]
     """Return the number of the pixel that unit direction `way` (3,) from the eye passes, or -1."""
     z = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from baker.reference.step import step
+from baker.trace.jit import inner
 
 INV_PI = 1.0 / math.pi
 # GGX widths below this are mirrors.
@@ -27,34 +27,34 @@ BASE, METALLIC, WIDTH = 0, 3, 4
 N_PARAMETERS = 5
 
 
-@step
+@inner
 def fresnel(f0, cosine):  # type: ignore[no-untyped-def]
     """Return Schlick's reflectance for the cosine between direction and half vector."""
     m = min(max(1.0 - cosine, 0.0), 1.0)
     return f0 + (1.0 - f0) * m * m * m * m * m
 
 
-@step
+@inner
 def ggx_density(nh, a):  # type: ignore[no-untyped-def]
     """Return D of a half vector with cosine nh."""
     t = nh * nh * (a * a - 1.0) + 1.0
     return a * a / max(math.pi * t * t, 1.0e-300)
 
 
-@step
+@inner
 def ggx_masking(nv, a):  # type: ignore[no-untyped-def]
     """Return Smith's G1 for a direction with cosine nv."""
     return 2.0 * nv / max(nv + math.sqrt(a * a + (1.0 - a * a) * nv * nv), 1.0e-300)
 
 
-@step
+@inner
 def ggx_visibility(nl, nv, a):  # type: ignore[no-untyped-def]
     """Return V = G2 / (4 nl nv), height-correlated."""
     s = nl * math.sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * math.sqrt(nl * nl * (1.0 - a * a) + a * a)
     return 0.5 / max(s, 1.0e-300)
 
 
-@step
+@inner
 def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
     """Return the chance to sample the specular lobe of parameters row[:, lane], seen at cosine nv."""
     if row[WIDTH, lane] < 0.0:
@@ -68,7 +68,7 @@ def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
     return min(max(specular / (specular + diffuse), 0.1), 0.9)
 
 
-@step
+@inner
 def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untyped-def]
     """Write f(v, l) n.l (RGB) to `out` (3,) and return the density with which `bsdf_sample` finds l.
 
@@ -78,7 +78,7 @@ def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untype
     return bsdf_cosines(row, lane, vz, lz, vx * lx + vy * ly + vz * lz, out)
 
 
-@step
+@inner
 def bsdf_cosines(row, lane, nv, nl, vl, out):  # type: ignore[no-untyped-def]
     """Do the same from the cosines n.v, n.l and v.l, which are all that an isotropic surface asks for."""
     out[0] = out[1] = out[2] = 0.0
@@ -103,13 +103,13 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):  # type: ignore[no-untyped-def]
     return cosines_pdf(row, lane, nv, nl, vl)
 
 
-@step
+@inner
 def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):  # type: ignore[no-untyped-def]
     """Return the density per steradian with which `bsdf_sample` finds l from v, mirrors left out."""
     return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
 
 
-@step
+@inner
 def cosines_pdf(row, lane, nv, nl, vl):  # type: ignore[no-untyped-def]
     """Return the same density from the cosines n.v, n.l and v.l."""
     if nv <= 0.0 or nl <= 0.0:
@@ -125,7 +125,7 @@ def cosines_pdf(row, lane, nv, nl, vl):  # type: ignore[no-untyped-def]
     return density
 
 
-@step
+@inner
 def visible_normal(vx, vy, vz, a, u, w):  # type: ignore[no-untyped-def]
     """Return a half vector, distributed as the GGX normals that v sees (Heitz 2018, listing 1)."""
     sx, sy, sz = a * vx, a * vy, vz
@@ -150,7 +150,7 @@ def visible_normal(vx, vy, vz, a, u, w):  # type: ignore[no-untyped-def]
     return hx / length, hy / length, hz / length
 
 
-@step
+@inner
 def cosine_sample(u, w):  # type: ignore[no-untyped-def]
     """Map the unit square to the cosine-weighted hemisphere about +z."""
     r = math.sqrt(u)
@@ -158,7 +158,7 @@ def cosine_sample(u, w):  # type: ignore[no-untyped-def]
     return r * math.cos(phi), r * math.sin(phi), math.sqrt(max(1.0 - u, 0.0))
 
 
-@step
+@inner
 def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):  # type: ignore[no-untyped-def]
     """Sample a direction; write f n.l / density (RGB) to `weight` (3,).
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.core.errors import SettingsError
 from baker.core.scene import Camera
 from baker.kernels.sampling import hash_u32
 from baker.reference.randomness import mix64
+from baker.trace.jit import inner, kernel
 
 
 def parse_camera(text: str) -> Camera:
@@ -77,7 +77,7 @@ def camera_rays(
     return way
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-untyped-def]
     """Write unit directions to `way` (n, samples, 3).
 
@@ -109,7 +109,7 @@ def _salt(seed: int, number: int) -> np.uint64:
     return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def _uniform(pixel, salt):  # type: ignore[no-untyped-def]
     """Return a uniform number of a pixel."""
     return np.float64(mix64(np.uint64(pixel + 1) * np.uint64(0x9E3779B97F4A7C15) ^ salt) >> np.uint64(11)) * (

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from baker.reference.vertex import base_colour
 from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED, Reference
+from baker.trace.jit import kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
+
+_new_colour = scratch((4,), np.float64)
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,11 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
     return FirstHits(triangle, bary, depth, albedo, position, sign * normal, sign * face, front, lit)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth, albedo):  # type: ignore[no-untyped-def]
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
-    colour = np.zeros(4)
+    colour = _new_colour()
     for group in range(0, len(way), width):
         for lane in range(width):
             i = group + lane

@@ -19,8 +19,8 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.sampling import triangle_barycentric
 from baker.lights.emissive import build_emitters
-from baker.reference.step import step
 from baker.shading.materials import Shading
+from baker.trace.jit import inner
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Columns of an emissive triangle: three corners, face normal, area, two-sided, chance, radiance, textured.
@@ -152,7 +152,7 @@ def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.floa
     return chance
 
 
-@step
+@inner
 def pick_lamp(cumulative, u):  # type: ignore[no-untyped-def]
     """Return the number of the lamp that the uniform number u falls on."""
     low = 0
@@ -166,7 +166,7 @@ def pick_lamp(cumulative, u):  # type: ignore[no-untyped-def]
     return low
 
 
-@step
+@inner
 def aim_at_triangle(triangle, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     """Return the way from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
 
@@ -180,7 +180,7 @@ def aim_at_triangle(triangle, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     return dx, dy, dz, density, b1, b2
 
 
-@step
+@inner
 def triangle_density(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return the density per steradian with which a point at the end of d on emitter e is aimed at."""
     square = dx * dx + dy * dy + dz * dz
@@ -195,7 +195,7 @@ def triangle_density(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
     return triangle[e, CHANCE] / triangle[e, AREA] * square / cosine
 
 
-@step
+@inner
 def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
     """Return the way from (x, y, z) to a light without area: dx, dy, dz, reach, irradiance per intensity.
 
@@ -212,7 +212,7 @@ def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
     return dx, dy, dz, length * _SHORT, share / square
 
 
-@step
+@inner
 def spot_share(point, e, cosine):  # type: ignore[no-untyped-def]
     """Return the share of its intensity that light e sends at this cosine to its axis; 1 if it is no spot."""
     if point[e, KIND] != 1.0:

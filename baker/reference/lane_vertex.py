@@ -51,8 +51,8 @@ from baker.reference.lanes import (
     W_WAY,
     unsigned,
 )
-from baker.reference.step import step
 from baker.reference.view import CORNER, FACE, SHADING, TWO_SIDED
+from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
 
 _f = np.float32
@@ -68,7 +68,7 @@ _M = LAMP * LANES
 _L = LANES
 
 
-@step
+@inner
 def stand(s, base, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
 
@@ -89,7 +89,7 @@ def stand(s, base, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     s[base + (BITANGENT + 2) * _L + lane] = bz
 
 
-@step
+@inner
 def stand_lanes(s, base, least):  # type: ignore[no-untyped-def]
     """Make the lanes' places on surfaces vertices; see `stand`."""
     base = unsigned(base)
@@ -98,7 +98,18 @@ def stand_lanes(s, base, least):  # type: ignore[no-untyped-def]
         stand(s, base, lane, x, y, z, least)
 
 
-@step
+@inner
+def weighted(s, base, column, lane, b, u, v):  # type: ignore[no-untyped-def]
+    """Return what a lane's triangle has at barycentrics (b, u, v), by three corners from a column on."""
+    at = base + _T + column * _L + lane
+    return (
+        b * s[at] + u * s[at + 3 * _L] + v * s[at + 6 * _L],
+        b * s[at + _L] + u * s[at + 4 * _L] + v * s[at + 7 * _L],
+        b * s[at + 2 * _L] + u * s[at + 5 * _L] + v * s[at + 8 * _L],
+    )
+
+
+@inner
 def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
     """Make the lanes' hits, whose triangles' rows have been copied, vertices; black backs end the path.
 
@@ -124,36 +135,8 @@ def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
         s[base + NORMAL * _L + lane] = sign * fx
         s[base + (NORMAL + 1) * _L + lane] = sign * fy
         s[base + (NORMAL + 2) * _L + lane] = sign * fz
-        x = (
-            b * s[base + _T + CORNER * _L + lane]
-            + u * s[base + _T + (CORNER + 3) * _L + lane]
-            + v * s[base + _T + (CORNER + 6) * _L + lane]
-        )
-        y = (
-            b * s[base + _T + (CORNER + 1) * _L + lane]
-            + u * s[base + _T + (CORNER + 4) * _L + lane]
-            + v * s[base + _T + (CORNER + 7) * _L + lane]
-        )
-        z = (
-            b * s[base + _T + (CORNER + 2) * _L + lane]
-            + u * s[base + _T + (CORNER + 5) * _L + lane]
-            + v * s[base + _T + (CORNER + 8) * _L + lane]
-        )
-        nx = (
-            b * s[base + _T + SHADING * _L + lane]
-            + u * s[base + _T + (SHADING + 3) * _L + lane]
-            + v * s[base + _T + (SHADING + 6) * _L + lane]
-        )
-        ny = (
-            b * s[base + _T + (SHADING + 1) * _L + lane]
-            + u * s[base + _T + (SHADING + 4) * _L + lane]
-            + v * s[base + _T + (SHADING + 7) * _L + lane]
-        )
-        nz = (
-            b * s[base + _T + (SHADING + 2) * _L + lane]
-            + u * s[base + _T + (SHADING + 5) * _L + lane]
-            + v * s[base + _T + (SHADING + 8) * _L + lane]
-        )
+        x, y, z = weighted(s, base, CORNER, lane, b, u, v)
+        nx, ny, nz = weighted(s, base, SHADING, lane, b, u, v)
         square = nx * nx + ny * ny + nz * nz
         bent = square > _f(1.0e-12) and nx * fx + ny * fy + nz * fz > _ZERO
         scale = sign / math.sqrt(square if bent else _ONE)
@@ -163,7 +146,7 @@ def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
         stand(s, base, lane, x, y, z, least)
 
 
-@step
+@inner
 def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
     """Aim at the lanes' lamps, whose rows have been copied: write direction, reach and the light they bring.
 
@@ -260,7 +243,7 @@ def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
         s[base + B1 * _L + lane], s[base + B2 * _L + lane] = b1, b2
 
 
-@step
+@inner
 def scatter_lanes(s, base, sure):  # type: ignore[no-untyped-def]
     """Choose the directions in which the lanes' paths go on; others end.
 

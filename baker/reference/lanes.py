@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.reference.step import step
 from baker.trace.embree import RayScene
+from baker.trace.jit import inner
 from baker.trace.packets import (
     DIR_X,
     GEOM_ID,
@@ -87,19 +87,19 @@ def new_path_memory(rays: RayScene) -> PathMemory:
     return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins)
 
 
-@step
+@inner
 def unsigned(place):  # type: ignore[no-untyped-def]
     """Return a place in an array, said to be below 2^32: negative ones would count from the end."""
     return np.int64(np.uint32(place))
 
 
-@step
+@inner
 def place_of(lane):  # type: ignore[no-untyped-def]
     """Return where the first row of a lane is; lanes are numbered through all blocks."""
     return unsigned(lane // LANES * BLOCK + lane % LANES)
 
 
-@step
+@inner
 def trace_blocks(s, words, blocks, on, intersect, scene, surface):  # type: ignore[no-untyped-def]
     """Trace the rays of the first blocks and ask for the rows (two cache lines each) of what they hit.
 
@@ -130,7 +130,7 @@ def trace_blocks(s, words, blocks, on, intersect, scene, surface):  # type: igno
     return n
 
 
-@step
+@inner
 def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
     """Move paths from the last blocks into the gaps of the first; return how many blocks are left."""
     low, high = 0, blocks * LANES - 1

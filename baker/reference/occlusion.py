@@ -7,7 +7,6 @@ lanes touch one array each, or they would not become vector code (see `lanes`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.sampling import cosine_direction, reverse_bits, scramble_reversed
 from baker.reference.lane_vertex import stand_lanes
@@ -25,7 +24,7 @@ from baker.reference.lanes import (
     W_WAY,
 )
 from baker.reference.randomness import mix4
-from baker.reference.step import step
+from baker.trace.jit import inner, kernel
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree
 
 _f = np.float32
@@ -34,7 +33,7 @@ _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = LANES
 
 
-@step
+@inner
 def seed_lanes(words, first, number, salt):  # type: ignore[no-untyped-def]
     """Write the two scramble seeds of points `first` to `first` + 8."""
     for lane in range(LANES):
@@ -42,7 +41,7 @@ def seed_lanes(words, first, number, salt):  # type: ignore[no-untyped-def]
         words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
 
 
-@step
+@inner
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
     """Write the lanes' uniform numbers, in [1, 2): the shared bits of (first, second), the rest scrambled."""
     one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
@@ -54,7 +53,7 @@ def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
         words[U_WAY * _L + lane], words[W_WAY * _L + lane] = _w((x >> bits) | one), _w((y >> bits) | one)
 
 
-@step
+@inner
 def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
     """Copy place k of points `group` to `group` + 8 into the lanes."""
     for lane in range(min(LANES, len(position) - group)):
@@ -64,7 +63,7 @@ def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-
             s[(NORMAL + a) * _L + lane] = face_normal[group + lane, k, a]
 
 
-@step
+@inner
 def point_lanes(s, reach):  # type: ignore[no-untyped-def]
     """Point the lanes' rays, cosine-weighted. What points below the facet is closed by the facet itself."""
     for lane in range(LANES):
@@ -88,14 +87,14 @@ def point_lanes(s, reach):  # type: ignore[no-untyped-def]
         s[ALIVE * _L + lane] = _ONE if above > _ZERO else _ZERO
 
 
-@step
+@inner
 def count_lanes(s):  # type: ignore[no-untyped-def]
     """Count the lanes' rays that have met nothing in `VALUE`."""
     for lane in range(LANES):
         s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def open_rays(  # type: ignore[no-untyped-def]
     position, normal, face_normal, begin, memory, net, shared, reach, least, how, out
 ):

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from baker.reference.bsdf import N_PARAMETERS, WIDTH
 from baker.reference.lamps import RADIANCE, pick_lamp, triangle_density
@@ -59,7 +58,6 @@ from baker.reference.lanes import (
 )
 from baker.reference.randomness import random_lanes, spread_lanes
 from baker.reference.shadow_rays import cast_packet, cast_to_lamps
-from baker.reference.step import step
 from baker.reference.vertex import BETA as PATH_BETA
 from baker.reference.vertex import DENSITY as PATH_DENSITY
 from baker.reference.vertex import (
@@ -76,6 +74,7 @@ from baker.reference.vertex import (
     start_path,
 )
 from baker.reference.view import EMITTER, FACE, MATERIAL, TEXTURED, TWO_SIDED
+from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
 _f = np.float32
@@ -85,9 +84,13 @@ _MOST = 0.98
 # Few lamps are counted through, more are searched.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
+# Working memory of a tile.
+_new_path, _new_row = scratch((N_ROWS, LANES), np.float64), scratch((N_PARAMETERS, LANES), np.float64)
+_new_value, _new_way, _new_rgba = (scratch((n,), np.float64) for n in (3, 6, 4))
+_new_lamp, _new_filled = scratch((LANES,), np.int64), scratch((BINS,), np.int64)
 
 
-@step
+@inner
 def see_emitter(s, base, lane, surface, triangle, prim, mode, power, value):  # type: ignore[no-untyped-def]
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
@@ -114,7 +117,7 @@ def see_emitter(s, base, lane, surface, triangle, prim, mode, power, value):  # 
         value[c] = s[base + (BETA + c) * LANES + lane] * triangle[e, RADIANCE + c] * weight
 
 
-@step
+@inner
 def see_sky(s, base, lane, sky, mode, power, value):  # type: ignore[no-untyped-def]
     """Do the same for the sky, where a path leaves the scene."""
     value[0] = value[1] = value[2] = 0.0
@@ -128,7 +131,7 @@ def see_sky(s, base, lane, sky, mode, power, value):  # type: ignore[no-untyped-
         value[c] = s[base + (BETA + c) * LANES + lane] * sky[c] * weight
 
 
-@step
+@inner
 def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):  # type: ignore[no-untyped-def]
     """Begin paths: at white Lambertian points (light leaving them is E / pi), or as rays; see `trace_paths`.
 
@@ -158,7 +161,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
             s[base + (NORMAL + a) * LANES + lane] = normal[i, k, a]
 
 
-@step
+@inner
 def fetch_lanes(s, words, base, surface, material):  # type: ignore[no-untyped-def]
     """Copy what Lambertian vertices are made of: the triangles' rows and base colours."""
     base = unsigned(base)
@@ -172,7 +175,7 @@ def fetch_lanes(s, words, base, surface, material):  # type: ignore[no-untyped-d
                 s[base + (ALBEDO + c) * LANES + lane] = material[m, c]
 
 
-@step
+@inner
 def choose_lamps(s, words, base, every, cumulative, lamp):  # type: ignore[no-untyped-def]
     """Choose a lamp for each lane: its number to `lamp` (8,) int64, its row of `every` to `s`."""
     base = unsigned(base)
@@ -191,7 +194,7 @@ def choose_lamps(s, words, base, every, cumulative, lamp):  # type: ignore[no-un
             s[base + (LAMP + c) * LANES + lane] = every[e, c]
 
 
-@step
+@inner
 def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ignore[no-untyped-def]
     """Choose the direction in which one lane's path goes on, or end it."""
     choice = np.float64(words[base + LOBE * LANES + lane]) * _INV_2_32
@@ -212,7 +215,7 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ign
     s[base + COSINE * LANES + lane] = cosine
 
 
-@step
+@inner
 def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value, way):  # type: ignore[no-untyped-def]
     """Aim at one lamp from one lane's vertex; return its number, -1 if it brings nothing."""
     choice = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32
@@ -233,7 +236,7 @@ def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky,
     return lamp
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, memory, net, how, out):  # type: ignore[no-untyped-def]
     """Add the light that paths bring to each of m points, and count path segments and shadow rays.
 
@@ -266,10 +269,8 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     hemisphere, mode, strata, power = how[0], how[1], how[2], how[3]
     most_bounces, number_of_pass, salt = how[4], how[6], how[7]
     lit = cumulative[len(cumulative) - 1] > 0.0
-    path = np.zeros((N_ROWS, LANES))
-    row = np.zeros((N_PARAMETERS, LANES))
-    value, way, rgba = np.zeros(3), np.zeros(6), np.zeros(4)
-    lamp, filled = np.zeros(LANES, np.int64), np.zeros(BINS, np.int64)
+    path, row = _new_path(), _new_row()
+    value, way, rgba, lamp, filled = _new_value(), _new_way(), _new_rgba(), _new_lamp(), _new_filled()
     samples, m, places = len(net), toward.shape[0], toward.shape[1]
     total = m * samples
     following = rays = shadows = 0

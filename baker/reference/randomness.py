@@ -26,7 +26,7 @@ from baker.reference.lanes import (
     W_WAY,
     unsigned,
 )
-from baker.reference.step import step
+from baker.trace.jit import inner
 
 _w = np.uint32
 _u = np.uint64
@@ -34,7 +34,7 @@ _STEP = np.uint64(0x9E3779B97F4A7C15)
 _INV_2_53 = 1.0 / 9007199254740992.0
 
 
-@step
+@inner
 def mix64(x):  # type: ignore[no-untyped-def]
     """Return a well-mixed uint64 of a uint64."""
     x = _u(x ^ (x >> _u(30)))
@@ -44,7 +44,7 @@ def mix64(x):  # type: ignore[no-untyped-def]
     return _u(x ^ (x >> _u(31)))
 
 
-@step
+@inner
 def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
     """Return the state (uint64) of sample `sample` of point `point` in pass `number`."""
     x = mix64(_u(_u(seed) + _STEP))
@@ -53,14 +53,14 @@ def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
     return mix64(_u(x ^ _u(_u(sample) + _u(1)) * _STEP))
 
 
-@step
+@inner
 def draw(state, lane):  # type: ignore[no-untyped-def]
     """Advance `state` (16,) uint64 of a lane and return a float64 in [0, 1)."""
     state[lane] = _u(state[lane] + _STEP)
     return np.float64(mix64(state[lane]) >> _u(11)) * _INV_2_53
 
 
-@step
+@inner
 def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
     """Return numbers of a scrambled (0,2)-net, scrambled anew for each point, pass and pair."""
     bits = path_state(seed, number_of_pass, point, _u(1) << _u(40 + pair))
@@ -73,7 +73,7 @@ def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-
     )
 
 
-@step
+@inner
 def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
     """Return four well-mixed uint32 of four (pcg4d)."""
     x, y = _w(x * _w(1664525) + _w(1013904223)), _w(y * _w(1664525) + _w(1013904223))
@@ -97,7 +97,7 @@ def seed_salt(seed: int) -> int:
     return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
 
 
-@step
+@inner
 def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
     """Write the lanes' random numbers for their vertices; `COUNT` counts up.
 
@@ -120,7 +120,7 @@ def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
         words[base + W_WAY * LANES + lane] = _w((z >> bits) | one)
 
 
-@step
+@inner
 def spread_lanes(words, base, net, number, salt):  # type: ignore[no-untyped-def]
     """Replace the pairs of lanes at their path's first vertex by numbers of scrambled (0,2)-nets.
 
@@ -138,7 +138,7 @@ def spread_lanes(words, base, net, number, salt):  # type: ignore[no-untyped-def
             words[base + W_WAY * LANES + lane] = scrambled(net[sample, 1], w)
 
 
-@step
+@inner
 def scrambled(number, seed):  # type: ignore[no-untyped-def]
     """Return a scrambled number of a net as the bits of a float32 in [1, 2)."""
     return _w((reverse_bits(scramble_reversed(number, seed)) >> _w(9)) | _w(0x3F800000))

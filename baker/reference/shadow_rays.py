@@ -17,13 +17,13 @@ from baker.reference.lanes import (
     VALUE,
     unsigned,
 )
-from baker.reference.step import step
+from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, ORG_X, TFAR, call_embree
 
 _f = np.float32
 
 
-@step
+@inner
 def cast_packet(bins, filled, k, occluded, scene, on, out):  # type: ignore[no-untyped-def]
     """Trace packet k, add the light of rays that nothing is in the way of to their points, and empty it.
 
@@ -41,7 +41,7 @@ def cast_packet(bins, filled, k, occluded, scene, on, out):  # type: ignore[no-u
     filled[k] = 0
 
 
-@step
+@inner
 def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, on, out):  # type: ignore[no-untyped-def]
     """Put the lanes' rays to lamps into packets, those to one lamp together; trace what is full.
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from baker.kernels.alpha import presence_at
 from baker.kernels.sampling import tangent_frame
@@ -32,8 +31,8 @@ from baker.reference.lamps import (
     aim_at_triangle,
     pick_lamp,
 )
-from baker.reference.step import step
 from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
+from baker.trace.jit import inner
 
 # Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
 # emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces, the
@@ -47,7 +46,7 @@ _OFFSET = 1.0e-5
 _SHORT = 0.9999
 
 
-@step
+@inner
 def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Write the frame around a unit shading normal."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
@@ -56,7 +55,7 @@ def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
     path[FRAME + 6, lane], path[FRAME + 7, lane], path[FRAME + 8, lane] = nx, ny, nz
 
 
-@step
+@inner
 def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return a world direction in the frame of the vertex."""
     return (
@@ -66,7 +65,7 @@ def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
     )
 
 
-@step
+@inner
 def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`."""
     step = _OFFSET * max(abs(x), abs(y), abs(z), least)
@@ -75,7 +74,7 @@ def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     path[PLACE + 2, lane] = z + step * path[NORMAL + 2, lane]
 
 
-@step
+@inner
 def start_path(path, row, lane, where, toward, normal, at_surface, least):  # type: ignore[no-untyped-def]
     """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
 
@@ -101,7 +100,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, least):  # ty
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
 
 
-@step
+@inner
 def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v
@@ -140,12 +139,9 @@ def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-untyped-def]
-    """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory.
-
-    Called for surfaces that have some only: a tuple of arrays is dear to hand over.
-    """
+    """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory."""
     m = shading.material[prim]
     base_colour(shading, prim, m, u, v, rgba)
     for c in range(3):
@@ -157,7 +153,7 @@ def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-un
         row[WIDTH, lane] *= rgba[1] * rgba[1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
     """Write what texture and vertex colours multiply a base colour by to `out` (4,)."""
     out[0] = out[1] = out[2] = 1.0
@@ -172,7 +168,7 @@ def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
             )
 
 
-@step
+@inner
 def heuristic(own, other, power):  # type: ignore[no-untyped-def]
     """Return the MIS weight of a technique of density `own` against one of density `other`."""
     if power:
@@ -180,7 +176,7 @@ def heuristic(own, other, power):  # type: ignore[no-untyped-def]
     return own / (own + other) if own > 0.0 else 0.0
 
 
-@step
+@inner
 def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):  # type: ignore[no-untyped-def]
     """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
 
@@ -238,7 +234,7 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
     return lamp if value[0] + value[1] + value[2] > 0.0 else -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@inner
 def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-def]
     """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
 
@@ -255,7 +251,7 @@ def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-de
             value[c] *= rgba[c]
 
 
-@step
+@inner
 def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[no-untyped-def]
     """Choose the direction in which the path goes on; return False where it ends.
 

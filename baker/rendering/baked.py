@@ -16,8 +16,12 @@ from baker.io.bake_folder import SCENE_NAME, StoredBake, read_bake
 from baker.io.fingerprint import scene_sha256
 from baker.io.load import load_scene
 from baker.reference.first_hit import FirstHits
+from baker.reference.lamps import RADIANCE
 from baker.reference.vertex import glow
 from baker.reference.view import Reference
+from baker.trace.jit import kernel, scratch
+
+_new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 
 
 @dataclass(frozen=True)
@@ -58,12 +62,26 @@ class BakedLight:
         irradiance = bilinear(self.bake.maps["irradiance"], self.geometry.page[triangle], uv)
         light[lit] = hits.albedo[lit] * irradiance / math.pi
         emitter = reference.lamps.emitter[hits.triangle]
-        value, rgba = np.zeros(3), np.zeros(4)
-        for i in np.flatnonzero(hits.lit & (emitter >= 0)):
-            value[:] = reference.lamps.triangle[emitter[i], 15:18]
-            glow(reference.shading, hits.triangle[i], hits.bary[i, 0], hits.bary[i, 1], value, rgba, False)
-            light[i] += value
+        glowing = np.flatnonzero(hits.lit & (emitter >= 0))
+        add_emission(
+            glowing, emitter, reference.lamps.triangle, hits.triangle, hits.bary, reference.shading, light
+        )
         return light
+
+
+@kernel
+def add_emission(chosen, emitter, lamp, triangle, bary, shading, light):  # type: ignore[no-untyped-def]
+    """Add what emitters send from hits `chosen` (m,) to `light` (n, 3).
+
+    emitter, triangle : (n,) row of `lamp` (`LampTable.triangle`) and triangle of each hit; bary : (n, 2)
+    """
+    value, rgba = _new_value(), _new_rgba()
+    for i in chosen:
+        for c in range(3):
+            value[c] = lamp[emitter[i], RADIANCE + c]
+        glow(shading, triangle[i], bary[i, 0], bary[i, 1], value, rgba, False)
+        for c in range(3):
+            light[i, c] += value[c]
 
 
 def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from inner import compiled
 from mixed_scenes import ROOM_CAMERA, YARD_CAMERA, glossy, glossy_room, open_yard
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
@@ -19,6 +20,7 @@ from baker.reference.irradiance import irradiance_pass, new_estimate
 from baker.reference.radiance import radiance_pass
 from baker.reference.view import build_reference
 
+(bsdf_eval,) = compiled(bsdf_eval)
 SIZE = 12
 
 

@@ -2,10 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from inner import compiled
 from numba import njit
 from scipy import stats
 
 from baker.reference.bsdf import bsdf_eval, bsdf_pdf, bsdf_sample
+
+(bsdf_eval,) = compiled(bsdf_eval)
 
 LAMBERT = (0.6, 0.3, 0.1, 0.0, -1.0)
 MATERIALS = {

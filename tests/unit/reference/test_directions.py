@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from inner import compiled
 from numba import njit
 from scipy import stats
 
@@ -13,6 +14,7 @@ from baker.reference.bsdf import N_PARAMETERS, bsdf_eval
 from baker.reference.camera import camera_rays, look_at
 from baker.reference.vertex import BETA, DENSITY, GO, N_ROWS, NORMAL, TO, scatter, set_frame
 
+(bsdf_eval,) = compiled(bsdf_eval)
 LEVEL = 1e-4
 N = 100_000
 AXIS = np.array([0.48, -0.6, 0.64])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import solid_angle
+from inner import compiled
 from numba import njit
 from scipy import stats
 from tiny_scenes import Quad, grey, quad_scene
@@ -19,6 +20,7 @@ from baker.reference.lamps import aim_at_triangle, pick_lamp
 from baker.reference.vertex import BETA, GO, NORMAL, PLACE
 from baker.reference.view import build_reference
 
+aim_at_triangle, pick_lamp, start_at_lamp = compiled(aim_at_triangle, pick_lamp, start_at_lamp)
 LEVEL = 1e-4
 N = 100_000
 SPOT = PunctualLight("spot", "s", 0, (2.0, 2.0, 2.0), (0.1, 0.2, 0.3), (0.6, 0.0, -0.8), 0.3, 0.7)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import njit
+from inner import compiled
 from scipy import stats
 
 from baker.reference import lamps as lamp_columns
@@ -49,6 +49,10 @@ from baker.reference.view import ROW_LENGTH
 from baker.trace.packets import DIR_X, HIT_U, ORG_X, PRIM_ID
 
 ALPHA = 1e-4
+aim, arrive, set_frame = compiled(aim, arrive, set_frame)
+aim_lanes, arrive_lanes, scatter_lanes = compiled(aim_lanes, arrive_lanes, scatter_lanes)
+choose_lamps, fetch_lanes, random_lanes = compiled(choose_lamps, fetch_lanes, random_lanes)
+(close_gaps,) = compiled(close_gaps)
 
 
 def blocks(n=BLOCKS):
@@ -177,19 +181,6 @@ def some_lamps():
     return triangle, point, sky, np.arange(1, 25) / 24, all_alike(triangle, point, sky)
 
 
-@njit
-def aim_one(path, row, lane, triangle, point, cumulative, sky, mode, power, numbers, value, way):
-    return aim(
-        path, row, lane, triangle, point, cumulative, sky, mode, power, numbers[0], numbers[1], numbers[2],
-        value, way,
-    )  # fmt: skip
-
-
-@njit
-def frame_one(path, lane, n):
-    set_frame(path, lane, n[0], n[1], n[2])
-
-
 @pytest.mark.parametrize(("mode", "power"), [(0, 0), (1, 0), (2, 0), (2, 1)])
 def test_lamps_are_aimed_at_as_one_at_a_time(some_lamps, mode, power):
     triangle, point, sky, cumulative, every = some_lamps
@@ -216,15 +207,13 @@ def test_lamps_are_aimed_at_as_one_at_a_time(some_lamps, mode, power):
             path[PATH_NORMAL : PATH_NORMAL + 3, lane] = normal[lane]
             path[PATH_BETA : PATH_BETA + 3, lane] = rows[0, BETA : BETA + 3, lane]
             row[:3, lane] = rows[0, ALBEDO : ALBEDO + 3, lane]
-            frame_one(path, lane, shaded[lane])
+            set_frame(path, lane, *shaded[lane])
             path[27, lane] = 1.0
             value, way = np.zeros(3), np.zeros(6)
             numbers = np.array(
                 [bits[CHOICE, lane] / 2.0**32, rows[0, U_LAMP, lane] - 1.0, rows[0, W_LAMP, lane] - 1.0]
             )
-            found = aim_one(
-                path, row, lane, triangle, point, cumulative, sky, mode, power, numbers, value, way
-            )
+            found = aim(path, row, lane, triangle, point, cumulative, sky, mode, power, *numbers, value, way)
             assert lamp[lane] == int(numbers[0] * 24)
             own = rows[0, VALUE : VALUE + 3, lane]
             if lamp[lane] == 23:
@@ -293,7 +282,7 @@ def test_hits_become_vertices_as_one_at_a_time():
         for lane in range(LANES):
             path[3:6, lane] = rows[0, DIR_X : DIR_X + 3, lane]
             barycentric = [float(x) for x in rows[0, HIT_U : HIT_U + 2, lane]]
-            alive = arrive_one(path, row, lane, surface, material, first + lane, *barycentric)
+            alive = arrive(path, row, lane, surface, material, first + lane, *barycentric, 0.1, 1)
             assert bool(rows[0, ALIVE, lane]) == alive
             black += not alive
             if alive:
@@ -302,11 +291,6 @@ def test_hits_become_vertices_as_one_at_a_time():
                 for own, one in ((NORMAL, PATH_NORMAL), (SHADED, PATH_SHADED)):
                     assert np.allclose(rows[0, own : own + 3, lane], path[one : one + 3, lane], atol=1e-5)
     assert 20 < black < 200
-
-
-@njit
-def arrive_one(path, row, lane, surface, material, prim, u, v):
-    return arrive(path, row, lane, surface, material, prim, u, v, 0.1, 1)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.97, 1.0])
