@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from baker.cli.app import COMMANDS
-from baker.cli.failures import FAILED_CHECK
-from baker.cli.judged import write_failed, write_worst
+from baker.cli.judged import tell, write_failed, write_worst
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -70,12 +69,7 @@ def work(
 
         wanted = DiffSettings(texels=texels, flip=flip, fail_if=fail_if, seed=resolved.seed)
         found = compare(a, b, wanted, progress)
-    if not quiet:
-        write_text(found, session.text_stream(as_json=as_json), verbose=verbose)
-    if as_json:
-        session.write_json(difference_json(found))
-    if not found.passed:
-        raise typer.Exit(FAILED_CHECK)
+    tell(found, session, write_text, difference_json, quiet=quiet, as_json=as_json, verbose=verbose)
 
 
 def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:

@@ -1,12 +1,39 @@
-"""Lines about the worst places and the limits, of the commands that judge a bake."""
+"""What the commands that judge a bake have in common: how they tell and end, lines on places and limits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
+import typer
+from baker.cli.failures import FAILED_CHECK
+
 if TYPE_CHECKING:
+    from baker.cli.session import Session
+
     from baker.judge.limits import Verdict
+
+
+def tell(
+    found: Any,
+    session: Session,
+    as_text: Callable[..., None],
+    as_data: Callable[[Any], dict[str, Any]],
+    *,
+    quiet: bool,
+    as_json: bool,
+    verbose: int,
+) -> None:
+    """Write what was found as text and, if wanted, as JSON; end the program as failed if it did not pass.
+
+    as_text : called with what was found, a stream and `verbose`; as_data : makes what `--json` writes
+    """
+    if not quiet:
+        as_text(found, session.text_stream(as_json=as_json), verbose=verbose)
+    if as_json:
+        session.write_json(as_data(found))
+    if not found.passed:
+        raise typer.Exit(FAILED_CHECK)
 
 
 def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from baker.cli.app import COMMANDS
-from baker.cli.failures import FAILED_CHECK
-from baker.cli.judged import write_failed, write_worst
+from baker.cli.judged import tell, write_failed, write_worst
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -107,12 +106,7 @@ def work(
             from baker.verification.cases import write_junit
 
             write_junit(junit, found)
-    if not quiet:
-        write_text(found, session.text_stream(as_json=as_json), verbose=verbose)
-    if as_json:
-        session.write_json(verification_json(found))
-    if not found.passed:
-        raise typer.Exit(FAILED_CHECK)
+    tell(found, session, write_text, verification_json, quiet=quiet, as_json=as_json, verbose=verbose)
 
 
 def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
