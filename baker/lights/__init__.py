@@ -1,5 +1,5 @@
 """Light families, one a file."""
 
-from baker.trace.kernel_cache import allow_no_cache
+from baker.trace.kernel_cache import keep_kernels
 
-allow_no_cache(__file__)
+keep_kernels(__file__, "trace", "kernels")

@@ -1,5 +1,5 @@
 """Path-traced truth: shares rays with the bake and nothing else."""
 
-from baker.trace.kernel_cache import allow_no_cache
+from baker.trace.kernel_cache import keep_kernels
 
-allow_no_cache(__file__)
+keep_kernels(__file__, "trace", "kernels", "lights")

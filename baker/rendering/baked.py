@@ -20,6 +20,9 @@ from baker.reference.lamps import RADIANCE
 from baker.reference.vertex import glow
 from baker.reference.view import Reference
 from baker.trace.jit import kernel, scratch
+from baker.trace.kernel_cache import keep_kernels
+
+keep_kernels(__file__, "trace", "kernels", "lights", "reference")
 
 _new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 

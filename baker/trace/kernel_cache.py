@@ -1,30 +1,69 @@
-"""Lets kernels work where Numba can keep nothing: a read-only install and no cache folder to write to.
+"""Where compiled kernels are kept, and when they are not.
 
-Numba then refuses to define a function that asks to be kept on disk. Ours are compiled in memory instead,
-anew in every process.
+Numba compiles a kernel anew when the kernel's own file has changed. What the kernel was made of may lie in
+other files: after an update of a checkout it would run yesterday's code, with arrays it does not know.
+It also refuses to define a function that asks to be kept on disk where it can keep nothing, in a read-only
+install without a cache folder. Ours are compiled in memory then, anew in every process.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
+import time
 from pathlib import Path
 from typing import Any
 
 
-def allow_no_cache(package_file: str) -> None:
-    """Let kernels of this program be defined where they cannot be kept.
+def keep_kernels(package_file: str, *made_of: str) -> None:
+    """Prepare a package whose kernels are about to be defined.
 
     Parameters
     ----------
     package_file : str
-        `__file__` of the package whose kernels are about to be defined.
+        `__file__` of the package, or of the only file in it that has some.
+    made_of : str
+        Names of the other packages that its kernels take functions from.
+    """
+    folder = Path(package_file).parent
+    drop_stale(folder, [folder, *(folder.parent / name for name in made_of)])
+    allow_no_cache(folder)
+
+
+def drop_stale(folder: Path, made_of: list[Path]) -> None:
+    """Remove what was compiled for a package before one of the files it may be made of was last written.
+
+    Parameters
+    ----------
+    folder : Path
+        The package.
+    made_of : list of Path
+        Folders of the packages that its kernels take functions from, its own among them.
+    """
+    newest = max((file.stat().st_mtime for part in made_of for file in part.glob("*.py")), default=0.0)
+    if newest > time.time():
+        # A clock is wrong: all would look stale for ever.
+        return
+    for index in folder.glob("__pycache__/*.nbi"):
+        # Another process may be quicker, or the folder not ours.
+        with contextlib.suppress(OSError):
+            if index.stat().st_mtime < newest:
+                index.unlink()
+
+
+def allow_no_cache(folder: Path) -> None:
+    """Let kernels of this program be defined where they cannot be kept.
+
+    Parameters
+    ----------
+    folder : Path
+        Package whose kernels are about to be defined.
 
     Notes
     -----
     Where the package's own cache folder can be written, which is nearly always, this looks no further. Numba
     has no setting for it: its two kinds of compiled function are told to go on.
     """
-    folder = Path(package_file).parent
     kept = folder / "__pycache__"
     if os.access(kept if kept.exists() else folder, os.W_OK):
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -73,5 +74,45 @@ def test_a_package_that_was_never_compiled_counts_as_writable(tmp_path, monkeypa
     monkeypatch.setattr(os, "access", lambda path, mode: path.name == writable)
     kinds = []
     monkeypatch.setattr(kernel_cache, "_go_on", lambda kind, function: kinds.append(kind))
-    kernel_cache.allow_no_cache(str(package / "__init__.py"))
+    kernel_cache.allow_no_cache(package)
     assert len(kinds) == changed
+
+
+KERNEL = """
+from numba import njit
+from part.inner import number
+@njit(cache=True)
+def kernel():
+    return number()
+print(kernel(), sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def test_a_kernel_is_compiled_anew_when_a_file_it_is_made_of_has_changed(tmp_path):
+    part, outer = tmp_path / "part", tmp_path / "outer"
+    for folder in (part, outer):
+        folder.mkdir()
+    (outer / "__init__.py").write_text(
+        'from baker.trace.kernel_cache import keep_kernels\nkeep_kernels(__file__, "part")\n'
+    )
+    (outer / "kernel.py").write_text(KERNEL)
+
+    def run(number=None):
+        if number is not None:
+            code = f"from numba import njit\n@njit\ndef number():\n    return {number}\n"
+            (part / "inner.py").write_text(code)
+        script = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.dont_write_bytecode = True\n"
+        return said(script + "import outer.kernel").split()
+
+    assert run(1) == ["1", "0"]
+    assert run() == ["1", "1"]
+    # A clock that is off must not cost a compilation in every run.
+    ahead = time.time() + 1000
+    os.utime(outer / "kernel.py", (ahead, ahead))
+    assert run()[0] == "1"
+    assert run() == ["1", "1"]
+    now = time.time()
+    os.utime(outer / "kernel.py", (now - 100, now - 100))
+    assert run()[0] == "1"
+    assert run(2) == ["2", "0"]
+    assert run() == ["2", "1"]
