@@ -76,8 +76,7 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
     """
     if tint is None:
         return
-    stop, colour, scene, arguments = tint.stop, tint.colour, tint.scene, tint.arguments
-    words = spare.view(np.uint32)
+    stop, colour = tint.stop, tint.colour
     for lane in range(LANES):
         stop[lane] = NO_HIT
         if hits is not None and hits[GEOM_ID * LANES + lane] != NO_HIT:
@@ -96,10 +95,37 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
             for row in range(DIR_Z + 1):
                 copy_four(spare, row * width + to, rays, row * LANES + first + to)
             copy_four(spare, TFAR * width + to, rays, TFAR * LANES + first + to)
-        for lane in range(width):
-            words[ID * width + lane] = np.uint32(first + lane)
-        # No hit counts, so every surface up to the ray's end is asked: the filter function multiplies.
-        call_embree_with(function, spare_on, scene, spare, arguments)
+        _ask(tint, function, width, spare_on, spare, first)
+
+
+@inner
+def follow_packet(tint, function, width, on, packet, hits):  # type: ignore[no-untyped-def]
+    """Do the same for one packet, where it lies.
+
+    width : at most 16; packet : (12 * width or more,) float32
+    hits : whether it was traced to first hits
+    """
+    if tint is None:
+        return
+    stop, colour, words = tint.stop, tint.colour, packet.view(np.uint32)
+    for lane in range(width):
+        stop[lane] = NO_HIT
+        if hits and words[GEOM_ID * width + lane] != NO_HIT:
+            stop[lane] = words[PRIM_ID * width + lane]
+        for c in range(3):
+            colour[c * LANES + lane] = _f(1.0)
+    _ask(tint, function, width, on, packet, 0)
+
+
+@inner
+def _ask(tint, function, width, on, packet, first):  # type: ignore[no-untyped-def]
+    """Have the filter function multiply the colours of rays `first` and on: no hit counts, each is asked."""
+    words = packet.view(np.uint32)
+    for lane in range(width):
+        words[ID * width + lane] = np.uint32(first + lane)
+    call_embree_with(function, on, tint.scene, packet, tint.arguments)
+    for lane in range(width):
+        words[ID * width + lane] = np.uint32(0)
 
 
 @inner

@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from baker.kernels.tint import follow_packet, light_kept
 from baker.reference.bidirectional_lamps import aim_both_ways, meet_emitter, meet_sky, start_at_lamp
 from baker.reference.bidirectional_weights import (
     BACK,
@@ -55,7 +56,7 @@ from baker.reference.vertex import (
 )
 from baker.reference.view import EMITTER, TEXTURED
 from baker.trace.jit import inner, kernel, scratch
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
+from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, ID, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
 # Roulette begins after this many bounces and lets at most this share live on.
@@ -288,6 +289,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                     path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
                     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
                 )  # fmt: skip
+                words[ID * width + lane] = np.uint32(0)
                 valid[lane] = -1
                 any_ray = True
                 rays += 1
@@ -295,6 +297,11 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
             break
         if any_ray:
             trace(intersect, scene, valid, floats)
+            follow_packet(caster.tint, occluded, width, valid, floats, True)
+            for lane in range(width):
+                if stage[lane] == _RAY:
+                    for c in range(3):
+                        path[BETA + c, lane] *= light_kept(caster.tint, c, lane)
         for lane in range(width):
             if stage[lane] != _RAY:
                 continue
@@ -373,6 +380,9 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                         path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
                         way[0], way[1], way[2], np.float32(way[3]),
                     )  # fmt: skip
+                    # Random bits, see `shadow_rays.cast_to_lamps`; directions to other vertices are random.
+                    bits = np.uint32(state[lane] >> np.uint64(32))
+                    words[ID * width + lane] = bits if step == 0 else np.uint32(0)
                     valid[lane] = -1
                     any_shadow = True
                     shadows += 1
@@ -380,16 +390,17 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                         values[c, lane] = value[c]
             if any_shadow:
                 trace(occluded, scene, valid, floats)
+                follow_packet(caster.tint, occluded, width, valid, floats, False)
                 for lane in range(width):
                     if valid[lane] == 0 or floats[TFAR * width + lane] < np.float32(0.0):
                         continue
                     if eye[lane]:
                         for c in range(3):
-                            path[LIGHT + c, lane] += values[c, lane]
+                            path[LIGHT + c, lane] += values[c, lane] * light_kept(caster.tint, c, lane)
                     else:
                         splat_pixel[splats] = pixel[lane]
                         for c in range(3):
-                            splat[splats, c] = values[c, lane]
+                            splat[splats, c] = values[c, lane] * light_kept(caster.tint, c, lane)
                         splats += 1
             if not more:
                 break

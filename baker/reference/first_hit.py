@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.kernels.tint import follow_packet, light_kept
 from baker.reference.vertex import base_colour
 from baker.reference.view import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED, Reference
 from baker.trace.jit import kernel, scratch
@@ -29,6 +30,7 @@ class FirstHits:
     normal, face_normal : (n, 3) float64, towards the viewer, 0 where nothing is met
     front : (n,) bool, the triangle's front is seen
     lit : (n,) bool, the side seen reflects: a front, or of a two-sided surface
+    kept : (n, 3) float64, what light along the ray is multiplied by where it passes coloured surfaces
     """
 
     triangle: NDArray[np.int32]
@@ -40,6 +42,7 @@ class FirstHits:
     face_normal: NDArray[np.float64]
     front: NDArray[np.bool_]
     lit: NDArray[np.bool_]
+    kept: NDArray[np.float64]
 
 
 def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[np.float64]) -> FirstHits:
@@ -55,10 +58,11 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
     depth, albedo = np.full(n, np.inf), np.zeros((n, 3))
     surfaces = reference.surfaces
     origin = np.ascontiguousarray(np.broadcast_to(origin, (n, 3)))
-    caster = new_caster(reference.rays.tracer)
+    caster, kept = new_caster(reference.rays.tracer), np.zeros((n, 3))
     _meet(
-        origin, way, caster, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth, albedo
-    )
+        origin, way, caster, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
+        albedo, kept,
+    )  # fmt: skip
     row = surfaces.row[triangle].astype(np.float64)
     weight = np.stack([1 - bary.sum(axis=1), bary[:, 0], bary[:, 1]], axis=1)
     met = triangle >= 0
@@ -70,11 +74,11 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
     front = met & ((face * way).sum(axis=1) < 0)
     sign = np.where(front, 1.0, -1.0)[:, None] * met[:, None]
     lit = met & (front | (row[:, TWO_SIDED] > 0))
-    return FirstHits(triangle, bary, depth, albedo, position, sign * normal, sign * face, front, lit)
+    return FirstHits(triangle, bary, depth, albedo, position, sign * normal, sign * face, front, lit, kept)
 
 
 @kernel
-def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth, albedo):  # type: ignore[no-untyped-def]
+def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
     width, scene, intersect = caster.width, caster.scene, caster.intersect
     valid, floats, words = caster.valid, caster.floats, caster.words
     colour = _new_colour()
@@ -89,9 +93,14 @@ def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth
                     np.float32(1.0e30),
                 )  # fmt: skip
         trace(intersect, scene, valid, floats)
+        follow_packet(caster.tint, caster.occluded, width, valid, floats, True)
         for lane in range(width):
             i = group + lane
-            if i >= len(way) or words[GEOM_ID * width + lane] == NO_HIT:
+            if i >= len(way):
+                continue
+            for c in range(3):
+                kept[i, c] = light_kept(caster.tint, c, lane)
+            if words[GEOM_ID * width + lane] == NO_HIT:
                 continue
             prim = np.int64(words[PRIM_ID * width + lane])
             u, v = np.float64(floats[HIT_U * width + lane]), np.float64(floats[HIT_V * width + lane])

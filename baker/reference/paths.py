@@ -253,7 +253,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     tuple of int
         Closest-hit and shadow rays cast.
     """
-    scene, intersect, occluded = memory.scene, memory.intersect, memory.occluded
+    scene, intersect, occluded, tint = memory.scene, memory.intersect, memory.occluded, memory.tint
     on, s, words, bins = memory.on, memory.s, memory.words, memory.bins
     surface, material, least, lambertian = (
         surfaces.row,
@@ -289,7 +289,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
             if following == total or blocks == BLOCKS:
                 if blocks == 0:
                     break
-                rays += trace_blocks(s, words, blocks, on, intersect, scene, surface)
+                rays += trace_blocks(s, words, blocks, on, intersect, occluded, scene, tint, surface)
                 block, traced = 0, True
                 continue
             base = unsigned(blocks * BLOCK)
@@ -405,7 +405,9 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                         glow(shading, number[e], u, v, value, rgba, True)
                         for c in range(3):
                             s[base + (VALUE + c) * LANES + lane] = value[c]
-            shadows += cast_to_lamps(s, base, lamp, len(cumulative), bins, filled, occluded, scene, on, out)
+            shadows += cast_to_lamps(
+                s, base, lamp, len(cumulative), bins, filled, occluded, scene, tint, on, out
+            )
         if plain:
             scatter_lanes(s, base, _f(_SURE))
         else:
@@ -414,5 +416,5 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                     turn_alone(path, row, lane, s, words, base, hemisphere, value)
     for k in range(BINS):
         if filled[k] > 0:
-            cast_packet(bins, filled, k, occluded, scene, on, out)
+            cast_packet(bins, filled, k, occluded, scene, tint, on, out)
     return rays, shadows

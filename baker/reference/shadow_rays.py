@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from baker.kernels.tint import follow_packet, light_kept
 from baker.reference.lanes import (
     ALIVE,
     BIN_POINT,
     BIN_ROWS,
     BIN_VALUE,
     BINS,
+    CHOICE,
     LANES,
     POINT,
     REACH,
@@ -18,31 +20,33 @@ from baker.reference.lanes import (
     unsigned,
 )
 from baker.trace.jit import inner
-from baker.trace.packets import DIR_X, ORG_X, TFAR, call_embree
+from baker.trace.packets import DIR_X, ID, ORG_X, TFAR, call_embree
 
 _f = np.float32
 
 
 @inner
-def cast_packet(bins, filled, k, occluded, scene, on, out):  # type: ignore[no-untyped-def]
+def cast_packet(bins, filled, k, occluded, scene, tint, on, out):  # type: ignore[no-untyped-def]
     """Trace packet k, add the light of rays that nothing is in the way of to their points, and empty it.
 
-    out : (m, 3) float64
+    tint : of the path memory; out : (m, 3) float64
     """
     n, start = filled[k], unsigned(k * BIN_ROWS * LANES)
     for lane in range(LANES):
         on[lane] = -1 if lane < n else 0
-    call_embree(occluded, on, scene, bins[start : start + BIN_ROWS * LANES])
+    packet = bins[start : start + BIN_ROWS * LANES]
+    call_embree(occluded, on, scene, packet)
+    follow_packet(tint, occluded, LANES, on, packet, False)
     for lane in range(n):
         if bins[start + TFAR * LANES + lane] >= _f(0.0):
             point = unsigned(bins[start + BIN_POINT * LANES + lane])
             for c in range(3):
-                out[point, c] += bins[start + (BIN_VALUE + c) * LANES + lane]
+                out[point, c] += bins[start + (BIN_VALUE + c) * LANES + lane] * light_kept(tint, c, lane)
     filled[k] = 0
 
 
 @inner
-def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, on, out):  # type: ignore[no-untyped-def]
+def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, on, out):  # type: ignore[no-untyped-def]
     """Put the lanes' rays to lamps into packets, those to one lamp together; trace what is full.
 
     lamp : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
@@ -70,7 +74,9 @@ def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, on, out
             bins[place + (BIN_VALUE + a) * LANES] = s[here + (VALUE + a) * LANES]
         bins[place + TFAR * LANES] = s[here + REACH * LANES]
         bins[place + BIN_POINT * LANES] = s[here + POINT * LANES]
+        # Random bits: else all rays from a point to a light without area would be let through, or none.
+        bins[place + ID * LANES] = s[here + CHOICE * LANES]
         filled[k] += 1
         if filled[k] == LANES:
-            cast_packet(bins, filled, k, occluded, scene, on, out)
+            cast_packet(bins, filled, k, occluded, scene, tint, on, out)
     return n

@@ -14,8 +14,8 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.parallel import thread_count
 from baker.core.scene import Scene
 from baker.reference.lamps import LampTable, build_lamps
-from baker.shading.alpha import see_through
 from baker.shading.materials import Shading, resolve_materials
+from baker.shading.ray_tree import build_ray_tree
 from baker.trace.embree import RayScene
 from baker.trace.packets import aligned_floats
 
@@ -106,7 +106,7 @@ def build_reference(
     count = thread_count(threads)
     geometry = world_geometry(scene, _no_atlas(scene))
     shading = resolve_materials(scene, geometry, reflections=not lambertian)
-    rays = RayScene(geometry.position, geometry.triangle, threads=count, see_through=see_through(shading))
+    rays = build_ray_tree(geometry, shading, threads=count)
     lamps = build_lamps(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lamps, lambertian)
     return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count)

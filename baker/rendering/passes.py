@@ -158,7 +158,7 @@ def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> Poin
         hits = run.hits(begin, end, estimate.rounds)
         light = baked.radiance(run.reference, hits)
         light[hits.triangle < 0] = sky
-        add_pass(estimate, np.arange(begin, end), light)
+        add_pass(estimate, np.arange(begin, end), light * hits.kept)
 
     while not run.enough(estimate):
         run.blocks(work, run.within(estimate))
