@@ -26,7 +26,7 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import TileRunner, thread_count
 from baker.core.progress import Progress, report, silent
-from baker.core.scene import Scene, SceneWarning
+from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PagePlan, finish_page
@@ -130,7 +130,9 @@ def bake(
     compiling = warm.start()
     try:
         with record.stage("load"):
-            if not isinstance(scene, Scene):
+            if isinstance(scene, Scene):
+                check_brightness(scene)
+            else:
                 scene = load_scene(scene, up=settings.up, scale=settings.scale)
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
         with record.stage("unwrap"):

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.errors import InputError
+from baker.core.limits import BRIGHTEST
 from baker.core.raw import RawScene
 
 
@@ -224,3 +226,22 @@ class Scene:
     def n_triangles(self) -> int:
         """Count the triangles of all instances."""
         return sum(len(self.meshes[i.mesh].triangle) for i in self.instances)
+
+
+def check_brightness(scene: Scene) -> None:
+    """Refuse lights too bright to reckon with.
+
+    Raises
+    ------
+    InputError
+        If an emission or an intensity is above `BRIGHTEST`.
+    """
+    named = [(f"material '{m.name}'", "emission", m.emission, "cd/m2") for m in scene.materials]
+    named += [
+        (f"light '{light.name}'", "intensity", light.intensity, "lx" if light.kind == "directional" else "cd")
+        for light in scene.lights
+    ]
+    for name, what, value, unit in named:
+        if max(value) > BRIGHTEST:
+            message = f"{name}: its {what} of {max(value):.3g} {unit} is above {BRIGHTEST:.0e}; lower it"
+            raise InputError(message, file=str(scene.path) if scene.path else None, object=name)

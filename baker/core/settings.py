@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from baker.core.errors import SettingsError
+from baker.core.limits import BRIGHTEST
 
 # Hemisphere rays per texel for each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
@@ -45,7 +46,7 @@ class BakeSettings(BaseModel):
         "10%", description="Reach of AO: metres, `10%` of the scene's diagonal, or `inf`."
     )
     sky: str | None = Field(None, description="Sky radiance R,G,B in cd/m2.")
-    sky_strength: float = Field(1.0, ge=0, description="Factor on the sky.")
+    sky_strength: float = Field(1.0, ge=0, allow_inf_nan=False, description="Factor on the sky.")
     bounces: int | None = Field(
         None, ge=0, le=1000, description="Reflections of light; default: until converged."
     )
@@ -153,8 +154,8 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"])
         raise SettingsError(f"{name}: {first['msg']} (was {first['input']!r})", object=name) from None
-    if settings.sky is not None:
-        parse_sky(settings.sky)
+    if max(settings.sky_radiance) > BRIGHTEST:
+        raise SettingsError(f"sky: {settings.sky} is above {BRIGHTEST:.0e} cd/m2", object="sky")
     settings.ao_reach(1.0)
     settings.rgbm_top(1.0)
     if not settings.channels:

@@ -115,7 +115,8 @@ def duplicates(
 
 def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return, sorted, the triangles whose corners hash like those of another: few in a clean mesh."""
-    bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
+    with np.errstate(invalid="ignore"):
+        bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)
     for k in range(3):
         key = mix(key ^ bits[:, k])

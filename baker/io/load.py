@@ -13,7 +13,7 @@ from pathlib import Path
 
 from baker.core.errors import InputError, ResourceError, SettingsError
 from baker.core.registry import Registry
-from baker.core.scene import Scene
+from baker.core.scene import Scene, check_brightness
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ def load_scene(
     reflections : bool
         Also read textures that only say how mirror-like a surface is: bakes do not look at them.
     lenient : bool
-        For those who judge the file: indices out of range, negative lights and a scene without a good
-        triangle are no errors, and `Scene.raw` holds all triangles as they are in the file.
+        For those who judge the file: indices out of range, negative or far too strong lights and a scene
+        without a good triangle are no errors, and `Scene.raw` holds all triangles as they are in the file.
 
     Returns
     -------
@@ -108,9 +108,12 @@ def load_scene(
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
     try:
-        return importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
+        scene = importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
     except MemoryError:
         raise ResourceError("the scene does not fit into memory", file=str(path)) from None
+    if not lenient:
+        check_brightness(scene)
+    return scene
 
 
 def read_scene_file(path: Path) -> bytes:

@@ -133,8 +133,8 @@ class _Part:
         if self.source.normal is None:
             flat = face_normal(position, self.triangle)
             return np.repeat(_unit(flat), 3, axis=0).astype(np.float32)
-        given = self.source.normal[self.row].astype(np.float64)
         with np.errstate(over="ignore", invalid="ignore"):
+            given = self.source.normal[self.row].astype(np.float64)
             length = np.sqrt((given * given).sum(axis=1))
             bad = ~(np.isfinite(length) & (length > 1e-12))
         if bad.any():

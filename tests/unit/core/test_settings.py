@@ -51,6 +51,8 @@ def test_a_name_like_no_other_brings_the_list():
         ("light_samples", 0),
         ("ao_samples", 0),
         ("sky_strength", -0.1),
+        ("sky_strength", float("inf")),
+        ("sky", "1e16,0,0"),
         ("bounces", -1),
         ("bounces", 1001),
         ("dtype", "int"),

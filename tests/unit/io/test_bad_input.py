@@ -291,3 +291,12 @@ def test_flipped_bytes_never_surprise(tmp_path):
             broken[at] = rng.integers(0, 256)
         loaded += survives(path, bytes(broken))
     assert 0 < loaded < 600
+
+
+@pytest.mark.parametrize("strength", [1e16, 1e200])
+def test_an_emission_too_strong_to_reckon_with(tmp_path, strength):
+    more = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    builder = quad_builder(name="lamp", emissiveFactor=[1, 1, 1], extensions=more)
+    path = write(tmp_path / "a.glb", builder.glb())
+    refuse(path, "material 'lamp'", "emission", "cd/m2")
+    assert load_scene(path, lenient=True).materials
