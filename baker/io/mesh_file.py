@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import logging
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from baker.core.raw import PrimitiveArrays
 from baker.core.scene import Material, Scene
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_scene import scene_of_meshes, to_world
+
+# It logs what it could not read with a traceback, which Python prints where no program asked for logs.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 

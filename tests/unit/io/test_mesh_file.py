@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -120,3 +122,13 @@ def test_bad_files_are_refused_in_a_sentence(tmp_path, name, data, word):
         load(tmp_path, name, data)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_parsers_own_logs_are_not_shown(tmp_path):
+    corner = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    text = f"solid a\nfacet normal 0 x 1\nouter loop\n{corner}endloop\nendfacet\nendsolid a\n"
+    (tmp_path / "a.stl").write_text(text)
+    script = "import sys\nfrom baker.io.load import load_scene\nprint(load_scene(sys.argv[1]).n_triangles)"
+    command = [sys.executable, "-c", script, str(tmp_path / "a.stl")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("1", "")
