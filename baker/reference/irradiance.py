@@ -19,10 +19,11 @@ from baker.core.progress import Progress, silent
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.reference.estimators import Estimator, estimator_named
 from baker.reference.lanes import new_path_memory
-from baker.reference.occlusion import open_rays
+from baker.reference.occlusion import near_together, open_rays
 from baker.reference.paths import trace_paths
 from baker.reference.randomness import seed_salt
 from baker.reference.view import Reference
+from baker.trace.packets import occluded_arguments
 
 SAMPLES_PER_PASS = 16
 _TILE = 128
@@ -164,15 +165,20 @@ def openness_pass(
     least = np.float32(reference.surfaces.least)
     setting = np.array([number, seed_salt(seed)], np.int64)
 
+    arguments = np.stack([occluded_arguments(coherent=coherent) for coherent in (False, True)])
+
     def work(begin: int, end: int) -> None:
+        rows = begin + near_together(position[begin:end, 0])
         out = np.zeros((end - begin, 1))
         open_rays(
-            position[begin:end], normal[begin:end], face_normal[begin:end], begin,
-            new_path_memory(reference.rays), net, shared, reach, least, setting, out,
+            position, normal, face_normal, rows, new_path_memory(reference.rays), arguments, net, shared,
+            reach, least, setting, out,
         )  # fmt: skip
-        add_pass(estimate, slice(begin, end), out / samples)
+        add_pass(estimate, rows, out / samples)
 
-    run_tiles(len(position), 4 * _TILE, work, threads=reference.threads, stage="openness", progress=progress)
+    # Large tiles hold more neighbours, but few of them keep threads waiting at the end.
+    tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE)
+    run_tiles(len(position), tile, work, threads=reference.threads, stage="openness", progress=progress)
     estimate.rounds += 1
     estimate.rays += len(position) * samples
 

@@ -1,12 +1,16 @@
 """Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
 
-Eight points at a time, each with the same sample: their rays share a packet and its first bits. Loops over
+Eight points at a time, each with the same sample: their rays share a packet and their first bits. So rays of
+points that are close together go alike, and Embree follows such a packet through its tree as one. Loops over
 lanes touch one array each, or they would not become vector code (see `lanes`).
+
+Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.kernels.sampling import cosine_direction, reverse_bits, scramble_reversed
 from baker.reference.lane_vertex import stand_lanes
@@ -24,20 +28,34 @@ from baker.reference.lanes import (
     W_WAY,
 )
 from baker.reference.randomness import mix4
-from baker.trace.jit import inner, kernel
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree
+from baker.trace.jit import inner, kernel, larger, smaller
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree_with
 
 _f = np.float32
 _w = np.uint32
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = LANES
+# Rays go alike if they start within this share of their reach, or of the scene's size (`_FAR` * least).
+_ALIKE, _FAR = _f(0.125), _f(100.0)
+# Numbers of ten bits with two zeros between any two bits.
+_SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
+
+
+def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return an order (m,) of m > 0 points (m, 3) in which those close together follow each other."""
+    low = position.min(axis=0)
+    side = max(float((position.max(axis=0) - low).max()), 1.0e-30)
+    cell = ((position - low) * ((len(_SPREAD) - 0.5) / side)).astype(np.int64)
+    key = _SPREAD[cell[:, 0]] | _SPREAD[cell[:, 1]] << 1 | _SPREAD[cell[:, 2]] << 2
+    # Numbers are sorted in a fraction of the time that their order is found in.
+    return np.sort(key << 32 | np.arange(len(position))) & 0xFFFFFFFF
 
 
 @inner
-def seed_lanes(words, first, number, salt):  # type: ignore[no-untyped-def]
-    """Write the two scramble seeds of points `first` to `first` + 8."""
-    for lane in range(LANES):
-        x, y, _, _ = mix4(_w(first + lane), _w(0xFFFFFFFE), _w(number), _w(salt))
+def seed_lanes(words, rows, group, number, salt):  # type: ignore[no-untyped-def]
+    """Write the two scramble seeds of points `group` to `group` + 8 of the order `rows`."""
+    for lane in range(min(LANES, len(rows) - group)):
+        x, y, _, _ = mix4(_w(rows[group + lane]), _w(0xFFFFFFFE), _w(number), _w(salt))
         words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
 
 
@@ -54,13 +72,26 @@ def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
-    """Copy place k of points `group` to `group` + 8 into the lanes."""
-    for lane in range(min(LANES, len(position) - group)):
+def place_lanes(s, position, normal, face_normal, rows, group, k):  # type: ignore[no-untyped-def]
+    """Copy place k of points `group` to `group` + 8 of the order `rows` into the lanes."""
+    for lane in range(min(LANES, len(rows) - group)):
+        i = rows[group + lane]
         for a in range(3):
-            s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
-            s[(SHADED + a) * _L + lane] = normal[group + lane, k, a]
-            s[(NORMAL + a) * _L + lane] = face_normal[group + lane, k, a]
+            s[(ORG_X + a) * _L + lane] = position[i, k, a]
+            s[(SHADED + a) * _L + lane] = normal[i, k, a]
+            s[(NORMAL + a) * _L + lane] = face_normal[i, k, a]
+
+
+@inner
+def extent(s, lanes):  # type: ignore[no-untyped-def]
+    """Return how far apart, along any axis, the first lanes' rays start."""
+    most = _ZERO
+    for a in range(3):
+        low = high = s[(ORG_X + a) * _L]
+        for lane in range(1, lanes):
+            low, high = smaller(low, s[(ORG_X + a) * _L + lane]), larger(high, s[(ORG_X + a) * _L + lane])
+        most = larger(most, high - low)
+    return most
 
 
 @inner
@@ -96,32 +127,37 @@ def count_lanes(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def open_rays(  # type: ignore[no-untyped-def]
-    position, normal, face_normal, begin, memory, net, shared, reach, least, how, out
+    position, normal, face_normal, rows, memory, arguments, net, shared, reach, least, how, out
 ):
-    """Count the rays of each point that meet nothing within reach.
+    """Count the rays of points that meet nothing within reach.
 
-    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k
-    begin : number of the first point; memory : `PathMemory`; net : (n, 2) uint32
-    shared : uint32, bits that all points share; reach, least : float32, metres, see `Surfaces`
+    position, normal, face_normal : (n, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k
+    rows : (m,) int64, the points, neighbours together; memory : `PathMemory`
+    arguments : (2, 5) int64, `occluded_arguments` of packets whose rays do not go alike, and do
+    net : (n, 2) uint32; shared : uint32, bits that all points share
+    reach, least : float32, metres, see `Surfaces`
     how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
     """
     scene, occluded = memory.scene, memory.occluded
     on, s, words = memory.on, memory.s, memory.words
     samples, places = len(net), position.shape[1]
-    for group in range(0, len(position), LANES):
-        lanes = min(LANES, len(position) - group)
-        seed_lanes(words, begin + group, how[0], how[1])
+    alike = _ALIKE * min(reach, _FAR * least)
+    for group in range(0, len(rows), LANES):
+        lanes = min(LANES, len(rows) - group)
+        seed_lanes(words, rows, group, how[0], how[1])
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
             s[VALUE * LANES + lane] = _ZERO
         for sample in range(samples):
             k = (how[0] * samples + sample) % places
             if sample == 0 or places > 1:
-                place_lanes(s, position, normal, face_normal, group, k)
+                place_lanes(s, position, normal, face_normal, rows, group, k)
                 stand_lanes(s, 0, least)
+            if sample == 0:
+                asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
             number_lanes(words, net[sample, 0], net[sample, 1], shared)
             point_lanes(s, reach)
-            call_embree(occluded, on, scene, s)
+            call_embree_with(occluded, on, scene, s, asked)
             count_lanes(s)
         for lane in range(lanes):
             out[group + lane, 0] += s[VALUE * LANES + lane]

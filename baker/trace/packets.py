@@ -34,6 +34,8 @@ LANES = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
 # Words of what the filter function of coloured triangles finds: context, `Tint.stop`, `Tint.colour`.
 TINT_STOP, TINT_COLOUR, CONTEXT_WORDS = 16, 16 + LANES, 16 + 4 * LANES
+# RTC_RAY_QUERY_FLAG_COHERENT.
+_COHERENT = 1 << 16
 
 
 def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
@@ -154,10 +156,18 @@ def new_tint(scene: int) -> Tint:
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:TINT_STOP] = NO_HIT
-    # RTCOccludedArguments: no flags and all features (32 bits each), context, no functions of its own.
-    arguments = np.array([0xFFFFFFFF << 32, 0, 0, 0, 0], np.uint64).view(np.int64)
+    arguments = occluded_arguments()
     arguments[1] = memory.ctypes.data
     return Tint(scene, arguments, words[TINT_STOP:TINT_COLOUR], memory[TINT_COLOUR:])
+
+
+def occluded_arguments(*, coherent: bool = False) -> NDArray[np.int64]:
+    """Return (5,) RTCOccludedArguments: flags and features (32 bits each), no context, no functions.
+
+    coherent : the rays of a packet go alike: it is followed through the tree as one
+    """
+    flags = _COHERENT if coherent else 0
+    return np.array([0xFFFFFFFF << 32 | flags, 0, 0, 0, 0], np.uint64).view(np.int64)
 
 
 def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
