@@ -35,6 +35,7 @@ from baker.reference.bidirectional_weights import (
     towards_lamp,
 )
 from baker.reference.bsdf import N_PARAMETERS, bsdf_sample
+from baker.reference.lamps import SHORT
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.randomness import draw, path_state, stratum
 from baker.reference.vertex import (
@@ -45,9 +46,11 @@ from baker.reference.vertex import (
     GO,
     GRAZE,
     LIGHT,
+    MOST,
     NORMAL,
     PLACE,
     SHADED,
+    SURE,
     TO,
     arrive,
     glow,
@@ -59,10 +62,6 @@ from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, ID, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
-# Roulette begins after this many bounces and lets at most this share live on.
-_SURE = 3
-_MOST = 0.98
-_SHORT = 0.9999
 # Working memory of a tile; kept vertices stand in column (vertex * MAX_WIDTH + lane).
 _new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
 _new_row, _new_kept_row = (scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
@@ -163,7 +162,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: 
     for c in range(3):
         value[c] *= path[BETA + c, lane] * kept[BETA + c, k] * spare[c] * scale
         total += value[c]
-    way[0], way[1], way[2], way[3] = dx, dy, dz, length * _SHORT
+    way[0], way[1], way[2], way[3] = dx, dy, dz, length * SHORT
     return total > 0.0
 
 
@@ -188,7 +187,7 @@ def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-un
     if pixel < 0 or cosine <= 0.0:
         return -1
     density = pixel_density(camera, way) * cosine / square
-    way[0], way[1], way[2], way[3] = -way[0], -way[1], -way[2], length * _SHORT
+    way[0], way[1], way[2], way[3] = -way[0], -way[1], -way[2], length * SHORT
     reverse, _ = meet(
         path, row, lane, way[0], way[1], way[2], path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane],
         value,
@@ -415,9 +414,9 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                     u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1)
                 alive = scatter_both(path, row, lane, eye[lane], choice, u, w, value, spare)
                 length = path[BOUNCES, lane] if eye[lane] else np.float64(count[lane] - 1)
-                if alive and length >= _SURE:
+                if alive and length >= SURE:
                     survive = max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane])
-                    survive = min(survive if eye[lane] else survive / first[lane], _MOST)
+                    survive = min(survive if eye[lane] else survive / first[lane], MOST)
                     alive = draw(state, lane) < survive
                     for c in range(3):
                         path[BETA + c, lane] /= survive

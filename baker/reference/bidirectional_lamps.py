@@ -37,6 +37,7 @@ from baker.reference.lamps import (
     POINT_CHANCE,
     POSITION,
     RADIANCE,
+    SHORT,
     TWO_SIDED,
     aim_at_point_light,
     aim_at_triangle,
@@ -48,8 +49,6 @@ from baker.reference.vertex import BETA, DENSITY, GO, NORMAL, PLACE, place_off
 from baker.trace.jit import inner
 
 _INV_4_PI = 0.25 / math.pi
-# Shadow rays end this share of their way before the goal.
-_SHORT = 0.9999
 
 
 @inner
@@ -190,7 +189,7 @@ def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, cho
         square = dx * dx + dy * dy + dz * dz
         length = math.sqrt(square)
         dx, dy, dz = dx / length, dy / length, dz / length
-        reach = length * _SHORT
+        reach = length * SHORT
         scale = 1.0 / density
         # Density per area (but for the cosine here) with which light that starts there arrives here.
         onward = lamp_cosine(triangle, lamp, dx, dy, dz) * emission_density(triangle, lamp) / square
@@ -205,7 +204,7 @@ def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, cho
         scale = share / point[e, POINT_CHANCE]
         onward = far
         if point[e, KIND] != 2.0:
-            onward = spread(point, e) / max((reach / _SHORT) ** 2, 1.0e-20)
+            onward = spread(point, e) / max((reach / SHORT) ** 2, 1.0e-20)
         red, green, blue = point[e, INTENSITY], point[e, INTENSITY + 1], point[e, INTENSITY + 2]
     else:
         a, b, c = cosine_sample(u, w)

@@ -164,7 +164,6 @@ def openness_pass(
     reach = np.float32(min(distance, 1.0e30))
     least = np.float32(reference.surfaces.least)
     setting = np.array([number, seed_salt(seed)], np.int64)
-
     arguments = np.stack([occluded_arguments(coherent=coherent) for coherent in (False, True)])
 
     def work(begin: int, end: int) -> None:

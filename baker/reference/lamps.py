@@ -35,9 +35,9 @@ KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE = 0, 1, 4, 7, 1
 LANE_CORNER, LANE_EDGE, LANE_NORMAL, LANE_GAIN, LANE_TWO_SIDED = 0, 3, 9, 12, 13
 LANE_OUTER, LANE_SCALE, LANE_RADIANCE, LANE_KIND = 14, 15, 16, 19
 _KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
-# A directional light and the sky end nowhere.
+# A directional light and the sky end nowhere; rays to other lamps end this share of their way before them.
 FAR = 1.0e30
-_SHORT = 0.9999
+SHORT = 0.9999
 
 
 class LampTable(NamedTuple):
@@ -209,7 +209,7 @@ def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
     dx, dy, dz = dx / length, dy / length, dz / length
     cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
     share = spot_share(point, e, cosine)
-    return dx, dy, dz, length * _SHORT, share / square
+    return dx, dy, dz, length * SHORT, share / square
 
 
 @inner

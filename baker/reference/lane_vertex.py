@@ -15,6 +15,7 @@ import numpy as np
 
 from baker.kernels.sampling import cosine_direction, tangent_frame, triangle_barycentric
 from baker.reference.lamps import (
+    FAR,
     LANE_CORNER,
     LANE_EDGE,
     LANE_GAIN,
@@ -24,6 +25,7 @@ from baker.reference.lamps import (
     LANE_RADIANCE,
     LANE_SCALE,
     LANE_TWO_SIDED,
+    SHORT,
 )
 from baker.reference.lanes import (
     ALBEDO,
@@ -51,6 +53,7 @@ from baker.reference.lanes import (
     W_WAY,
     unsigned,
 )
+from baker.reference.vertex import MOST, OFFSET, SURE
 from baker.reference.view import CORNER, FACE, SHADING, TWO_SIDED
 from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
@@ -59,10 +62,8 @@ _f = np.float32
 # A float64 constant would widen the whole expression.
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
-_OFFSET = _f(1.0e-5)
-_SHORT = _f(0.9999)
-_FAR = _f(1.0e30)
-_MOST = _f(0.98)
+_OFFSET, _SHORT, _FAR = _f(OFFSET), _f(SHORT), _f(FAR)
+_SURE, _MOST = _f(SURE), _f(MOST)
 _T = TRIANGLE * LANES
 _M = LAMP * LANES
 _L = LANES
@@ -244,11 +245,8 @@ def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
 
 
 @inner
-def scatter_lanes(s, base, sure):  # type: ignore[no-untyped-def]
-    """Choose the directions in which the lanes' paths go on; others end.
-
-    sure : float32, bounces before roulette begins
-    """
+def scatter_lanes(s, base):  # type: ignore[no-untyped-def]
+    """Choose the directions in which the lanes' paths go on; others end."""
     base = unsigned(base)
     for lane in range(LANES):
         u, w = s[base + U_WAY * _L + lane] - _ONE, s[base + W_WAY * _L + lane] - _ONE
@@ -277,7 +275,7 @@ def scatter_lanes(s, base, sure):  # type: ignore[no-untyped-def]
         green = s[base + (BETA + 1) * _L + lane] * s[base + (ALBEDO + 1) * _L + lane]
         blue = s[base + (BETA + 2) * _L + lane] * s[base + (ALBEDO + 2) * _L + lane]
         most = max(max(red, green), blue)
-        survive = min(most, _MOST) if s[base + BOUNCES * _L + lane] >= sure else _ONE
+        survive = min(most, _MOST) if s[base + BOUNCES * _L + lane] >= _SURE else _ONE
         goes_on = (
             c > _ZERO and above > _ZERO and s[base + ROULETTE * _L + lane] - _ONE < survive and most > _ZERO
         )

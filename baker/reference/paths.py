@@ -63,8 +63,10 @@ from baker.reference.vertex import DENSITY as PATH_DENSITY
 from baker.reference.vertex import (
     FRAME,
     GO,
+    MOST,
     N_ROWS,
     PLACE,
+    SURE,
     aim,
     arrive,
     glow,
@@ -78,9 +80,6 @@ from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
 _f = np.float32
-# Roulette begins after this many bounces and lets at most this share live on.
-_SURE = 3
-_MOST = 0.98
 # Few lamps are counted through, more are searched.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
@@ -201,8 +200,8 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ign
     u, w = np.float64(s[base + U_WAY * LANES + lane]) - 1.0, np.float64(s[base + W_WAY * LANES + lane]) - 1.0
     alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
     survive = 1.0
-    if alive and s[base + BOUNCES * LANES + lane] >= _f(_SURE):
-        survive = min(max(path[PATH_BETA, lane], path[PATH_BETA + 1, lane], path[PATH_BETA + 2, lane]), _MOST)
+    if alive and s[base + BOUNCES * LANES + lane] >= _f(SURE):
+        survive = min(max(path[PATH_BETA, lane], path[PATH_BETA + 1, lane], path[PATH_BETA + 2, lane]), MOST)
         alive = s[base + ROULETTE * LANES + lane] - 1.0 < survive
     s[base + ALIVE * LANES + lane] = _f(1.0) if alive else _f(0.0)
     cosine = 0.0
@@ -409,7 +408,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                 s, base, lamp, len(cumulative), bins, filled, occluded, scene, tint, on, out
             )
         if plain:
-            scatter_lanes(s, base, _f(_SURE))
+            scatter_lanes(s, base)
         else:
             for lane in range(LANES):
                 if s[base + ALIVE * LANES + lane] > _f(0.0):

@@ -16,6 +16,7 @@ from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 from baker.reference.bsdf import (
     METALLIC,
+    SMOOTH,
     WIDTH,
     bsdf_eval,
     bsdf_sample,
@@ -27,6 +28,7 @@ from baker.reference.lamps import (
     INTENSITY,
     POINT_CHANCE,
     RADIANCE,
+    SHORT,
     aim_at_point_light,
     aim_at_triangle,
     pick_lamp,
@@ -42,8 +44,9 @@ N_ROWS = 32
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
 # Origins leave the surface by this share of the largest coordinate.
-_OFFSET = 1.0e-5
-_SHORT = 0.9999
+OFFSET = 1.0e-5
+# Roulette begins after this many bounces and lets at most this share live on.
+SURE, MOST = 3, 0.98
 
 
 @inner
@@ -68,10 +71,10 @@ def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
 @inner
 def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`."""
-    step = _OFFSET * max(abs(x), abs(y), abs(z), least)
-    path[PLACE, lane] = x + step * path[NORMAL, lane]
-    path[PLACE + 1, lane] = y + step * path[NORMAL + 1, lane]
-    path[PLACE + 2, lane] = z + step * path[NORMAL + 2, lane]
+    off = OFFSET * max(abs(x), abs(y), abs(z), least)
+    path[PLACE, lane] = x + off * path[NORMAL, lane]
+    path[PLACE + 1, lane] = y + off * path[NORMAL + 1, lane]
+    path[PLACE + 2, lane] = z + off * path[NORMAL + 2, lane]
 
 
 @inner
@@ -198,7 +201,7 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
             return -1
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         dx, dy, dz = dx / length, dy / length, dz / length
-        reach = length * _SHORT
+        reach = length * SHORT
         scale = 1.0 / density
         red, green, blue = (
             triangle[lamp, RADIANCE],
@@ -261,7 +264,7 @@ def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[
     mirror = 0.0
     if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
         # A mirror's direction cannot be found by chance.
-        mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < 1.0e-3 else 0.0
+        mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < SMOOTH else 0.0
     if hemisphere == 0 or choice < mirror:
         lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)
         if smooth:

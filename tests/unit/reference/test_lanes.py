@@ -121,7 +121,7 @@ def test_directions_follow_the_cosine_whatever_the_normal():
         frame(rows, tilt)
         rows[0, U_WAY], rows[0, W_WAY] = 1 + rng.random((2, LANES))
         rows[0, ROULETTE] = 1.5
-        scatter_lanes(s, 0, np.float32(3))
+        scatter_lanes(s, 0)
         way = rows[0, DIR_X : DIR_X + 3].T.astype(float)
         up = (way * tilt).sum(axis=1)
         assert np.allclose(np.linalg.norm(way, axis=1), 1, atol=2e-6)
@@ -156,7 +156,7 @@ def test_roulette_is_fair():
         rows[0, BETA : BETA + 3] = np.array([1, 1, 1, 1, 0.5, 0.25, 0.1, 4])
         rows[0, ALBEDO : ALBEDO + 3] = 0.5
         rows[0, U_WAY], rows[0, W_WAY], rows[0, ROULETTE] = 1.4, 1.7, 1 + (k + 0.5) / n
-        scatter_lanes(s, 0, np.float32(3))
+        scatter_lanes(s, 0)
         left += rows[0, ALIVE] * rows[0, BETA]
     assert np.allclose(left / n, [0.5, 0.5, 0.5, 0.5, 0.25, 0.125, 0.05, 2.0], rtol=1e-3)
 
