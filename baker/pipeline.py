@@ -29,7 +29,7 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
-from baker.finish.finish import PagePlan, finish_page
+from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.io.load import load_scene
 from baker.kernels.emitters import Emitters
 from baker.kernels.hits import HitTable
@@ -428,7 +428,11 @@ def _finish(
             )
             for page in range(atlas.n_pages):
                 images = [
-                    (texels.page_image(part.value, page=page), texels.page_image(part.error, page=page))
+                    PageLayer(
+                        texels.page_image(part.value, page=page),
+                        texels.page_image(part.error, page=page),
+                        part.bound,
+                    )
                     for part in layers
                 ]
                 plan = PagePlan(chart[page], valid[page], centroid[page])

@@ -127,7 +127,7 @@ def cast_rays() -> None:
 
 def finish_pages() -> None:
     """Finish a page of two charts, one of them with a buried texel."""
-    from baker.finish.finish import PagePlan, finish_page
+    from baker.finish.finish import PageLayer, PagePlan, finish_page
 
     chart = np.full((_PAGE, _PAGE), -1, np.int32)
     chart[4:20, 4:40] = 0
@@ -138,7 +138,9 @@ def finish_pages() -> None:
     noise = np.random.Generator(np.random.PCG64(0))
     value = noise.random((_PAGE, _PAGE, 3), np.float32)
     error = np.full((_PAGE, _PAGE), 0.3, np.float32)
-    finish_page(plan, [(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent)
+    finish_page(
+        plan, [PageLayer(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent
+    )
 
 
 if __name__ == "__main__":

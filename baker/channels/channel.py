@@ -42,10 +42,13 @@ class Layer:
     value : (n_front, C) float32
     error : (n_front,) float32
         Standard error of the mean of the C values.
+    bound : bool
+        Whether that is an upper bound, perhaps a loose one.
     """
 
     value: NDArray[np.float32]
     error: NDArray[np.float32]
+    bound: bool = False
 
 
 @dataclass(frozen=True)

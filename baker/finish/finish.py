@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +42,20 @@ class PagePlan:
         return covered
 
 
+class PageLayer(NamedTuple):
+    """A part of a page that is denoised by itself.
+
+    value (H, W, C) float32; error (H, W) float32, standard error; bound: whether that is an upper bound.
+    """
+
+    value: NDArray[np.float32]
+    error: NDArray[np.float32]
+    bound: bool = False
+
+
 def finish_page(
     plan: PagePlan,
-    layers: list[tuple[NDArray[np.float32], NDArray[np.float32]]],
+    layers: list[PageLayer],
     *,
     upper: float,
     denoise: bool,
@@ -55,7 +67,7 @@ def finish_page(
 
     Parameters
     ----------
-    layers : list of value (H, W, C) float32 and standard error (H, W) float32
+    layers : list of PageLayer
     upper : float
         Largest possible value of the sum.
     dilation : int
@@ -66,16 +78,22 @@ def finish_page(
     value : (H, W, C) float32, finite, 0 to `upper`
     grown : (H, W) bool, texels filled by the growth
     """
-    total = np.zeros_like(layers[0][0])
+    total = np.zeros_like(layers[0].value)
     light = _light(plan, layers)
-    for value, error in layers:
+    for value, error, bound in layers:
         if not value[plan.valid].any():
             continue
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
         noise = float(np.sqrt(np.square(error[plan.valid] / light, dtype=np.float64).mean()))
         if denoise and noise > NOT_WORTH_FILTERING:
             repaired = denoise_page(
-                repaired, plan.covered, plan.chart, standard_error=error, threads=threads, progress=progress
+                repaired,
+                plan.covered,
+                plan.chart,
+                standard_error=error,
+                bound=bound,
+                threads=threads,
+                progress=progress,
             )
         total += recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
     np.clip(total, 0.0, upper, out=total)
@@ -84,11 +102,9 @@ def finish_page(
     return grown_value, grown
 
 
-def _light(
-    plan: PagePlan, layers: list[tuple[NDArray[np.float32], NDArray[np.float32]]]
-) -> NDArray[np.float32]:
+def _light(plan: PagePlan, layers: list[PageLayer]) -> NDArray[np.float32]:
     """Return the sum of layers (n_valid,) at valid texels, dark ones raised to a tenth of the mean."""
     total = np.zeros(int(plan.valid.sum()), np.float32)
-    for value, _ in layers:
-        total += value[plan.valid].mean(axis=1)
+    for layer in layers:
+        total += layer.value[plan.valid].mean(axis=1)
     return np.maximum(total, max(0.1 * float(total.mean(dtype=np.float64)), 1e-30) if total.size else 0.0)

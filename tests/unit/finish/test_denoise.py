@@ -9,7 +9,7 @@ import pytest
 
 from baker.core.errors import Cancelled, ResourceError
 from baker.finish import oidn
-from baker.finish.denoise import denoise_page, denoiser_name, surround_charts
+from baker.finish.denoise import FITTED, denoise_page, denoiser_name, surround_charts
 from baker.finish.noise import estimate_error
 from baker.kernels import page_guard
 from baker.kernels.page_guard import hold_to_samples
@@ -72,6 +72,22 @@ def test_a_nearly_converged_page_gets_no_worse(lit):
             clean = denoise_page(noisy, chart >= 0, chart, standard_error=standard_error)
             for part in rings(chart):
                 assert wrong(clean, truth, part) < most * wrong(noisy, truth, part)
+
+
+def test_an_upper_bound_is_lowered_to_the_noise_that_is_seen(lit):
+    truth, chart = lit
+    noisy = with_noise(truth, 0.05)
+    error = (0.05 * truth @ np.float32([0.2126, 0.7152, 0.0722])).astype(np.float32)
+
+    def clean(standard_error, **more):
+        return denoise_page(noisy, chart >= 0, chart, standard_error=standard_error, **more)
+
+    right, lowered = clean(FITTED * error), clean(6 * error, bound=True)
+    covered = chart >= 0
+    assert wrong(lowered, right, covered) < 0.1 * wrong(clean(6 * error), right, covered)
+    # What is no loose bound stays, and so does one of zero.
+    assert wrong(clean(error, bound=True), clean(error), covered) < 1e-3
+    np.testing.assert_array_equal(clean(0 * error, bound=True), noisy)
 
 
 def test_ambient_occlusion_is_filtered_as_grey_and_gaps_stay(lit):
