@@ -134,6 +134,7 @@ def bake(
                 check_brightness(scene)
             else:
                 scene = load_scene(scene, up=settings.up, scale=settings.scale)
+        compiling = warm.suit(compiling, scene)
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)

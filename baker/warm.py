@@ -11,12 +11,13 @@ import gc
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from baker.core.progress import Progress, report, silent
-from baker.core.scene import SceneWarning
+from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
 
 STAGE = "compile"
 _LOOK = 0.1
@@ -32,7 +33,31 @@ def start() -> subprocess.Popen[bytes] | None:
     # Where nothing can be kept, another process cannot help.
     if folder is None or any(Path(folder).glob("page_guard.hold_to_samples-*.nbi")):
         return None
-    command = [sys.executable, "-m", "baker.warm"]
+    return _run()
+
+
+def suit(process: subprocess.Popen[bytes] | None, scene: Scene) -> subprocess.Popen[bytes] | None:
+    """Start anew where the scene has surfaces that let light through: its kernels are others."""
+    passing = [material for material in scene.materials if _passes(material)]
+    if process is None or not passing:
+        return process
+    stop(process)
+    blend = [material for material in passing if material.alpha_mode == "BLEND"]
+    tinted = any(m.base_colour_texture or m.base_colour[:3] != (1.0, 1.0, 1.0) for m in blend)
+    return _run("coloured" if tinted else "holes")
+
+
+def _passes(material: Material) -> bool:
+    """Tell whether light passes a surface of the material, if its vertices have no alpha of their own."""
+    lowest = material.base_colour[3]
+    if material.base_colour_texture is not None:
+        alpha = material.base_colour_texture.image[..., 3]
+        lowest *= float(alpha.min()) / (255 if alpha.dtype == np.uint8 else 1)
+    return material.alpha_mode != "OPAQUE" and lowest < 1.0
+
+
+def _run(*kind: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "baker.warm", *kind]
     silence = subprocess.DEVNULL
     return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
 
@@ -81,47 +106,56 @@ def stop(process: subprocess.Popen[bytes] | None) -> None:
         process.wait()
 
 
-def cast_rays() -> None:
-    """Light texels by one lamp that shines into the open, and gather from them."""
+def cast_rays(kind: str = "") -> None:
+    """Light texels by one lamp that shines into the open, and gather from them.
+
+    Parameters
+    ----------
+    kind : str
+        "holes" for a lamp that light passes, "coloured" for one that colours it, too.
+    """
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
-    from baker.core.scene import Instance, Material, Mesh, Scene
     from baker.kernels.area_light import light_samples
-    from baker.kernels.emitters import lamps_for, widest_view
+    from baker.kernels.emitters import lamps_for, needed_shading, widest_view
     from baker.kernels.gather import N_COLUMNS, gather
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
     from baker.lights.emissive import build_emitters
     from baker.shading.materials import resolve_materials
-    from baker.trace.embree import RayScene
+    from baker.shading.ray_tree import build_ray_tree
     from baker.trace.packets import new_caster
 
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
     up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     mesh = Mesh("lamp", corner, up, face, zero, zero, np.zeros(3, np.int32), np.arange(3, dtype=np.int32))
+    glass = (0.5, 1.0, 1.0, 0.5) if kind == "coloured" else (1.0, 1.0, 1.0, 0.5)
     material = Material(emission=(1.0, 1.0, 1.0))
+    if kind:
+        material = replace(material, base_colour=glass, alpha_mode="BLEND")
     scene = Scene("lamp", None, (mesh,), (material,), (Instance(0, "lamp", 0, np.eye(4)),))
     layout = InstanceLayout(0, 0, np.arange(3, dtype=np.int32), corner[:, :2], face, zero, False, 1.0)
     geometry = world_geometry(scene, Atlas(16, 1, (layout,), 1, 2))
     shading = resolve_materials(scene, geometry)
     emitters = build_emitters(geometry, shading)
-    rays = RayScene(geometry.position, geometry.triangle, threads=1)
+    rays = build_ray_tree(geometry, shading, threads=1)
     table = HitTable(np.zeros((1, 16), np.float32), 16, 256)
 
     origin, normal = np.zeros((_TEXELS, 16, 3), np.float32), np.zeros((_TEXELS, 16, 3), np.float32)
     origin[..., 2], normal[..., 2] = 1.0, -1.0
     caster, net, shared = new_caster(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
     lamps, exact = lamps_for(emitters, origin), np.zeros(_TEXELS, np.uint8)
+    needed = needed_shading(emitters, shading)
     # In the order in which a bake needs them. As long again takes what it compiles itself: everything before
     # direct light, the rays of gaps and form factors, and the matrix.
     weigh, two = np.array([16.0, 4.0]), np.array([1.0, 16.0])
     widest_view(emitters, origin)
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
-    light_samples(origin, normal, lamps, None, caster, 0, net, shared, weigh, exact, sums, squares)
+    light_samples(origin, normal, lamps, needed, caster, 0, net, shared, weigh, exact, sums, squares)
     dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
-    gather(origin, normal, table, dark, lamps, None, caster, 0, net, shared, black, two, exact, out)
+    gather(origin, normal, table, dark, lamps, needed, caster, 0, net, shared, black, two, exact, out)
     rays.close()
 
 
@@ -149,5 +183,5 @@ if __name__ == "__main__":
     skip_blas()
     # Compiling makes millions of small objects and hardly a cycle of them: looking for some takes 5 %.
     gc.disable()
-    cast_rays()
+    cast_rays(*sys.argv[1:])
     finish_pages()

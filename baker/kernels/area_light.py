@@ -236,7 +236,8 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
                         follow(caster.tint, occluded, width, on, rays, None, spare_on, spare)
-                        # Where a pane is in the way, each ray has to be asked for its colour.
+                        # Where a pane is in the way, each ray has to be asked for its colour; where none
+                        # is, all colours are 1 and stay so for the rays that are not cast.
                         blocked += count_coloured(caster.tint)
                     if shading is not None:
                         for lane in range(lanes):
