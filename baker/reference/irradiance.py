@@ -19,7 +19,7 @@ from baker.core.progress import Progress, silent
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.reference.estimators import Estimator, estimator_named
 from baker.reference.lanes import new_path_memory
-from baker.reference.occlusion import near_together, open_rays
+from baker.reference.occlusion import alike_within, are_dense, near_together, open_rays
 from baker.reference.paths import trace_paths
 from baker.reference.randomness import seed_salt
 from baker.reference.view import Reference
@@ -163,20 +163,25 @@ def openness_pass(
     shared = shared_bits_mask(samples)
     reach = np.float32(min(distance, 1.0e30))
     least = np.float32(reference.surfaces.least)
+    alike = alike_within(reach, least)
+    dense = are_dense(position[:, 0], float(alike))
     setting = np.array([number, seed_salt(seed)], np.int64)
     arguments = np.stack([occluded_arguments(coherent=coherent) for coherent in (False, True)])
 
     def work(begin: int, end: int) -> None:
-        rows = begin + near_together(position[begin:end, 0])
-        out = np.zeros((end - begin, 1))
+        name = np.arange(begin, end)
+        rows: NDArray[np.int64] | slice = slice(begin, end)
+        if dense:
+            name = rows = begin + near_together(position[begin:end, 0])
+        found = np.zeros((end - begin, 1))
         open_rays(
-            position, normal, face_normal, rows, new_path_memory(reference.rays), arguments, net, shared,
-            reach, least, setting, out,
+            position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.rays),
+            arguments, net, shared, reach, alike, least, setting, found,
         )  # fmt: skip
-        add_pass(estimate, rows, out / samples)
+        add_pass(estimate, rows, found / samples)
 
     # Large tiles hold more neighbours, but few of them keep threads waiting at the end.
-    tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE)
+    tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
     run_tiles(len(position), tile, work, threads=reference.threads, stage="openness", progress=progress)
     estimate.rounds += 1
     estimate.rays += len(position) * samples

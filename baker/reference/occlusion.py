@@ -18,6 +18,7 @@ from baker.reference.lanes import (
     ALIVE,
     BITANGENT,
     CHOICE,
+    KEY,
     LANES,
     LOBE,
     NORMAL,
@@ -37,8 +38,22 @@ _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = LANES
 # Rays go alike if they start within this share of their reach, or of the scene's size (`_FAR` * least).
 _ALIKE, _FAR = _f(0.125), _f(100.0)
+# Points that are looked at to tell if all are dense.
+_LOOK = 128
 # Numbers of ten bits with two zeros between any two bits.
 _SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
+
+
+def alike_within(reach: np.float32, least: np.float32) -> np.float32:
+    """Return how close together, metres, points are whose rays go alike; `least`, metres: see `Surfaces`."""
+    return np.float32(_ALIKE * min(reach, _FAR * least))
+
+
+def are_dense(position: NDArray[np.float64], alike: float) -> bool:
+    """Tell if most points (n, 3) are close to the next one: if so, sorting them is worth its time."""
+    first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
+    step = abs(position[first + 1] - position[first]).max(axis=1)
+    return bool(2 * np.count_nonzero(step < alike) > len(first))
 
 
 def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -52,10 +67,12 @@ def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @inner
-def seed_lanes(words, rows, group, number, salt):  # type: ignore[no-untyped-def]
-    """Write the two scramble seeds of points `group` to `group` + 8 of the order `rows`."""
-    for lane in range(min(LANES, len(rows) - group)):
-        x, y, _, _ = mix4(_w(rows[group + lane]), _w(0xFFFFFFFE), _w(number), _w(salt))
+def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
+    """Write the two scramble seeds of points `group` to `group` + 8."""
+    for lane in range(min(LANES, len(name) - group)):
+        words[KEY * _L + lane] = name[group + lane]
+    for lane in range(LANES):
+        x, y, _, _ = mix4(words[KEY * _L + lane], _w(0xFFFFFFFE), _w(number), _w(salt))
         words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
 
 
@@ -72,14 +89,13 @@ def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place_lanes(s, position, normal, face_normal, rows, group, k):  # type: ignore[no-untyped-def]
-    """Copy place k of points `group` to `group` + 8 of the order `rows` into the lanes."""
-    for lane in range(min(LANES, len(rows) - group)):
-        i = rows[group + lane]
+def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
+    """Copy place k of points `group` to `group` + 8 into the lanes."""
+    for lane in range(min(LANES, len(position) - group)):
         for a in range(3):
-            s[(ORG_X + a) * _L + lane] = position[i, k, a]
-            s[(SHADED + a) * _L + lane] = normal[i, k, a]
-            s[(NORMAL + a) * _L + lane] = face_normal[i, k, a]
+            s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
+            s[(SHADED + a) * _L + lane] = normal[group + lane, k, a]
+            s[(NORMAL + a) * _L + lane] = face_normal[group + lane, k, a]
 
 
 @inner
@@ -127,31 +143,31 @@ def count_lanes(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def open_rays(  # type: ignore[no-untyped-def]
-    position, normal, face_normal, rows, memory, arguments, net, shared, reach, least, how, out
+    position, normal, face_normal, name, memory, arguments, net, shared, reach, alike, least, how, out
 ):
     """Count the rays of points that meet nothing within reach.
 
-    position, normal, face_normal : (n, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k
-    rows : (m,) int64, the points, neighbours together; memory : `PathMemory`
+    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k;
+        rays are fastest if neighbours follow each other
+    name : (m,) int64, what random numbers a point has; memory : `PathMemory`
     arguments : (2, 5) int64, `occluded_arguments` of packets whose rays do not go alike, and do
     net : (n, 2) uint32; shared : uint32, bits that all points share
-    reach, least : float32, metres, see `Surfaces`
+    reach, alike, least : float32, metres, see `alike_within`
     how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
     """
     scene, occluded = memory.scene, memory.occluded
     on, s, words = memory.on, memory.s, memory.words
     samples, places = len(net), position.shape[1]
-    alike = _ALIKE * min(reach, _FAR * least)
-    for group in range(0, len(rows), LANES):
-        lanes = min(LANES, len(rows) - group)
-        seed_lanes(words, rows, group, how[0], how[1])
+    for group in range(0, len(position), LANES):
+        lanes = min(LANES, len(position) - group)
+        seed_lanes(words, name, group, how[0], how[1])
         for lane in range(LANES):
             on[lane] = -1 if lane < lanes else 0
             s[VALUE * LANES + lane] = _ZERO
         for sample in range(samples):
             k = (how[0] * samples + sample) % places
             if sample == 0 or places > 1:
-                place_lanes(s, position, normal, face_normal, rows, group, k)
+                place_lanes(s, position, normal, face_normal, group, k)
                 stand_lanes(s, 0, least)
             if sample == 0:
                 asked = arguments[1] if extent(s, lanes) < alike else arguments[0]

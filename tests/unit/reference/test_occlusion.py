@@ -10,7 +10,7 @@ from scenes import SceneBuilder
 
 import baker.reference.irradiance as irradiance
 from baker.reference.irradiance import new_estimate, openness_pass
-from baker.reference.occlusion import near_together
+from baker.reference.occlusion import are_dense, near_together
 from baker.reference.view import build_reference
 from baker.trace.packets import occluded_arguments
 
@@ -34,6 +34,15 @@ def test_neighbours_follow_each_other():
 @pytest.mark.parametrize("n", [1, 7])
 def test_points_of_one_place_keep_their_order(n):
     assert (near_together(np.full((n, 3), 0.3)) == np.arange(n)).all()
+
+
+def test_scattered_points_are_left_as_they_are():
+    """Sorting pays for dense points only; rows of a picture are dense, whatever lies between two rows."""
+    x, y = np.meshgrid(np.linspace(0, 8, 400), np.linspace(0, 8, 20))
+    rows = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    assert are_dense(rows, 0.05)
+    assert not are_dense(np.random.default_rng(2).permutation(rows), 0.05)
+    assert not are_dense(rows[:1], 0.05)
 
 
 @pytest.fixture(scope="module")
