@@ -22,7 +22,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scram
 from baker.kernels.surface import N_POINTS
 from baker.pipeline import World
 from baker.radiosity.points import points_of
-from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR, new_caster, trace, trace_lanes
+from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR, call_embree_with, new_caster, trace_lanes
 
 # Rows of a packet that hold the ray; the hit needs only its geometry number reset.
 RAY_ROWS = 12
@@ -80,7 +80,7 @@ def _made(function, caster, origin, normal, begin, net, shared, far):  # type: i
             on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
-            trace_lanes(function, scene, width, on, rays, spare_on, spare)
+            trace_lanes(function, scene, width, caster.query, on, rays, spare_on, spare)
             mixed ^= words[TFAR * LANES]
     return mixed
 
@@ -129,7 +129,7 @@ def _ready(function, caster, bank, lanes_on):  # type: ignore[no-untyped-def]
             continue
         for j in range(RAY_ROWS * width):
             floats[j] = bank[packet, j]
-        trace(function, scene, valid, floats)
+        call_embree_with(function, valid, scene, floats, caster.query)
         mixed ^= words[GEOM_ROW * width]
     return mixed
 

@@ -157,6 +157,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     """
     n_samples = len(net)
     scene, occluded, width = caster.scene, caster.occluded, caster.width
+    query = caster.query
     on, rays = caster.lane_valid, caster.lane_floats
     spare_on, spare = caster.valid, caster.floats
     row, triangle, starts = lamps.row, lamps.triangle, lamps.first
@@ -228,7 +229,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     if asked == 0:
                         continue
                     if not clear:
-                        trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
+                        trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
                         cast += asked
                         looked += asked
                         for lane in range(LANES):

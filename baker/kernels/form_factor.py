@@ -46,6 +46,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
     colour : (m, R, 3) float32 output, what light along a ray is multiplied by; no rows if nothing colours it
     """
     scene, intersect, width = caster.scene, caster.intersect, caster.width
+    query = caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
@@ -58,7 +59,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
         for r in range(len(net)):
             load_frames(rays, frame, origin, normal, group, lanes, r)
             aim_lanes(rays, words, frame, seeds, net[r, 0], net[r, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
+            trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
             _note_colour(caster.tint, colour, group, lanes, r)
             for lane in range(lanes):

@@ -61,6 +61,7 @@ def gather(  # type: ignore[no-untyped-def]
     """
     n_samples = len(net)
     scene, intersect, width = caster.scene, caster.intersect, caster.width
+    query = caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
@@ -93,7 +94,7 @@ def gather(  # type: ignore[no-untyped-def]
                 for lane in range(LANES):
                     missed[lane] = _f(0.0)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
+            trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
             for lane in range(LANES):
                 none = words[GEOM_ID * LANES + lane] == NO_HIT
@@ -184,6 +185,7 @@ def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
     """
     n_samples = len(net)
     scene, occluded, width = caster.scene, caster.occluded, caster.width
+    query = caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     count = _counts()
@@ -201,7 +203,7 @@ def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
             aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, distance)
-            trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
+            trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for lane in range(LANES):
                 count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
             done += 1

@@ -21,6 +21,7 @@ def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_p
     Returns the number of rays cast.
     """
     scene, intersect, width = caster.scene, caster.intersect, caster.width
+    query = caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row = table.row
@@ -44,7 +45,7 @@ def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_p
                 continue
             cast += lanes
             aim_lanes(rays, words, frame, seeds, net[sample, 0], net[sample, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, on, rays, spare_on, spare)
+            trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
                 if words[GEOM_ID * LANES + lane] == NO_HIT:
                     continue

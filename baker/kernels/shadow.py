@@ -22,6 +22,7 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
     colour : (3,) float32; out : (n, 6) float32
     """
     scene, occluded, width = caster.scene, caster.occluded, caster.width
+    query = caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     bits = origin.view(np.uint32)
@@ -44,7 +45,7 @@ def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-un
                     any_lane = True
             if not any_lane:
                 continue
-            trace_lanes(occluded, scene, width, on, rays, spare_on, spare)
+            trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             follow(caster.tint, occluded, width, on, rays, None, spare_on, spare)
             for lane in range(lanes):
                 if on[lane] and rays[TFAR * LANES + lane] >= _f(0.0):

@@ -23,7 +23,7 @@ from baker.reference.occlusion import alike_within, are_dense, near_together, op
 from baker.reference.paths import trace_paths
 from baker.reference.randomness import seed_salt
 from baker.reference.view import Reference
-from baker.trace.packets import occluded_arguments
+from baker.trace.packets import arguments_of
 
 SAMPLES_PER_PASS = 16
 _TILE = 128
@@ -166,7 +166,7 @@ def openness_pass(
     alike = alike_within(reach, least)
     dense = are_dense(position[:, 0], float(alike))
     setting = np.array([number, seed_salt(seed)], np.int64)
-    arguments = np.stack([occluded_arguments(coherent=coherent) for coherent in (False, True)])
+    arguments = np.stack([arguments_of(coherent=coherent) for coherent in (False, True)])
 
     def work(begin: int, end: int) -> None:
         name = np.arange(begin, end)

@@ -150,7 +150,7 @@ def open_rays(  # type: ignore[no-untyped-def]
     position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k;
         rays are fastest if neighbours follow each other
     name : (m,) int64, what random numbers a point has; memory : `PathMemory`
-    arguments : (2, 5) int64, `occluded_arguments` of packets whose rays do not go alike, and do
+    arguments : (2, 5) int64, `arguments_of` of packets whose rays do not go alike, and do
     net : (n, 2) uint32; shared : uint32, bits that all points share
     reach, alike, least : float32, metres, see `alike_within`
     how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output

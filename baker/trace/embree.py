@@ -24,6 +24,10 @@ _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
 _SCENE_ROBUST = 1 << 2
+# Up to so many triangles rays of neighbouring texels meet the same ones, and packets of them are traced as
+# coherent. *Measured*, final gather at 512 with 64 rays, share of the time without: 0.79 with 36 triangles,
+# 0.81 with 446, 0.77 with 986, 0.74 with 2714, 0.93 to 1.2 with 11 thousand, 1.35 with 70 thousand.
+FEW = 4096
 _QUALITY_MEDIUM = 1
 _ERROR_OUT_OF_MEMORY = 4
 _ERRORS = {
@@ -106,6 +110,8 @@ class Tracer(NamedTuple):
         N, the widest packet this CPU traces natively.
     tint : int or None
         RTCScene of the triangles that colour what they let through, None if there are none.
+    few : bool
+        Whether the scene has so few triangles (`FEW`) that rays of neighbouring texels meet the same ones.
     """
 
     scene: int
@@ -113,6 +119,7 @@ class Tracer(NamedTuple):
     occluded: int
     width: int
     tint: int | None = None
+    few: bool = False
 
     def grey(self) -> Tracer:
         """Return the same for rays that ask only whether and where they end."""
@@ -255,7 +262,8 @@ class RayScene:
             if library.rtcGetDeviceProperty(self._device, name):
                 width = candidate
                 break
-        return Tracer(scene, *self.functions(width), width, tint)
+        few = len(self._triangles[0]) <= FEW
+        return Tracer(scene, *self.functions(width), width, tint, few)
 
     def functions(self, width: int) -> tuple[int, int]:
         """Return the addresses of rtcIntersectN and rtcOccludedN for packets of 4, 8 or 16 rays."""

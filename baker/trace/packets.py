@@ -119,6 +119,7 @@ class Caster(NamedTuple):
     scene, intersect, occluded, width: see `Tracer`; valid (16,) int32, -1 for lanes to trace;
     floats (21 * 16,) float32 and words, the same memory as uint32: a packet of the native width.
     lane_valid, lane_floats, lane_words: the same for sixteen rays, rows 16 numbers apart.
+    query: (5,) int64, `arguments_of` rays of neighbouring texels in this scene.
     tint: None if nothing colours light; Numba then compiles kernels without it.
     """
 
@@ -132,6 +133,7 @@ class Caster(NamedTuple):
     lane_valid: NDArray[np.int32]
     lane_floats: NDArray[np.float32]
     lane_words: NDArray[np.uint32]
+    query: NDArray[np.int64]
     tint: Tint | None = None
 
 
@@ -146,6 +148,7 @@ def new_caster(tracer: Tracer) -> Caster:
         *tracer[:4],
         *(valid, floats, floats.view(np.uint32)),
         *(lane_valid, lane_floats, lane_floats.view(np.uint32)),
+        arguments_of(coherent=tracer.few),
         None if tracer.tint is None else new_tint(tracer.tint),
     )
 
@@ -156,13 +159,15 @@ def new_tint(scene: int) -> Tint:
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:TINT_STOP] = NO_HIT
-    arguments = occluded_arguments()
+    arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     return Tint(scene, arguments, words[TINT_STOP:TINT_COLOUR], memory[TINT_COLOUR:])
 
 
-def occluded_arguments(*, coherent: bool = False) -> NDArray[np.int64]:
-    """Return (5,) RTCOccludedArguments: flags and features (32 bits each), no context, no functions.
+def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:
+    """Return (5,) RTCIntersectArguments or RTCOccludedArguments, which lie alike.
+
+    Flags and features (32 bits each), no context, no functions of its own.
 
     coherent : the rays of a packet go alike: it is followed through the tree as one
     """
@@ -203,13 +208,13 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 
 
 @inner
-def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
+def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
-    function, scene, width and the four arrays are a caster's
+    function, scene, width, query and the four arrays are a caster's
     """
     if width == LANES:
-        trace(function, scene, lane_valid, lane_floats)
+        call_embree_with(function, lane_valid, scene, lane_floats, query)
         return
     # Four at a time by hand: what the compiler makes of loops over lanes here is twenty times as long.
     for first in range(0, LANES, width):
@@ -226,7 +231,7 @@ def trace_lanes(function, scene, width, lane_valid, lane_floats, valid, floats):
             copy_four(floats, TFAR * width + to, lane_floats, TFAR * LANES + at)
             copy_four(floats, ID * width + to, lane_floats, ID * LANES + at)
             copy_four(floats, GEOM_ID * width + to, lane_floats, GEOM_ID * LANES + at)
-        trace(function, scene, valid, floats)
+        call_embree_with(function, valid, scene, floats, query)
         for to in range(0, width, 4):
             at = first + to
             copy_four(lane_floats, TFAR * LANES + at, floats, TFAR * width + to)

@@ -45,7 +45,7 @@ def _cast(caster, origin, direction, far, any_hit, end, kept):
                 rays[(DIR_X + a) * LANES + lane] = direction[i, a]
             rays[TFAR * LANES + lane] = far
             words[GEOM_ID * LANES + lane] = NO_HIT
-        trace_lanes(function, caster.scene, width, on, rays, caster.valid, caster.floats)
+        trace_lanes(function, caster.scene, width, caster.query, on, rays, caster.valid, caster.floats)
         # A query for any hit leaves the rows of hits as they were: they must not be looked at.
         if any_hit:
             follow(caster.tint, caster.occluded, width, on, rays, None, caster.valid, caster.floats)

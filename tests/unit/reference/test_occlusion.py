@@ -12,7 +12,7 @@ import baker.reference.irradiance as irradiance
 from baker.reference.irradiance import new_estimate, openness_pass
 from baker.reference.occlusion import are_dense, near_together
 from baker.reference.view import build_reference
-from baker.trace.packets import occluded_arguments
+from baker.trace.packets import arguments_of
 
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -79,12 +79,12 @@ def test_packets_followed_as_one_meet_the_same(under_cards, monkeypatch, distanc
     def told(never):
         def arguments(*, coherent=False):
             asked.append(coherent)
-            return occluded_arguments(coherent=coherent and not never)
+            return arguments_of(coherent=coherent and not never)
 
         return arguments
 
     for never in (False, True):
-        monkeypatch.setattr(irradiance, "occluded_arguments", told(never))
+        monkeypatch.setattr(irradiance, "arguments_of", told(never))
         found.append(opened(reference, position, distance))
     assert asked == [False, True] * 2
     assert 0.1 < found[0].min() < 0.5 < found[0].max()
