@@ -172,9 +172,8 @@ def finish_pages() -> None:
     noise = np.random.Generator(np.random.PCG64(0))
     value = noise.random((_PAGE, _PAGE, 3), np.float32)
     error = np.full((_PAGE, _PAGE), 0.3, np.float32)
-    finish_page(
-        plan, [PageLayer(value, error)], upper=1.0, denoise=True, dilation=4, threads=1, progress=silent
-    )
+    layers = [PageLayer(value, error, bound=True)]
+    finish_page(plan, layers, upper=1.0, denoise=True, dilation=4, threads=1, progress=silent)
 
 
 if __name__ == "__main__":
