@@ -44,7 +44,7 @@ from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.patches import build_patches
 from baker.radiosity.points import KeptPoints, keep_points
-from baker.radiosity.solve import energy_audit, solve_radiosity
+from baker.radiosity.solve import energy_audit, solve_radiosity, solve_warnings
 from baker.radiosity.texels import build_texels
 from baker.shading.materials import Shading, resolve_materials
 from baker.shading.ray_tree import build_ray_tree
@@ -389,12 +389,12 @@ def _reflected(
         record.solve.update(
             patches=patches.n,
             nonzeros=len(matrix.value),
-            iterations=solution.iterations,
-            residual=solution.residual,
+            **solution.figures(),
             energy=energy_audit(matrix, patches.area, direct, source, solution.irradiance, albedo),
             row_error=matrix.row_error,
             reciprocity_error=matrix.reciprocity_error,
         )
+        record.warnings.extend(solve_warnings(solution))
         indirect = (solution.irradiance + from_sky).astype(np.float32)
     return texels.albedo * (complete + indirect[patches.patch])
 

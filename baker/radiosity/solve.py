@@ -6,25 +6,40 @@ With M = s + rho E this is (A / rho - A F) M = A s / rho, symmetric by reciproci
 for rho < 1: conjugate gradients, preconditioned by A / rho, need a few dozen products even where
 simple sweeps need thousands (a closed room of albedo 0.99). N bounces are N products instead.
 
+The norms of conjugate gradients are sums over all patches: a dim room beside a sunlit street is no part of
+them, and the polynomials they choose are those that suit the street. So the residual of every patch and
+colour is held against that patch's own light, and the solve is repeated for the residual of the patches
+that are not done. Rows of the residual have only the light of their own patch in them, so its rounding
+error is relative to that light, too.
+
 Based on: Goral et al., Modeling the interaction of light between diffuse surfaces, 1984; Neumann,
 New efficient algorithms with positive definite radiosity matrix, 1994; Saad, Iterative methods for
-sparse linear systems, 2003, algorithm 9.1.
+sparse linear systems, 2003, algorithm 9.1; Higham, Accuracy and stability of numerical algorithms, 2002,
+chapter 12 (iterative refinement).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
+from baker.core.scene import SceneWarning
 from baker.kernels.form_factor import multiply, multiply_coloured
 from baker.radiosity.form_factors import FormFactorMatrix
 
 STAGE = "solve"
-TOLERANCE = 1e-5
+# Largest error of a patch's light, as a share of that light, at which the solve stops.
+TOLERANCE = 3e-5
 MAX_ITERATIONS = 1000
+# Light below this share of a colour's brightest patch is not resolved any further.
+_DARK = 1e-15
+# One run of conjugate gradients reduces a residual by no more than this: their vectors lose their
+# orthogonality, and the residual that they carry along departs from the true one.
+_REDUCTION = 1e-12
 # A closed room of albedo 1 has no solution: light would never end.
 MAX_ALBEDO = 0.999
 # Black patches get this albedo in the symmetric form, which divides by it.
@@ -40,11 +55,22 @@ class Solution:
     irradiance : (P, 3) float64, lx, indirect: at least once reflected
     iterations : int
     residual : float, |s + rho F M - M| / |s|, the worst of the three colours
+    patch_error : float, the largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour; an estimate of
+        the largest relative error of a patch's light (in a closed room of even light and albedo, its bound)
     """
 
     irradiance: NDArray[np.float64]
     iterations: int
     residual: float
+    patch_error: float
+
+    def figures(self) -> dict[str, float]:
+        """Return what the manifest says of the solve."""
+        return {
+            "iterations": self.iterations,
+            "residual": self.residual,
+            "patch_error": self.patch_error,
+        }
 
 
 def solve_radiosity(
@@ -76,14 +102,49 @@ def solve_radiosity(
         for step in range(steps):
             irradiance = apply(matrix, source + albedo * irradiance)
             report(progress, STAGE, (step + 1) / steps)
-        return Solution(irradiance, steps, 0.0)
-    exitance, iterations = _conjugate_gradients(matrix, source, albedo, area[:, None], progress)
-    irradiance = apply(matrix, exitance)
-    remainder = source + albedo * irradiance - exitance
+        return Solution(irradiance, steps, 0.0, 0.0)
+    return _converge(matrix, source, albedo, area[:, None], progress)
+
+
+def _converge(
+    matrix: FormFactorMatrix,
+    source: NDArray[np.float64],
+    albedo: NDArray[np.float64],
+    area: NDArray[np.float64],
+    progress: Progress,
+) -> Solution:
+    """Solve until every patch has its light; see `solve_radiosity`."""
+    exitance = source.copy()
+    goal = _Goal(TOLERANCE * (1.0 - albedo), _DARK * source.max(axis=0, initial=0.0))
+    iterations = 0
+    while True:
+        irradiance = apply(matrix, exitance)
+        rest = source + albedo * irradiance - exitance
+        share = goal.share(rest, exitance)
+        if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
+            break
+        # What is done counts no more: beside a dim room, even the rounding errors of a bright one are light.
+        rest[share <= goal.MARGIN] = 0.0
+        before = iterations
+        iterations = _conjugate_gradients(matrix, exitance, rest, albedo, area, goal, progress, before)
+        if iterations == before:
+            break
     norms = np.linalg.norm(source, axis=0)
     lit = norms > 0
-    residual = float((np.linalg.norm(remainder, axis=0)[lit] / norms[lit]).max(initial=0.0))
-    return Solution(irradiance, iterations, residual)
+    remainder = np.linalg.norm(source + albedo * irradiance - exitance, axis=0)
+    residual = float((remainder[lit] / norms[lit]).max(initial=0.0))
+    return Solution(irradiance, iterations, residual, TOLERANCE * float(share.max(initial=0.0)))
+
+
+def solve_warnings(solution: Solution) -> list[SceneWarning]:
+    """Return a warning if the solve ended before every patch had its light."""
+    if solution.patch_error <= TOLERANCE:
+        return []
+    message = (
+        f"bounced light is exact to {100 * solution.patch_error:.2g} % only: the solve ended after"
+        f" {solution.iterations} iterations; lower base colours near 1 in closed rooms, or set --bounces"
+    )
+    return [SceneWarning("solve-not-converged", message)]
 
 
 def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -97,35 +158,63 @@ def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np
     return irradiance
 
 
+@dataclass(frozen=True)
+class _Goal:
+    """How large the residual of each patch and colour may be.
+
+    Attributes
+    ----------
+    tolerance : (P, 3) float64, as a share of the patch's exitance
+    dark : (3,) float64, lx, exitance that the residual is held against at least
+    """
+
+    # Share of what is allowed that a run of conjugate gradients aims at.
+    MARGIN: ClassVar[float] = 0.5
+    tolerance: NDArray[np.float64]
+    dark: NDArray[np.float64]
+
+    def share(self, rest: NDArray[np.float64], exitance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the residual (P, 3) in units of what is allowed; 0 where there is no light."""
+        allowed = self.tolerance * np.maximum(exitance, self.dark)
+        return np.divide(np.abs(rest), allowed, out=np.zeros_like(rest), where=rest != 0.0)
+
+
 def _conjugate_gradients(
     matrix: FormFactorMatrix,
-    source: NDArray[np.float64],
+    exitance: NDArray[np.float64],
+    rest: NDArray[np.float64],
     albedo: NDArray[np.float64],
     area: NDArray[np.float64],
+    goal: _Goal,
     progress: Progress,
-) -> tuple[NDArray[np.float64], int]:
-    """Solve (A / rho - A F) M = A s / rho for three colours at once; return M and the iterations."""
-    diagonal = area / albedo
-    exitance = source.copy()
-    # The first guess M = s leaves the residual A F s.
-    rest = area * apply(matrix, source)
-    goal = TOLERANCE * np.sqrt((area * source * source / albedo).sum(axis=0))
-    scaled = rest / diagonal
-    direction = scaled.copy()
-    size = (rest * scaled).sum(axis=0)
-    for iteration in range(MAX_ITERATIONS):
-        if (np.sqrt(size) <= goal).all():
-            return exitance, iteration
+    iteration: int,
+) -> int:
+    """Add the solution of (I - rho F) x = rest to `exitance`, both (P, 3), changed in place.
+
+    In the scalar product weighted by A / rho the matrix is symmetric. `iteration` is the number of
+    iterations before, returned is the number after.
+    """
+    weight = area / albedo
+    direction = rest.copy()
+    size = (weight * rest * rest).sum(axis=0)
+    enough = _REDUCTION**2 * size
+    while iteration < MAX_ITERATIONS:
         report(progress, STAGE, min(iteration / 50, 0.99))
-        image = diagonal * direction - area * apply(matrix, direction)
-        curvature = (direction * image).sum(axis=0)
-        step = np.where(curvature > 0, size / np.where(curvature > 0, curvature, 1.0), 0.0)
+        done = (goal.share(rest, exitance) <= goal.MARGIN).all(axis=0) | (size <= enough)
+        if done.all():
+            break
+        image = direction - albedo * apply(matrix, direction)
+        curvature = (weight * direction * image).sum(axis=0)
+        going = ~done & (curvature > 0)
+        if not going.any():
+            break
+        step = np.where(going, size / np.where(going, curvature, 1.0), 0.0)
         exitance += step * direction
         rest -= step * image
-        scaled = rest / diagonal
-        before, size = size, (rest * scaled).sum(axis=0)
-        direction = scaled + np.where(before > 0, size / np.where(before > 0, before, 1.0), 0.0) * direction
-    return exitance, MAX_ITERATIONS
+        before, size = size, (weight * rest * rest).sum(axis=0)
+        direction = rest + np.where(before > 0, size / np.where(before > 0, before, 1.0), 0.0) * direction
+        iteration += 1
+    return iteration
 
 
 def energy_audit(

@@ -10,8 +10,16 @@ from scipy.sparse import csr_matrix
 
 from baker.core.errors import Cancelled
 from baker.core.progress import silent
+from baker.radiosity import solve
 from baker.radiosity.form_factors import FormFactorMatrix
-from baker.radiosity.solve import MAX_ALBEDO, TOLERANCE, apply, energy_audit, solve_radiosity
+from baker.radiosity.solve import (
+    MAX_ALBEDO,
+    TOLERANCE,
+    apply,
+    energy_audit,
+    solve_radiosity,
+    solve_warnings,
+)
 
 
 def room(n, seed, openness=0.0):
@@ -182,3 +190,80 @@ def test_light_is_neither_made_nor_lost():
     assert audit["emitted"] == pytest.approx((area[:, None] * direct).sum() / 3)
     assert audit["emitted"] == pytest.approx(audit["absorbed"] + audit["escaped"], rel=1e-4)
     assert audit["escaped"] > 0.05 * audit["emitted"]
+
+
+def rooms(count, n, passage, seed):
+    """A chain of closed rooms of n patches each; `passage` is the flux between neighbouring rooms."""
+    rng = np.random.default_rng(seed)
+    size = count * n
+    area, flux = rng.uniform(0.5, 2, size), np.zeros((size, size))
+    for first in range(0, size, n):
+        block = rng.random((n, n)) ** 3
+        flux[first : first + n, first : first + n] = block + block.T
+    for _ in range(300):
+        scale = np.sqrt(area / flux.sum(axis=1))
+        flux = scale[:, None] * flux * scale
+    for first in range(n, size, n):
+        flux[first - 1, first] = flux[first, first - 1] = passage
+    rows = csr_matrix((flux / area[:, None]).astype(np.float32))
+    none = np.zeros(size, np.float32)
+    matrix = FormFactorMatrix(
+        rows.indptr.astype(np.int64), rows.indices.astype(np.int32), rows.data, none, none, 0, 0, 0
+    )
+    return matrix, rows.toarray().astype(float), area
+
+
+def refined_solution(dense, source, albedo):
+    """Return the dense solution, refined until every row is accurate by itself."""
+    truth = np.zeros_like(source)
+    for c in range(3):
+        system = np.eye(len(dense)) - albedo[:, c, None] * dense
+        for _ in range(8):
+            rest = source[:, c] + albedo[:, c] * (dense @ truth[:, c]) - truth[:, c]
+            truth[:, c] += np.linalg.solve(system, rest)
+    return dense @ truth
+
+
+@pytest.mark.parametrize("passage", [0.0, 1e-6, 1e-3])
+@pytest.mark.parametrize("albedo", [0.5, 0.8, 0.99])
+@pytest.mark.parametrize("dim", [1e-3, 1e-6, 1e-11])
+def test_every_patch_has_its_light_however_bright_others_are(passage, albedo, dim):
+    """Rooms beside brighter ones, apart or joined by cracks, and a colour that is dim everywhere."""
+    matrix, dense, area = rooms(3, 30, passage, 8)
+    rho = np.clip(albedo + np.random.default_rng(9).uniform(-0.05, 0.009, (90, 3)), 0, MAX_ALBEDO)
+    source = np.zeros((90, 3))
+    source[:4], source[-4:] = (1.0, 1e-5, 1.0), (dim, 1e-3 * dim, dim)
+    solution = solve_radiosity(matrix, source, rho, area, bounces=None, progress=silent)
+    truth = refined_solution(dense, source, rho)
+    # The estimate is a bound for even light only; the worst of 72 random systems came to 1.8 times it.
+    np.testing.assert_allclose(solution.irradiance, truth, rtol=4 * TOLERANCE)
+    assert solution.patch_error <= TOLERANCE
+    assert solution.iterations < 120
+    assert solve_warnings(solution) == []
+
+
+def test_a_bright_ground_does_not_end_the_solve_of_a_room():
+    """An open surface converges in a step; the room beside it takes as many as it takes alone."""
+    matrix, _, area = rooms(1, 40, 0.0, 10)
+    albedo, source = np.full((40, 3), 0.8), np.random.default_rng(11).random((40, 3))
+    alone = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)
+    none = np.zeros(41, np.float32)
+    both = FormFactorMatrix(
+        np.append(matrix.first, matrix.first[-1]), matrix.column, matrix.value, none, none, 0, 0, 0
+    )
+    lit, white = np.vstack([source, np.full(3, 1e12)]), np.vstack([albedo, np.full(3, 0.8)])
+    beside = solve_radiosity(both, lit, white, np.append(area, 100.0), bounces=None, progress=silent)
+    np.testing.assert_allclose(beside.irradiance[:40], alone.irradiance, rtol=2 * TOLERANCE)
+
+
+def test_a_solve_that_ends_too_early_says_so(monkeypatch):
+    matrix, _, area = rooms(2, 30, 1e-3, 12)
+    albedo, source = np.full((60, 3), 0.9), np.zeros((60, 3))
+    source[:3] = 1.0
+    monkeypatch.setattr(solve, "MAX_ITERATIONS", 4)
+    solution = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)
+    assert solution.iterations == 4
+    assert solution.patch_error > TOLERANCE
+    (warning,) = solve_warnings(solution)
+    assert warning.code == "solve-not-converged"
+    assert "4 iterations" in warning.message
