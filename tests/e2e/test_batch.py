@@ -156,6 +156,7 @@ def children(process):
         mine = more
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("how", ["ctrl-c", "kill the command", "kill everything"])
 def test_stopped_in_the_middle(tree, how):
     slow(tree)

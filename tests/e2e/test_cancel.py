@@ -51,6 +51,7 @@ def _alive(process: int) -> bool:
     return not state.exists() or state.read_text().rpartition(")")[2].split()[0] != "Z"
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("how", ["polite", "deaf", "threads"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_stop_is_quick_and_clean(how, number, tmp_path):
@@ -121,6 +122,7 @@ def test_death_of_native_code_is_one_sentence(how, word, tmp_path):
     assert list(tmp_path.rglob("*baker-*")) == []
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("after", [0.4, 1.5])
 def test_real_bake_stops_quickly(after, tmp_path):
     out = tmp_path / "out"

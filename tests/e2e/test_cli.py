@@ -305,6 +305,7 @@ def test_progress_answers_the_stop_flag():
         assert reporter("gather", 0.1)
 
 
+@pytest.mark.timed
 def test_help_is_quick_and_imports_nothing_heavy():
     # The fastest of three: other work on the machine may slow any one of them.
     seconds = []

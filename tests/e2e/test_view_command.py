@@ -17,6 +17,7 @@ from view_bake import make_bake
 BAKER = [sys.executable, "-c", "from baker.cli.app import main; main()"]
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_serves_until_it_is_stopped(tmp_path, number):
     out = make_bake(tmp_path / "level (1) ü")

@@ -219,6 +219,7 @@ def test_a_worker_that_dies_leaves_its_triangles_without_chart(monkeypatch):
     assert (answer.chart == -1).all()
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("error", [None, KeyboardInterrupt])
 def test_cancel_kills_the_workers_within_a_second(error):
     # A curled part of this size takes the library several seconds.
