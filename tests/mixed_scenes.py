@@ -73,7 +73,7 @@ def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
 
 
 def open_yard() -> Scene:
-    """Return ground, a wall, a glossy ball, a sun and a spot, to be seen under a sky."""
+    """Return ground, a wall, a glossy ball, a sun, a spot and a bulb of a range, to be seen under a sky."""
     quads = [
         Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), glossy((0.6, 0.5, 0.4), 0.0, 0.6)),
         Quad((-1, 1, 0), (2, 0, 0), (0, 0, 1.5), glossy((0.8, 0.8, 0.8), 0.0, 1.0, double_sided=True)),
@@ -81,7 +81,7 @@ def open_yard() -> Scene:
     ]
     sun = PunctualLight("directional", "sun", 0, (2.0, 1.8, 1.5), direction=(0.36, 0.48, -0.8))
     spot = PunctualLight("spot", "spot", 1, (3.0, 4.0, 5.0), (0.8, -0.5, 2.0), (0.0, 0.6, -0.8), 0.2, 0.5)
-    bulb = PunctualLight("point", "bulb", 2, (0.5, 0.4, 0.3), (-0.8, 0.6, 1.0))
+    bulb = PunctualLight("point", "bulb", 2, (0.5, 0.4, 0.3), (-0.8, 0.6, 1.0), range=1.6)
     scene = replace(quad_scene(quads), lights=(sun, spot, bulb))
     # No smoother: from the eye, what a narrow lobe throws of a lamp without area is met by rare luck only.
     return smooth_ball(scene, (0.6, 0.2, 0.5), 0.45, glossy((0.9, 0.9, 0.9), 1.0, 0.5))

@@ -6,6 +6,7 @@ Importers build it, nothing changes it. Meshes are shared by instances; world sp
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,9 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.limits import BRIGHTEST
 from baker.core.raw import RawScene
+
+# Metres; the square of a shorter range would leave float32.
+_SHORTEST_RANGE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,8 @@ class PunctualLight:
         Colour times intensity: cd for point and spot, lx for directional.
     position, direction : (3,) tuple, world space; direction is where the light shines to, unit.
     inner_cone, outer_cone : float, radians (spot)
+    range : float, metres
+        Distance at which a point or spot light has faded out, inf if it never does.
     """
 
     kind: str
@@ -145,6 +151,12 @@ class PunctualLight:
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     inner_cone: float = 0.0
     outer_cone: float = 0.7853981633974483
+    range: float = math.inf
+
+    @property
+    def inverse_range(self) -> float:
+        """Return 1 / range^2, 1/m2, as kernels take it; 0 without a range."""
+        return float(1.0 / max(self.range, _SHORTEST_RANGE) ** 2)
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight, SceneWarning
 from baker.io.gltf_json import JsonObject
 from baker.io.gltf_node import Placed
 
 _KINDS = ("point", "spot", "directional")
+# Length of the light's axis, as a share of the node's largest stretch, below which rounding aims the light:
+# exporters write single precision.
+_FLATTEST = 1e-6
+_TINY = float(np.finfo(np.float64).tiny)
 
 
 def read_light(
@@ -32,7 +37,7 @@ def read_light(
     Raises
     ------
     InputError
-        For an unknown kind, a negative colour or intensity, or cone angles out of range.
+        For an unknown kind, a negative colour or intensity, cone angles out of range, or a range not above 0.
     """
     kind = light.string("type")
     if kind not in _KINDS:
@@ -42,17 +47,19 @@ def read_light(
     colour = light.numbers("color", 3, (1.0, 1.0, 1.0))
     if min(colour) < 0 and not lenient:
         light.fail("a colour is negative", "color")
-    if "range" in light:
-        message = "the light's range is not applied: it falls off with the square of the distance only"
-        warnings.append(SceneWarning("light-range", message, name))
+    reach = light.number("range") if "range" in light and kind != "directional" else math.inf
+    if not reach > 0:
+        light.fail(f"the light's range is {reach:g}; it must be above 0, or left out for no limit", "range")
     inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
-    axis = -node.matrix[:3, 2]
-    length = float(np.linalg.norm(axis))
-    if kind != "point" and not length > 0:
-        message = "the node's scale leaves the light no direction; it is left out"
+    axis, share = _axis(node)
+    if kind != "point" and not share > _FLATTEST:
+        message = (
+            f"the scale of the node or its parents leaves the {kind} light no direction: the axis it shines "
+            f"along has {share:.1g} of the largest stretch; the light is left out"
+        )
         warnings.append(SceneWarning("flat-light", message, name))
         return None
-    x, y, z = (float(v) for v in (axis / length if length > 0 else np.array([0.0, 0.0, -1.0])))
+    x, y, z = (float(v) for v in axis)
     px, py, pz = (float(v) for v in node.matrix[:3, 3])
     return PunctualLight(
         kind=kind,
@@ -63,7 +70,21 @@ def read_light(
         direction=(x, y, z),
         inner_cone=inner,
         outer_cone=outer,
+        range=reach,
     )
+
+
+def _axis(node: Placed) -> tuple[NDArray[np.float64], float]:
+    """Return where the node's -Z points, unit, and its length as a share of the node's largest stretch."""
+    linear = node.matrix[:3, :3]
+    # Scaled first: the squares of very small or large numbers are not numbers.
+    linear = linear / max(float(np.abs(linear).max()), _TINY)
+    axis = -linear[:, 2]
+    length = float(np.linalg.norm(axis))
+    stretch = float(np.linalg.norm(linear, ord=2))
+    if not length > _FLATTEST * stretch:
+        return np.array([0.0, 0.0, -1.0]), length / max(stretch, _TINY)
+    return axis / length, length / stretch
 
 
 def _cone(light: JsonObject) -> tuple[float, float]:

@@ -192,6 +192,8 @@ def _light(light: PunctualLight) -> Json:
         "color": [float(v) / strength for v in light.intensity],
         "intensity": float(strength),
     }
+    if math.isfinite(light.range):
+        result["range"] = light.range
     if light.kind == "spot":
         result["spot"] = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
     return result

@@ -174,7 +174,13 @@ def _scene(path: Path, scene: Scene) -> dict[str, Any]:
             for m in scene.materials
         ],
         "lights": [
-            {"kind": light.kind, "name": light.name, "node": light.node, "intensity": list(light.intensity)}
+            {
+                "kind": light.kind,
+                "name": light.name,
+                "node": light.node,
+                "intensity": list(light.intensity),
+                **({"range": light.range} if math.isfinite(light.range) else {}),
+            }
             for light in scene.lights
         ],
         "cameras": [

@@ -179,6 +179,8 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
         entry["unit"] = "lx" if light.kind == "directional" else "cd"
         if light.kind != "directional":
             entry["position"] = light.position
+            if math.isfinite(light.range):
+                entry["range"] = light.range
         if light.kind != "point":
             entry["direction"] = light.direction
         if light.kind == "spot":

@@ -1,8 +1,9 @@
 """Spot light: a point light inside a cone with glTF's fall-off.
 
     E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
+        * clamp(1 - (r / range)^4, 0, 1)
 
-Based on: KHR_lights_punctual, "Inner and Outer Cone Angles".
+Based on: KHR_lights_punctual, "Inner and Outer Cone Angles" and "Range Property".
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ def spot_light(
     weight: NDArray[np.float32],
 ) -> None:
     """Fill rays and weights of a spot light (see `LightFamily`)."""
-    inverse_square(np.array(light.position, np.float64), origin, normal, ray, weight)
+    position = np.array(light.position, np.float64)
+    inverse_square(position, light.inverse_range, origin, normal, ray, weight)
     outer = math.cos(light.outer_cone)
     scale = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
     _cone(np.array(light.direction, np.float64), outer, scale, ray, weight)

@@ -12,8 +12,6 @@ from baker.lint.subject import Subject
 NOTES = {
     "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
     "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
-    "flat-light": ("warning", "give the light's node a scale other than zero"),
-    "light-range": ("info", "expect more light far away than in engines that cut lights off"),
     "missing-mtl": ("warning", "put the material library beside the scene"),
     "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
     "morphed": ("info", "bake the shape that is shown most, or leave the object out"),
@@ -31,7 +29,7 @@ def file_note(subject: Subject) -> Iterator[Found]:
     """Parts of the file that a bake passes by or reads in its own way.
 
     The importer's own code is in `note`: unknown extensions, skins and morph targets (the base shape is
-    baked), ranges of lights, primitives of points and lines, several scenes in one file, missing texture
+    baked), primitives of points and lines, several scenes in one file, missing texture
     coordinates or material libraries.
     """
     for warning in subject.scene.warnings:

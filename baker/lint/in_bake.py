@@ -14,9 +14,14 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     """
     # Not through the register, which would import every check.
     from baker.lint.inside_out import inside_out
+    from baker.lint.light_sources import light_range
     from baker.lint.subject import Subject
 
-    return [
+    subject = Subject(scene, settings)
+    found = [
         SceneWarning("inside-out", f"{found.message}; it will be black", found.place.object)
-        for found in inside_out(Subject(scene, settings))
+        for found in inside_out(subject)
     ]
+    if subject.wants_light:
+        found += [SceneWarning("light-range", f.message, f.place.object) for f in light_range(subject)]
+    return found

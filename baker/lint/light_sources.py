@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -34,6 +35,55 @@ def no_light(subject: Subject) -> Iterator[Found]:
     glows = any(max(subject.scene.materials[k].emission) > 0 for k in subject.used_materials)
     if not lit and not glows and not any(subject.settings.sky_radiance) and subject.wants_light:
         yield Found("nothing emits light: the irradiance will be black")
+
+
+@check(
+    "flat-light",
+    group="light",
+    severity="warning",
+    fix="give the light's node and its parents a scale other than zero; a bake leaves the light out",
+)
+def flat_light(subject: Subject) -> Iterator[Found]:
+    """Spot and directional lights whose node leaves them no direction.
+
+    A scale of zero along the axis that the light shines along, of the node or of a parent, maps the direction
+    to nothing, or to rounding errors. Point lights need no direction and are kept.
+    """
+    for warning in subject.scene.warnings:
+        if warning.code == "flat-light":
+            yield Found(warning.message, Place(warning.object))
+
+
+@check(
+    "light-range",
+    group="light",
+    severity="info",
+    fix="raise or remove the range, if surfaces farther away are to be lit",
+)
+def light_range(subject: Subject) -> Iterator[Found]:
+    """Point and spot lights whose `range` ends inside the scene.
+
+    Light fades out as KHR_lights_punctual says, to nothing at the range. Engines fade lights out in other
+    ways, and some ignore the range.
+    """
+    lights = [
+        light for light in subject.scene.lights if math.isfinite(light.range) and max(light.intensity) > 0
+    ]
+    if not lights:
+        return
+    low, high = subject.box
+    place = np.array([light.position for light in lights])
+    farthest = np.linalg.norm(np.maximum(np.abs(place - low), np.abs(place - high)), axis=1)
+    ends = [k for k, light in enumerate(lights) if light.range < farthest[k]]
+    if ends:
+        k = min(ends, key=lambda k: lights[k].range)
+        light = lights[k]
+        text = (
+            f"the {light.kind} light ends at its range of {light.range:.3g} m; the scene reaches "
+            f"{farthest[k]:.3g} m from it, and what lies beyond the range gets none of its light"
+        )
+        text += f" (so do {len(ends) - 1} further lights with ranges of their own)" if len(ends) > 1 else ""
+        yield Found(text, Place(light.name, light.node), count=len(ends), position=light.position)
 
 
 @check(

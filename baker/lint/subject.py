@@ -72,8 +72,8 @@ class Subject:
         return found
 
     @cached_property
-    def diagonal(self) -> float:
-        """Return the diagonal of the bounding box of all good triangles, metres, world."""
+    def box(self) -> NDArray[np.float64]:
+        """Return the lowest and highest corner (2, 3) of all good triangles, metres, world; inf if none."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.raw.instances:
             facts = self.meshes[instance.mesh]
@@ -84,6 +84,12 @@ class Subject:
             box = np.array(list(product(*own.T)))
             world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
             low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+        return np.stack([low, high])
+
+    @property
+    def diagonal(self) -> float:
+        """Return the diagonal of that box, metres."""
+        low, high = self.box
         return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
 
     @cached_property

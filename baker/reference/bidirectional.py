@@ -19,7 +19,14 @@ import math
 import numpy as np
 
 from baker.kernels.tint import follow_packet, light_kept
-from baker.reference.bidirectional_lamps import aim_both_ways, meet_emitter, meet_sky, start_at_lamp
+from baker.reference.bidirectional_lamps import (
+    aim_both_ways,
+    fade,
+    meet_emitter,
+    meet_sky,
+    range_of_lamp,
+    start_at_lamp,
+)
 from baker.reference.bidirectional_weights import (
     BACK,
     CHAIN,
@@ -240,7 +247,8 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
     path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
     # Vertices of the lane's subpath from a lamp, the lamp among them.
     count = _new_numbers()
-    eye, first = _new_flags(), _new_first()
+    # Its brightest colour at the start, and 1 / range^2 of its lamp.
+    eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
     value, spare, way, rgba, spot = _new_value(), _new_value(), _new_way(), _new_rgba(), _new_spot()
     values, state = _new_values(), _new_state()
     pixel, stage, job = _new_numbers(), _new_numbers(), _new_numbers()
@@ -270,6 +278,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                         glow(shading, number[lamp], spot[0], spot[1], value, rgba, True)
                         for c in range(3):
                             path[BETA + c, lane] = value[c]
+                    inverse_range[lane] = range_of_lamp(point, lamp, len(triangle))
                     first[lane] = max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane])
                     if first[lane] > 0.0:
                         eye[lane] = False
@@ -311,6 +320,9 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                 u = np.float64(floats[HIT_U * width + lane])
                 v = np.float64(floats[HIT_V * width + lane])
                 alive = arrive(path, row, lane, surface, material, prim, u, v, least, lambertian)
+                if alive and not eye[lane] and count[lane] == 1 and inverse_range[lane] > 0.0:
+                    distance = np.float64(floats[TFAR * width + lane])
+                    alive = fade(path, lane, distance, inverse_range[lane])
                 if alive:
                     reach_vertex(
                         path, lane, np.float64(floats[TFAR * width + lane]),

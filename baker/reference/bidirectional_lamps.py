@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from baker.kernels.sampling import tangent_frame, triangle_barycentric
+from baker.lights.point import range_window
 from baker.reference.bidirectional_weights import (
     BACK,
     CHAIN,
@@ -32,6 +33,7 @@ from baker.reference.lamps import (
     DIRECTION,
     FAR,
     INTENSITY,
+    INVERSE_RANGE,
     KIND,
     OUTER,
     POINT_CHANCE,
@@ -153,6 +155,26 @@ def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, c
     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane] = dx, dy, dz
     path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane] = red * scale, green * scale, blue * scale
     return lamp
+
+
+@inner
+def range_of_lamp(point, lamp, n):  # type: ignore[no-untyped-def]
+    """Return 1 / range^2 of a lamp that stands behind n triangles; 0 if it has no range."""
+    if n <= lamp < n + len(point):
+        return point[lamp - n, INVERSE_RANGE]
+    return 0.0
+
+
+@inner
+def fade(path, lane, distance, inverse_range):  # type: ignore[no-untyped-def]
+    """Fade light that has gone `distance` metres from a point light of a range; return if any is left.
+
+    The light's own share is not known before its first hit; its densities do not depend on it.
+    """
+    share = range_window(distance * distance, inverse_range)
+    for c in range(3):
+        path[BETA + c, lane] *= share
+    return share > 0.0
 
 
 @inner

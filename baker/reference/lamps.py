@@ -19,6 +19,7 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.sampling import triangle_barycentric
 from baker.lights.emissive import build_emitters
+from baker.lights.point import range_window
 from baker.shading.materials import Shading
 from baker.trace.jit import inner
 
@@ -26,14 +27,15 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Columns of an emissive triangle: three corners, face normal, area, two-sided, chance, radiance, textured.
 CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 18
 # Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer
-# cosine, one over the cone's width, chance.
-KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE = 0, 1, 4, 7, 10, 11, 12
+# cosine, one over the cone's width, chance, 1 / range^2 (0 without a range).
+KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE, INVERSE_RANGE = 0, 1, 4, 7, 10, 11, 12, 13
 # Columns of any lamp as `lane_vertex` takes it: a corner (of a light without area its place, of parallel
 # light the way towards it), two edges, normal (a spot's axis), area over chance (or 1 over chance),
-# two-sided, outer cosine, one over the cone's width, radiance or intensity, and what it is: 0 triangle, 1
-# point, 2 spot, 3 directional, 4 sky.
+# two-sided (of a light without area 1 / range^2), outer cosine, one over the cone's width, radiance or
+# intensity, and what it is: 0 triangle, 1 point, 2 spot, 3 directional, 4 sky.
 LANE_CORNER, LANE_EDGE, LANE_NORMAL, LANE_GAIN, LANE_TWO_SIDED = 0, 3, 9, 12, 13
 LANE_OUTER, LANE_SCALE, LANE_RADIANCE, LANE_KIND = 14, 15, 16, 19
+LANE_INVERSE_RANGE = LANE_TWO_SIDED
 _KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
 # A directional light and the sky end nowhere; rays to other lamps end this share of their way before them.
 FAR = 1.0e30
@@ -94,6 +96,7 @@ def build_lamps(
         point[row, INTENSITY : INTENSITY + 3] = light.intensity
         point[row, OUTER] = outer
         point[row, SCALE] = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
+        point[row, INVERSE_RANGE] = light.inverse_range if light.kind != "directional" else 0.0
         solid = {"point": 4 * math.pi, "spot": 2 * math.pi * (1 - outer), "directional": disc}[light.kind]
         point_power[row] = float(np.array(light.intensity) @ _LUMINANCE) * solid
     sky_power = float(np.array(sky) @ _LUMINANCE) * math.pi * 4.0 * disc
@@ -132,6 +135,7 @@ def all_alike(
     spot[:, LANE_NORMAL : LANE_NORMAL + 3] = way
     spot[:, LANE_GAIN] = 1.0 / np.maximum(point[:, POINT_CHANCE], 1e-30)
     spot[:, LANE_OUTER], spot[:, LANE_SCALE] = point[:, OUTER], point[:, SCALE]
+    spot[:, LANE_INVERSE_RANGE] = point[:, INVERSE_RANGE]
     spot[:, LANE_RADIANCE : LANE_RADIANCE + 3] = point[:, INTENSITY : INTENSITY + 3]
     spot[:, LANE_KIND] = 1.0 + point[:, KIND]
     last[LANE_GAIN] = 1.0 / max(sky[3], 1e-30)
@@ -209,6 +213,7 @@ def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
     dx, dy, dz = dx / length, dy / length, dz / length
     cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
     share = spot_share(point, e, cosine)
+    share *= range_window(square, point[e, INVERSE_RANGE])
     return dx, dy, dz, length * SHORT, share / square
 
 

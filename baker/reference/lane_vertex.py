@@ -19,6 +19,7 @@ from baker.reference.lamps import (
     LANE_CORNER,
     LANE_EDGE,
     LANE_GAIN,
+    LANE_INVERSE_RANGE,
     LANE_KIND,
     LANE_NORMAL,
     LANE_OUTER,
@@ -216,6 +217,8 @@ def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
         area = kind == _ZERO
         gain *= (cosine if cosine > _f(1.0e-9) else _ZERO) if area else _ONE
         gain *= inside * inside if kind == _f(2.0) else _ONE
+        faded = square * s[base + _M + LANE_INVERSE_RANGE * _L + lane]
+        gain *= _ONE if area else max(_ONE - faded * faded, _ZERO)
         gain *= _PI / max(c, _f(1.0e-9)) if sky else near / square + (_ONE - near)
         above = (
             dx * s[base + NORMAL * _L + lane]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,19 @@ def fill(kind, origin, normal, light=None):
 
 def test_every_family_has_a_closed_form():
     assert LIGHT_FAMILIES.names() == sorted(TRUTH)
+
+
+@pytest.mark.parametrize("kind", ["point", "spot"])
+@pytest.mark.parametrize("reach", [2.0, 3.0, 1e6])
+def test_a_range_fades_the_light_out(kind, reach):
+    origin, normal = points()
+    _, weight = fill(kind, origin, normal, replace(light_of(kind), range=reach))
+    _, length, _ = toward(origin.astype(float))
+    window = np.clip(1 - (length / reach) ** 4, 0, 1)
+    truth = TRUTH[kind](origin.astype(float), normal.astype(float)) * window
+    np.testing.assert_allclose(weight, truth, rtol=3e-5, atol=1e-6)
+    assert (weight > 0).sum() > 20
+    assert (weight[length > reach] == 0).all()
 
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))

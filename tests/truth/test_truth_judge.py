@@ -139,6 +139,24 @@ def areas(corner):
 
 POINT = PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0.3, 0.0, 0.0))
 SPOT = PunctualLight("spot", "s", 0, (1.0, 1.0, 1.0), (0.1, 0.2, 0.0), (0.6, 0, -0.8), 0.8, 1.4)
+FADED = replace(POINT, range=1.15)
+
+
+def faded_flux(corner, light):
+    """Return what arrives at triangles (t, 3, 3) from a point light of a range (midpoint rule)."""
+    side = 64
+    i, j = np.divmod(np.arange(side * side), side)
+    up = i + j < side
+    u = np.where(up, i + 1 / 3, side - i - 1 / 3) / side
+    v = np.where(up, j + 1 / 3, side - j - 1 / 3) / side
+    edge = corner[:, 1:] - corner[:, :1]
+    place = corner[:, :1] + u[:, None] * edge[:, :1] + v[:, None] * edge[:, 1:]
+    way = np.array(light.position) - place
+    length = np.linalg.norm(way, axis=2)
+    # Twice the area, with its direction.
+    cross = np.cross(edge[:, 0], edge[:, 1])
+    window = np.clip(1 - (length / light.range) ** 4, 0, 1)
+    return float((np.einsum("tpx,tx->tp", way, cross) * window / length**3).sum() / 2 / side**2)
 
 
 @pytest.mark.parametrize(
@@ -146,6 +164,7 @@ SPOT = PunctualLight("spot", "s", 0, (1.0, 1.0, 1.0), (0.1, 0.2, 0.0), (0.6, 0, 
     [
         *(("point", "light", 0.5, 8), ("point", "mis", 0.7, 12), ("point", "bdpt", 0.5, 4)),
         *(("spot", "mis", 0.5, 16), ("area", "mis", 0.5, 8)),
+        *(("faded", "light", 0.5, 8), ("faded", "mis", 0.5, 16), ("faded", "bdpt", 0.5, 6)),
     ],
 )
 def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
@@ -153,8 +172,9 @@ def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
     corner = icosphere(1, inward=True)
     area = areas(corner)
     glows = corner[:, :, 2].mean(axis=1) > 0.6
-    flux = {"point": 4 * math.pi, "spot": spot_flux(0.8, 1.4), "area": math.pi * area[glows].sum()}[lamp]
-    light = {"point": (POINT,), "spot": (SPOT,), "area": ()}[lamp]
+    flux = {"point": 4 * math.pi, "spot": spot_flux(0.8, 1.4), "area": math.pi * area[glows].sum()}
+    flux = faded_flux(corner, FADED) if lamp == "faded" else flux[lamp]
+    light = {"point": (POINT,), "spot": (SPOT,), "faded": (FADED,), "area": ()}[lamp]
     scene, _ = polyhedron(corner, light, albedo, glows if lamp == "area" else None)
     found = traced(
         scene, lambda k: spread_over(corner, 256, k), estimator=estimator, samples=256, passes=passes
@@ -204,6 +224,12 @@ def test_integrating_sphere(estimator, albedo, passes):
             (2 * ((math.cos(0.3) - math.cos(0.4)) / (math.cos(0.2) - math.cos(0.4))) ** 2,) * 3,
         ),
         (PunctualLight("directional", "d", 0, (5.0, 5.0, 5.0), direction=(0.6, 0, -0.8)), (4, 4, 4)),
+        # The window of a range: 1 - (1 / 2)^4.
+        (PunctualLight("point", "p", 0, (3.0, 2.0, 1.0), (0, 0, 1), range=2.0), (45 / 16, 15 / 8, 15 / 16)),
+        (
+            PunctualLight("spot", "s", 0, (4.0,) * 3, (0, 0, 2), (0, 0, -1), 0.2, 0.4, range=4.0),
+            (15 / 16,) * 3,
+        ),
     ],
 )
 @pytest.mark.parametrize("estimator", ESTIMATORS)

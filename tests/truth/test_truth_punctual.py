@@ -48,6 +48,22 @@ def test_inverse_square_and_cosine_at_every_texel():
     assert np.abs(brightest - [0.7, 0, -0.4]).max() < 0.2
 
 
+def test_a_range_is_faded_out_to_as_gltf_says():
+    light, reach = (0.7, 0.8, -0.4), 1.4
+    builder, floor = floor_scene()
+    builder.light("point", 3.0, position=light, range=reach)
+    found = floor.values(builder.bake())[..., 0]
+
+    def irradiance(p):
+        window = np.clip(1 - (np.linalg.norm(p - light, axis=-1) / reach) ** 4, 0, 1)
+        return 3.0 * point_irradiance(light, p, UP) * window
+
+    assert_texels(found, floor.texel_mean(irradiance), 0.02)
+    far = np.linalg.norm(floor.points(16) - light, axis=-1).min(axis=2) > reach
+    assert far.sum() > 100
+    assert (found[far] == 0).all()
+
+
 def test_lights_add_up_and_keep_their_colours():
     builder, floor = floor_scene()
     builder.light("point", (1.0, 0.5, 0.0), position=(1.0, 1.0, 1.0))

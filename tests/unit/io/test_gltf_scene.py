@@ -124,6 +124,92 @@ def test_lights_stand_and_shine_where_their_nodes_do(tmp_path):
         np.testing.assert_allclose(light.direction, (0, -1, 0), atol=1e-15)
 
 
+def lit(light, *chain):
+    """Return a builder whose light hangs below nested nodes of these members, the outermost first."""
+    builder = quad_builder()
+    builder.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    nodes = [{**members} for members in chain]
+    nodes[-1]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
+    first = len(builder.json["nodes"])
+    for k, node in enumerate(nodes[:-1]):
+        node["children"] = [first + k + 1]
+    builder.json["nodes"] += nodes
+    return builder
+
+
+TURN = {"rotation": [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)], "name": "lamp"}
+# The same in single precision as exporters write it.
+TURN_32 = {"rotation": [float(np.float32(v)) for v in TURN["rotation"]], "name": "lamp"}
+SQUEEZE = [
+    [{"scale": [1, 0, 1]}, TURN],
+    [{"scale": [1, 0, 1]}, TURN_32],
+    [{"scale": [3e5, 0, 2e5]}, {"scale": [7, 7, 7]}, TURN_32],
+    [{"scale": [1e-7, 0, 1e-7]}, TURN_32],
+    [{"scale": [1, 1e-8, 1]}, TURN],
+    [{"scale": [0, 0, 0]}, TURN],
+    [{"scale": [-1, 0, 1], "rotation": [0, 0.6, 0, 0.8]}, TURN],
+    [{"name": "lamp", "matrix": [1, 0, 0, 0, 0, 0, 1, 0, 0, 6e-8, 0, 0, 0, 3, 0, 1]}],
+]
+
+
+@pytest.mark.parametrize("chain", SQUEEZE)
+@pytest.mark.parametrize("kind", ["spot", "directional"])
+def test_a_light_without_a_direction_is_named_and_left_out(tmp_path, chain, kind):
+    scene = load(tmp_path, lit({"type": kind}, *chain))
+    assert scene.lights == ()
+    assert [(w.code, w.object) for w in scene.warnings] == [("flat-light", "lamp")]
+    assert kind in scene.warnings[0].message
+    assert len(load(tmp_path, lit({"type": "point"}, *chain)).lights) == 1
+
+
+@pytest.mark.parametrize(
+    ("chain", "direction"),
+    [
+        ([{"scale": [1e-5] * 3}, TURN], (0, -1, 0)),
+        ([{"scale": [1e-200] * 3}, TURN], (0, -1, 0)),
+        ([{"scale": [1e200] * 3}, TURN], (0, -1, 0)),
+        ([{"scale": [1, 1e-4, 1]}, TURN], (0, -1, 0)),
+        ([{"scale": [1, -1, 1]}, TURN], (0, 1, 0)),
+        ([{"scale": [0, 1, 0]}, TURN], (0, -1, 0)),
+        ([{"scale": [1, 1, 0], "name": "lamp"}], None),
+        # A shear that leans -Z far over: x grows by 1000 z.
+        ([{"name": "l", "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 1000, 0, 1, 0, 0, 0, 0, 1]}], (-1000, 0, -1)),
+    ],
+)
+def test_scaled_mirrored_and_sheared_lights_shine_along_their_axis(tmp_path, chain, direction):
+    lights = load(tmp_path, lit({"type": "spot"}, *chain)).lights
+    if direction is None:
+        assert lights == ()
+        return
+    np.testing.assert_allclose(
+        lights[0].direction, np.array(direction) / np.linalg.norm(direction), atol=1e-11
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(math.nan, "NaN"), (math.inf, "Infinity"), (1e300, "not finite")]
+)
+def test_a_light_under_a_matrix_that_is_not_finite_is_bad_input(tmp_path, value, text):
+    matrix = np.eye(4).reshape(-1).tolist()
+    matrix[10] = value
+    with pytest.raises(InputError, match=text):
+        load(tmp_path, lit({"type": "spot"}, {"matrix": matrix}, {"matrix": matrix}))
+
+
+def test_the_range_of_a_light_is_read(tmp_path):
+    assert load(tmp_path, lit({"type": "point", "range": 2.5}, TURN)).lights[0].range == 2.5
+    assert load(tmp_path, lit({"type": "spot"}, TURN)).lights[0].range == math.inf
+    # The range of a light at infinity means nothing.
+    assert load(tmp_path, lit({"type": "directional", "range": 1}, TURN)).lights[0].range == math.inf
+    assert load(tmp_path, lit({"type": "point", "range": 2.5}, TURN)).warnings == ()
+
+
+@pytest.mark.parametrize("value", [0, -1, "far", None, True])
+def test_a_range_that_is_not_above_zero_is_refused(tmp_path, value):
+    with pytest.raises(InputError, match=r"lights\[0\]\.range"):
+        load(tmp_path, lit({"type": "point", "range": value}, TURN))
+
+
 def test_skinned_meshes_are_taken_as_they_are_bound(tmp_path):
     builder = quad_builder()
     builder.json["nodes"][0]["skin"] = 0

@@ -85,6 +85,11 @@ def sun(turn: Any, intensity: float = 1000.0) -> tuple:
     return {"type": "directional", "intensity": intensity}, {"rotation": list(turn)}
 
 
+def flattened(depth: float) -> tuple:
+    """Return a sun whose own scale squeezes the axis that it shines along."""
+    return {"type": "directional", "intensity": 1.0}, {"scale": [1, 1, depth], "rotation": list(DOWN)}
+
+
 DOWN, UP = (-0.70710678, 0, 0, 0.70710678), (0.70710678, 0, 0, 0.70710678)
 
 
@@ -252,6 +257,13 @@ CASES: dict[str, Case] = {
         scene((GRID, GRID_TRIANGLE, {"TEXCOORD_0": GRID[:, :2].copy()})),
     ),
     "no-light": Case(scene(floor()), scene(floor(), lights=(point(1),))),
+    "flat-light": Case(
+        scene(floor(), lights=(sun(DOWN), flattened(0.0))),
+        scene(floor(), lights=(sun(DOWN), flattened(1e-3))),
+    ),
+    "light-range": Case(
+        scene(floor(), lights=(point(1, range=3.0),)), scene(floor(), lights=(point(1, range=4.0),))
+    ),
     "light-inside": Case(
         scene((CUBE, CUBE_TRIANGLE), lights=(point(1, (0.5, 0.5, 0.5)),)),
         scene((CUBE, CUBE_TRIANGLE), lights=(point(1, (0.5, 1.5, 0.5)),)),
@@ -275,5 +287,7 @@ CASES: dict[str, Case] = {
         scene(floor(), (CEILING, QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, LAMP)),
     ),
     "cost": Case(scene(floor()), scene((FLOOR, [[0, 0, 0]]))),
-    "file-note": Case(scene(floor(), lights=(point(1, range=5.0),)), scene(floor(), lights=(point(1),))),
+    "file-note": Case(
+        scene(floor(), extra=lambda builder: builder.json.update(extensionsUsed=["ACME_x"])), scene(floor())
+    ),
 }
