@@ -46,6 +46,7 @@ from baker.radiosity.patches import build_patches
 from baker.radiosity.points import KeptPoints, keep_points
 from baker.radiosity.solve import energy_audit, solve_radiosity, solve_warnings
 from baker.radiosity.texels import build_texels
+from baker.shading.inside import hide_backs
 from baker.shading.materials import Shading, resolve_materials
 from baker.shading.ray_tree import build_ray_tree
 from baker.trace.embree import RayScene
@@ -87,6 +88,7 @@ class World:
     rays: RayScene
     emitters: Emitters
     table: HitTable
+    tells: NDArray[np.uint8]
     mask: NDArray[np.uint16]
     kept: KeptPoints | None
 
@@ -187,6 +189,7 @@ def prepare(
     with record.stage("texels"):
         geometry = world_geometry(scene, atlas)
         shading = resolve_materials(scene, geometry)
+        geometry, tells = hide_backs(scene, geometry, shading)
         texels, surface = build_texels(
             geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
         )
@@ -197,16 +200,13 @@ def prepare(
     if mask is None:
         with record.stage("buried texels"):
             mask, cast = find_buried(
-                texels,
-                surface,
-                table,
-                rays.tracer,
-                seed=settings.seed,
-                threads=threads,
-                progress=record.progress,
-            )
+                texels, surface, table, tells, rays.tracer,
+                seed=settings.seed, threads=threads, progress=record.progress,
+            )  # fmt: skip
             record.rays["buried texels"] = cast
-    return World(geometry, shading, texels, surface, rays, emitters, table, mask, keep_points(texels.n))
+    return World(
+        geometry, shading, texels, surface, rays, emitters, table, tells, mask, keep_points(texels.n)
+    )
 
 
 def trace_transport(

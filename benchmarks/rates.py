@@ -125,7 +125,7 @@ def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[f
 
     start = perf_counter()
     _, cast = find_buried(
-        world.texels, world.surface, world.table, world.rays.tracer,
+        world.texels, world.surface, world.table, world.tells, world.rays.tracer,
         seed=settings.seed, threads=thread_count(settings.threads), progress=silent,
     )  # fmt: skip
     record.timings["buried texels"], record.rays["buried texels"] = perf_counter() - start, cast

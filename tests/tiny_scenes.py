@@ -14,6 +14,7 @@ from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.lights.emissive import build_emitters
 from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.texels import build_texels
+from baker.shading.inside import scene_solids, tell_tales
 from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
 
@@ -47,6 +48,12 @@ class World:
     def free(self):
         """Masks that say that no point is buried."""
         return np.full(self.texels.n, 0xFFFF, np.uint16)
+
+    @property
+    def tells(self):
+        """What triangles tell rays that come from inside of something."""
+        solids = scene_solids(self.scene, self.geometry, self.shading)
+        return tell_tales(self.geometry, self.shading, solids)
 
 
 def grey(albedo=0.5, emission=0.0, double_sided=False):

@@ -36,7 +36,7 @@ def fill_invalid(
     value : (H, W, C) float32
         A new page; valid and empty texels are unchanged.
     n_hopeless : int
-        Texels of charts without any valid texel; they get 0.
+        Texels of charts without any valid texel; they keep what was measured, 0 if that is no number.
 
     Raises
     ------
@@ -49,14 +49,21 @@ def fill_invalid(
     known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
-    # Whatever a buried texel holds (even NaN) must not survive.
+    # A chart in which everything is buried may stand in something that looks solid and is not.
+    n_charts = int(chart.max()) + 1
+    some = np.bincount(chart[known], minlength=n_charts) > 0
+    hopeless = covered & ~known & ~some[chart]
+    filled[hopeless & ~np.isfinite(filled).all(axis=2)] = 0.0
+    n_hopeless = int(hopeless.sum())
+    if n_hopeless:
+        chart, covered = np.where(hopeless, -1, chart), covered & ~hopeless
+    # Whatever a buried texel beside valid ones holds (even NaN) must not survive.
     filled[covered & ~known] = 0.0
     _grow_rings(filled, chart, known)
     left = covered & ~known
     if not left.any():
-        return filled, 0
-    # Pieces of a chart cut off from its valid texels take the mean of these, if there are any.
-    n_charts = int(chart.max()) + 1
+        return filled, n_hopeless
+    # Pieces of a chart cut off from its valid texels take the mean of these.
     trusted = valid & covered
     count = np.bincount(chart[trusted], minlength=n_charts)
     owner = chart[left]
@@ -64,7 +71,7 @@ def fill_invalid(
         total = np.bincount(chart[trusted], weights=value[..., channel][trusted], minlength=n_charts)
         mean = total / np.maximum(count, 1)
         filled[..., channel][left] = mean[owner]
-    return filled, int((count[owner] == 0).sum())
+    return filled, n_hopeless
 
 
 def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDArray[np.bool_]) -> None:

@@ -9,15 +9,25 @@ from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_fram
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, NO_HIT, PRIM_ID, trace_lanes
 
+# What a triangle tells of a ray that meets it first. 0: nothing; 1: it sees a black back; 2, 3: it comes from
+# the inside of a solid, because it meets the back, or the front of a face wound the wrong way.
+BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
+# So many rays from the inside of a solid prove that their point lies there: one may slip through an edge.
+PROOF = 2
+# Counts of a point: rays from the inside of solids in the low half, rays that saw anything else in the high.
+ELSEWHERE = 16
+
 
 @kernel
-def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_point, most, hits):  # type: ignore[no-untyped-def]
-    """Count rays that hit the back of a one-sided surface, until it is clear whether more than `most` do.
+def inside_hits(origin, normal, table, tells, caster, begin, net, shared, rays_per_point, proof, hits):  # type: ignore[no-untyped-def]
+    """Count what the rays of points say about being inside, until that is clear.
 
     origin, normal : (m, w, 3) float32; every point casts `rays_per_point` cosine-weighted rays
+    tells : (T,) uint8, see above
     begin : number of the first of the m items, for its random numbers and its row of `hits`
     net : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
-    hits : (n, w) uint8, counts are added
+    proof : rays from the inside of solids that settle a point
+    hits : (n, w) uint8, counts are added, see `ELSEWHERE`
     Returns the number of rays cast.
     """
     scene, intersect, width = caster.scene, caster.intersect, caster.width
@@ -39,20 +49,29 @@ def back_face_hits(origin, normal, table, caster, begin, net, shared, rays_per_p
                 load_frames(rays, frame, origin, normal, group, lanes, point)
             clear = 0
             for lane in range(lanes):
-                found = np.int64(hits[begin + group + lane, point])
-                clear += 1 if found > most or turn - found >= rays_per_point - most else 0
+                count = np.int64(hits[begin + group + lane, point])
+                inside, elsewhere = count % ELSEWHERE, count // ELSEWHERE
+                # Too few rays are left for a proof, and some saw the open.
+                lost = elsewhere > 0 and inside + rays_per_point - turn < proof
+                clear += 1 if inside >= proof or lost else 0
             if clear == lanes:
                 continue
             cast += lanes
             aim_lanes(rays, words, frame, seeds, net[sample, 0], net[sample, 1], shared, FAR)
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
-                if words[GEOM_ID * LANES + lane] == NO_HIT:
-                    continue
-                prim = np.int64(words[PRIM_ID * LANES + lane])
-                dx, dy, dz = (
-                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
-                )  # fmt: skip
-                if row[prim, 7] == np.float32(0.0) and not front_facing(row, prim, dx, dy, dz):
+                told = np.int64(0)
+                front = 0
+                if words[GEOM_ID * LANES + lane] != NO_HIT:
+                    prim = np.int64(words[PRIM_ID * LANES + lane])
+                    dx, dy, dz = (
+                        rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
+                    )  # fmt: skip
+                    told = np.int64(tells[prim])
+                    if told > 0 and front_facing(row, prim, dx, dy, dz):
+                        front = 1
+                if (told == SOLID_BACK and front == 0) or (told == SOLID_FRONT and front == 1):
                     hits[begin + group + lane, point] += 1
+                elif told != BLACK_BACK or front == 1:
+                    hits[begin + group + lane, point] += ELSEWHERE
     return cast

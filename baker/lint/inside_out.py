@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.winding import first_inside
 from baker.lint.bad_faces import faces_found
 from baker.lint.finding import Found
-from baker.lint.inside import first_inside
 from baker.lint.mesh_facts import MeshFacts
 from baker.lint.registry import check
 from baker.lint.subject import Subject

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
+from baker.core.winding import first_inside
 from baker.lint.finding import Found, Place
-from baker.lint.inside import first_inside
 from baker.lint.registry import check
 from baker.lint.subject import Subject
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.raw import PrimitiveArrays
+from baker.core.topology import number_rows
 from baker.lint.bad_faces import faces_found
 from baker.lint.finding import Found
-from baker.lint.mesh_facts import MeshFacts, number_rows
+from baker.lint.mesh_facts import MeshFacts
 from baker.lint.registry import check
 from baker.lint.subject import Subject
 

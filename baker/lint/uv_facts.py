@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.topology import connected_vertices
-from baker.lint.mesh_facts import MeshFacts, number_rows
+from baker.core.topology import connected_vertices, number_rows
+from baker.lint.mesh_facts import MeshFacts
 
 LIGHTMAP_SET = 1
 # A lightmap uv may lie this far outside 0..1: exporters round.

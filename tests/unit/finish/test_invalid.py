@@ -51,15 +51,18 @@ def test_each_side_of_a_buried_strip_keeps_its_own_light():
     assert (filled[:, 11:] == 0.0).all()
 
 
-def test_a_chart_without_any_valid_texel_is_black_and_counted():
+def test_a_chart_without_any_valid_texel_keeps_its_numbers_and_is_counted():
     chart = np.full((5, 9), -1, np.int32)
     chart[1:4, 1:4] = 0
     chart[1:4, 5:8] = 3
     valid = chart == 0
     value = np.ones((5, 9, 3), np.float32)
+    value[chart == 3] = 7.0
+    value[2, 6] = np.nan
     filled, n_hopeless = fill_invalid(value, chart, valid)
     assert n_hopeless == 9
-    assert (filled[chart == 3] == 0.0).all()
+    assert filled[2, 6].tolist() == [0.0, 0.0, 0.0]
+    assert (filled[chart == 3] == 7.0).sum() == 8 * 3
     assert (filled[chart != 3] == 1.0).all()
 
 

@@ -1,4 +1,4 @@
-"""The form-factor matrix of rooms: whole rows, reciprocity, neighbours, determinism; buried points."""
+"""The form-factor matrix of rooms: whole rows, reciprocity, neighbours, determinism."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from scipy.sparse import csr_matrix
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
 from baker.core.progress import silent
-from baker.radiosity.buried import find_buried
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.patches import build_patches
-from baker.radiosity.points import points_of
 
 
 def factors(world, patches, mask=None, threads=1, n_rays=256):
@@ -131,63 +129,6 @@ def test_no_patches_give_no_factors():
     matrix = factors(world, nothing)
     assert matrix.first.tolist() == [0]
     assert matrix.rays == 0
-
-
-def sunk_crate(double_sided=False):
-    """A floor with a crate that stands in it."""
-    floor = Quad((0, 0, 0), (0, 0, 4), (4, 0, 0))
-    crate = box_quads(
-        (1.03, -0.51, 1.07), (2.53, 1.0, 2.41), inward=False, material=grey(double_sided=double_sided)
-    )
-    return quad_world([floor, *crate], 96, inset=0.2)
-
-
-@pytest.fixture(scope="module")
-def buried():
-    world = sunk_crate()
-    runs = [
-        find_buried(
-            world.texels, world.surface, world.table, world.rays.tracer, seed=0, threads=t, progress=silent
-        )
-        for t in (1, 2)
-    ]
-    assert runs[0][0].tobytes() == runs[1][0].tobytes()
-    return world, *runs[0]
-
-
-def test_points_inside_the_crate_are_buried(buried):
-    world, mask, rays = buried
-    origin, _ = points_of(world.surface, world.free, np.arange(world.texels.n))
-    good = (mask[:, None] >> np.arange(16, dtype=np.uint16) & 1).astype(bool)
-    on_floor = world.texels.instance == 0
-    x, z = origin[..., 0], origin[..., 2]
-    slack = 0.02
-    inside = (x > 1.03 + slack) & (x < 2.53 - slack) & (z > 1.07 + slack) & (z < 2.41 - slack)
-    outside = (x < 1.03 - slack) | (x > 2.53 + slack) | (z < 1.07 - slack) | (z > 2.41 + slack)
-    assert inside[on_floor].sum() > 500
-    assert not good[on_floor][inside[on_floor]].any()
-    assert good[on_floor][outside[on_floor]].all()
-    assert rays > world.texels.n * 4
-
-
-def test_half_buried_texels_keep_their_free_half(buried):
-    world, mask, _ = buried
-    on_floor = np.flatnonzero(world.texels.instance == 0)
-    part = on_floor[(mask[on_floor] != 0) & (mask[on_floor] != 0xFFFF)]
-    assert len(part) > 20
-    origin, _ = points_of(world.surface, mask, part)
-    x, z = origin[..., 0], origin[..., 2]
-    assert ((x < 1.05) | (x > 2.51) | (z < 1.09) | (z > 2.39)).mean() > 0.999
-
-
-def test_nothing_is_buried_where_every_back_shines():
-    world = sunk_crate(double_sided=True)
-    table = world.table._replace(row=np.where(np.arange(16) == 7, np.float32(1), world.table.row))
-    mask, rays = find_buried(
-        world.texels, world.surface, table, world.rays.tracer, seed=0, threads=1, progress=silent
-    )
-    assert (mask == 0xFFFF).all()
-    assert rays == 0
 
 
 def test_small_patches_keep_what_large_ones_missed():

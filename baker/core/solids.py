@@ -1,0 +1,241 @@
+"""Which closed parts are solids, so that nobody ever sees their inside, and which are rooms.
+
+The rule does not ask whether materials are double-sided where the shape tells enough:
+
+- An opaque closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock).
+- It is a room all the same if a lamp, a camera or an object that emits light lies inside, if it glows on both
+  sides and has anything inside, if it has small holes and anything inside, or if most of the scene is inside
+  (sky spheres).
+- One whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls), else
+  a room. If it is double-sided, has nothing inside and does not glow, it is a solid wound the wrong way.
+
+A solid has no light inside and lets none in, so what a wrong guess can hide is dark in any case.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.closed_parts import ClosedParts, find_closed_parts
+from baker.core.winding import winding_number
+
+# Where the inside of a solid is, seen from a triangle.
+NOWHERE, BEHIND, BEFORE = 0, 1, 2
+# A part is inside another one if most of so many of its triangles' centres are and none is outside.
+_WITNESSES = 8
+# Winding numbers above and below which a point is inside or outside.
+_INSIDE, _OUTSIDE = 0.75, 0.25
+# A part that holds more than this share of the other parts' area is a room.
+_MOST_OF_SCENE = 0.5
+# At most so many parts are examined as holding most of the scene, and so many as being held.
+_LARGEST, _HELD = 32, 64
+
+
+class Surfaces(NamedTuple):
+    """The world's triangles.
+
+    position (V, 3) float32, metres; triangle (T, 3) int; instance (T,) int; opaque, double_sided, glows (T,)
+    bool: nothing passes, the back reflects, emits light.
+    """
+
+    position: NDArray[np.float32]
+    triangle: NDArray[np.integer]
+    instance: NDArray[np.integer]
+    opaque: NDArray[np.bool_]
+    double_sided: NDArray[np.bool_]
+    glows: NDArray[np.bool_]
+
+
+class Solids(NamedTuple):
+    """What is solid in the world.
+
+    Attributes
+    ----------
+    inside : (T,) uint8
+        `BEHIND` if the inside of a solid lies behind the triangle, `BEFORE` if it lies in front of it
+        (wound the wrong way), else `NOWHERE`.
+    sealed : (T,) bool
+        The triangle belongs to a solid without any hole.
+    room : (T,) bool
+        The triangle belongs to a closed part that is a room.
+    part : (T,) int32
+        Part of each triangle, -1 for those that let light through.
+    parts : ClosedParts
+    """
+
+    inside: NDArray[np.uint8]
+    sealed: NDArray[np.bool_]
+    room: NDArray[np.bool_]
+    part: NDArray[np.int32]
+    parts: ClosedParts
+
+
+def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:
+    """Tell solids from rooms.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+    places : (N, 3) float64, metres, world
+        Lamps and cameras: where one is, somebody sees.
+    """
+    parts = find_closed_parts(
+        surfaces.position, surfaces.triangle, surfaces.instance, surfaces.opaque & (surfaces.instance >= 0)
+    )
+    n = len(surfaces.triangle)
+    if not parts.closed.any():
+        none = np.zeros(n, bool)
+        return Solids(np.zeros(n, np.uint8), none, none, parts.part, parts)
+    judge = _Judge(surfaces, parts, places)
+    room = judge.rooms()
+    known = parts.part >= 0
+    is_room = np.zeros(n, bool)
+    is_room[known] = room[parts.part[known]]
+    outward = np.where(is_room, 0, parts.outward)
+    # A hollow is wound as a solid's surface is: its normals point out of the material.
+    outward[np.isin(parts.part, judge.hollows()) & known] *= -1
+    inside = np.where(outward > 0, BEHIND, np.where(outward < 0, BEFORE, NOWHERE)).astype(np.uint8)
+    sealed = (inside != NOWHERE) & parts.exact[parts.part]
+    return Solids(inside, sealed, is_room, parts.part, parts)
+
+
+class _Judge:
+    """Decides part by part."""
+
+    def __init__(self, surfaces: Surfaces, parts: ClosedParts, places: NDArray[np.float64]) -> None:
+        self.surfaces, self.parts, self.places = surfaces, parts, places
+        n = len(parts.area)
+        known = np.flatnonzero(parts.part >= 0)
+        of = parts.part[known]
+        self.order = known[np.argsort(of, kind="stable")]
+        self.start = np.searchsorted(parts.part[self.order], np.arange(n + 1))
+        weight = self._areas(known)
+        area = np.maximum(parts.area, 1e-300)
+        # Slivers may have been left out of the area.
+        self.inward = np.bincount(of, weight * (parts.outward[known] < 0), minlength=n) > 0.5 * area
+        self.two_sided = np.bincount(of, weight * surfaces.double_sided[known], minlength=n) > 0.5 * area
+        self.glows = np.bincount(of, surfaces.glows[known], minlength=n) > 0
+        glows_behind = surfaces.glows & surfaces.double_sided
+        self.glows_behind = np.bincount(of, glows_behind[known], minlength=n) > 0
+        self.slack = 1e-6 * float(np.abs(surfaces.position).max(initial=0.0))
+        self.around: dict[int, int] = {}
+
+    def _areas(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
+        cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        return np.asarray(0.5 * np.linalg.norm(cross, axis=1))
+
+    def hollows(self) -> NDArray[np.int64]:
+        """Return the parts that are hollows of solids, known after `rooms`."""
+        return np.array(sorted(self.around), np.int64)
+
+    def rooms(self) -> NDArray[np.bool_]:
+        """Return (P,) bool: closed parts that are rooms."""
+        parts = self.parts
+        room = np.zeros(len(parts.area), bool)
+        outward = np.flatnonzero(parts.closed & ~self.inward)
+        inward = np.flatnonzero(parts.closed & self.inward)
+        for part in inward:
+            shells = outward[self._boxes_around(int(part), outward)]
+            shells = shells[np.argsort(np.prod(parts.high[shells] - parts.low[shells], axis=1))]
+            for shell in shells:
+                if self._is_inside(int(part), int(shell)):
+                    self.around[int(part)] = int(shell)
+                    break
+        largest = self._largest()
+        for part in outward:
+            room[part] = self._outward_room(int(part), int(part) in largest)
+        for part in inward:
+            shell = self.around.get(int(part))
+            if shell is not None and not room[shell]:
+                continue
+            self.around.pop(int(part), None)
+            room[part] = self._inward_room(int(part))
+        return room
+
+    def _outward_room(self, part: int, large: bool) -> bool:
+        if self._holds_place(part) or self._holds(part, self.glows):
+            return True
+        if (self.glows_behind[part] or not self.parts.exact[part]) and self._holds(part, None):
+            return True
+        return large and self._holds_most(part)
+
+    def _inward_room(self, part: int) -> bool:
+        if not self.two_sided[part] or self.glows[part] or len(self.parts.area) == 1:
+            return True
+        return self._holds_place(part) or self._holds(part, None)
+
+    def _largest(self) -> set[int]:
+        """Return the few closed parts whose boxes may hold most of the scene."""
+        parts = self.parts
+        closed = np.flatnonzero(parts.closed & ~self.inward)
+        size = np.prod(parts.high[closed] - parts.low[closed], axis=1)
+        return set(closed[np.argsort(-size, kind="stable")][:_LARGEST].tolist())
+
+    def _surface(self, part: int) -> NDArray[np.float64]:
+        """Return the corners (F, 3, 3) of a part and its hollows, wound so that a solid counts 1."""
+        corners = []
+        for one in (part, *(hollow for hollow, shell in self.around.items() if shell == part)):
+            rows = self.order[self.start[one] : self.start[one + 1]]
+            corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
+            outward = self.parts.outward[rows] * (1 if one == part else -1)
+            # Twins of the other winding would cancel the face they lie on.
+            keep = outward != 0
+            turned = np.where((outward < 0)[:, None, None], corner[:, ::-1], corner)
+            corners.append(turned[keep])
+        return np.concatenate(corners)
+
+    def _holds_place(self, part: int) -> bool:
+        """Tell whether a lamp or camera is inside."""
+        low, high = self.parts.low[part], self.parts.high[part]
+        near = self.places[((self.places > low) & (self.places < high)).all(axis=1)]
+        if not len(near):
+            return False
+        surface = self._surface(part)
+        return any(winding_number(surface, place) > _INSIDE for place in near)
+
+    def _boxes_around(self, part: int, shells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        low, high = self.parts.low, self.parts.high
+        inside = (low[shells] <= low[part] + self.slack) & (high[shells] >= high[part] - self.slack)
+        found: NDArray[np.bool_] = inside.all(axis=1) & (shells != part)
+        return found
+
+    def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+        low, high = self.parts.low, self.parts.high
+        inside = ((low >= low[part] - self.slack) & (high <= high[part] + self.slack)).all(axis=1)
+        inside[part] = False
+        for hollow, shell in self.around.items():
+            inside[hollow] &= shell != part
+        return np.flatnonzero(inside if wanted is None else inside & wanted)
+
+    def _holds(self, part: int, wanted: NDArray[np.bool_] | None) -> bool:
+        """Tell whether another part (one of the wanted ones) is inside."""
+        return any(self._is_inside(int(other), part) for other in self._held_boxes(part, wanted))
+
+    def _holds_most(self, part: int) -> bool:
+        """Tell whether most of the other parts' area is inside."""
+        area = self.parts.area
+        others = float(area.sum() - area[part])
+        held = self._held_boxes(part, None)
+        if area[held].sum() <= _MOST_OF_SCENE * others:
+            return False
+        # The largest are asked, and speak for the rest.
+        held = held[np.argsort(-area[held], kind="stable")][:_HELD]
+        found = sum(float(area[other]) for other in held if self._is_inside(int(other), part))
+        return found > _MOST_OF_SCENE * float(area[held].sum())
+
+    def _is_inside(self, part: int, shell: int) -> bool:
+        """Tell whether a part lies inside another one, possibly touching it."""
+        rows = self.order[self.start[part] : self.start[part + 1]]
+        chosen = rows[np.linspace(0, len(rows) - 1, min(_WITNESSES, len(rows))).round().astype(int)]
+        points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
+        surface, found = self._surface(shell), 0
+        for point in points:
+            number = winding_number(surface, point)
+            if number < _OUTSIDE:
+                return False
+            found += number > _INSIDE
+        return 2 * found >= len(points)
