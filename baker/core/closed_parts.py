@@ -161,14 +161,14 @@ def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
     way = np.where(begin == edges.low[half], 1, -1) * turn[edges.face]
     net = np.add.reduceat(way, edges.first)
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    total = np.bincount(piece, area, minlength=n_pieces)
+    total = np.bincount(piece, area, minlength=n_pieces).astype(np.float64)
     bad = np.flatnonzero(net != 0)
     holes = np.zeros(n_pieces)
     if len(bad):
         loop, size = _loops(vertex, corner, edges, bad, net[bad])
         owner = np.zeros(len(size), np.int64)
         owner[loop] = piece[edges.face[edges.first[bad]]]
-        holes = holes + np.bincount(owner, size, minlength=n_pieces).astype(np.float64)
+        holes = holes + np.bincount(owner, size, minlength=n_pieces)
     return _Pieces(piece, turn, bad, edges, holes, total)
 
 
