@@ -28,8 +28,10 @@ class Glb:
         if len(data) > 20 + size:
             length, kind = struct.unpack_from("<I4s", data, 20 + size)
             assert kind == b"BIN\0"
-            self.binary = data[28 + size :]
+            self.binary = data[28 + size : 28 + size + length]
             assert len(self.binary) == length == self.json["buffers"][0]["byteLength"]
+            # Chunks that glTF does not define may follow.
+            self.further = data[28 + size + length :]
 
     def view(self, index: int) -> bytes:
         view = self.json["bufferViews"][index]

@@ -201,11 +201,18 @@ class SourceDocument:
         Every buffer's bytes, resolved from the BIN chunk, files or data URIs.
     folder : Path or None
         Where relative image URIs are found.
+    missing, missing_images : frozenset of int
+        Buffers and image files that cannot be read; nothing that is baked needs them.
+    chunks : tuple of (int, bytes)
+        Kind and content of the GLB chunks that glTF does not define.
     """
 
     json: dict[str, Any]
     buffers: tuple[bytes, ...]
     folder: Path | None
+    missing: frozenset[int] = frozenset()
+    missing_images: frozenset[int] = frozenset()
+    chunks: tuple[tuple[int, bytes], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import copy
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from baker.io.glb_pack import Json, Packer
+from baker.io.glb_pack import Json, Packer, is_index, objects
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
         Whether the occlusion texture counts (not if AO takes its place).
     """
     for holder in material_holders(primitive):
-        if "material" in holder:
+        if _names_material(document, holder.get("material")):
             material = document["materials"][holder["material"]]
             if any(_texcoord(info) == 1 for info in _texture_infos(material, occlusion=occlusion)):
                 return True
@@ -71,7 +71,7 @@ def reads_texture(document: Json, primitive: Json) -> bool:
     return any(
         next(_texture_infos(document["materials"][holder["material"]], occlusion=True), None) is not None
         for holder in material_holders(primitive)
-        if "material" in holder
+        if _names_material(document, holder.get("material"))
     )
 
 
@@ -89,11 +89,13 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
     """
     baked = {id(use.primitive): use for use in uses}
     wanted: dict[int, dict[tuple[int, int], list[Json]]] = {}
-    for mesh in document.get("meshes", []):
-        for primitive in mesh["primitives"]:
+    for _, mesh in objects(document, "meshes"):
+        for _, primitive in objects(mesh, "primitives"):
             use = baked.get(id(primitive))
             for holder in material_holders(primitive):
                 index = holder.get("material", _NONE)
+                if index != _NONE and not _names_material(document, index):
+                    continue
                 need = _need(document, index, use, ao_texture)
                 wanted.setdefault(index, {}).setdefault(need, []).append(holder)
     for index, needs in sorted(wanted.items()):
@@ -113,6 +115,12 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
 
 _NONE = -1
 _UNCHANGED = (-1, -1)
+
+
+def _names_material(document: Json, index: object) -> bool:
+    """Tell whether an index leads to a material; of what is not baked it need not."""
+    materials = document.get("materials", [])
+    return is_index(index) and index < len(materials) and isinstance(materials[index], dict)
 
 
 def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> tuple[int, int]:
@@ -155,5 +163,7 @@ def _texture_infos(node: Json, *, occlusion: bool) -> Iterator[Json]:
 def material_holders(primitive: Json) -> Iterator[Json]:
     """List the objects whose `material` a primitive may be drawn with: itself and its variants."""
     yield primitive
-    variants = primitive.get("extensions", {}).get("KHR_materials_variants", {})
-    yield from variants.get("mappings", [])
+    extensions = primitive.get("extensions")
+    variants = extensions.get("KHR_materials_variants") if isinstance(extensions, dict) else None
+    if isinstance(variants, dict):
+        yield from (mapping for _, mapping in objects(variants, "mappings"))

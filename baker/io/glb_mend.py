@@ -41,7 +41,8 @@ def write_mended(
         replaced.update(primitive_accessors(primitive))
         for key in ("attributes", "indices"):
             primitive.pop(key, None)
-    packer = Packer(document, source.buffers, frozenset(replaced))
+    packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
+    packer.chunks = source.chunks
     for (mesh, number), new in mended.items():
         primitive = document["meshes"][mesh]["primitives"][number]
         if isinstance(new, RemadePrimitive):

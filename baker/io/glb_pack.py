@@ -11,14 +11,17 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import math
 import struct
+import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
+from baker.io.glb_chunks import CHUNK_BIN, CHUNK_JSON
 
 Json = dict[str, Any]
 
@@ -36,7 +39,17 @@ _NO_DATA = (
     "KHR_mesh_quantization", "KHR_xmp",
 )  # fmt: skip
 
-_JSON_CHUNK, _BIN_CHUNK = 0x4E4F534A, 0x004E4942
+
+def is_index(value: object) -> TypeGuard[int]:
+    """Tell whether a JSON value may be an index."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def objects(document: Json, key: str) -> Iterator[tuple[int, Json]]:
+    """List the objects under `key` with their numbers; a document may be broken where nothing is baked."""
+    items = document.get(key)
+    if isinstance(items, list):
+        yield from ((number, item) for number, item in enumerate(items) if isinstance(item, dict))
 
 
 class Packer:
@@ -50,17 +63,31 @@ class Packer:
         The buffers that the document's views point into.
     replaced : set of int
         Accessors that primitives have given up; those that nothing else may use are dropped.
+    missing : set of int
+        Buffers that cannot be read: they stay beside the one buffer as the document names them.
+
+    Attributes
+    ----------
+    chunks : tuple of (int, bytes)
+        Further GLB chunks, kind and content, that follow the buffer.
     """
 
     def __init__(
-        self, document: Json, buffers: tuple[bytes, ...] = (), replaced: frozenset[int] = frozenset()
+        self,
+        document: Json,
+        buffers: tuple[bytes, ...] = (),
+        replaced: frozenset[int] = frozenset(),
+        *,
+        missing: frozenset[int] = frozenset(),
     ) -> None:
         self.document = document
+        self.chunks: tuple[tuple[int, bytes], ...] = ()
+        self._missing = [item for k, item in enumerate(document.get("buffers", [])) if k in missing]
         self._accessors: list[Json] = document.get("accessors", [])
         self._views: list[Json] = document.get("bufferViews", [])
         self._cache: dict[tuple[bytes, str], int] = {}
         self._free_accessors, self._free_views = _unused(document, replaced)
-        self._chunks, self._length = _merge(self._views, buffers, self._free_views)
+        self._chunks, self._length = _merge(self._views, buffers, self._free_views, sorted(missing))
 
     def add_bytes(self, data: bytes, **keys: Any) -> int:
         """Append `data` in a buffer view of its own and return the view's index."""
@@ -128,18 +155,22 @@ class Packer:
                 self.document[key] = items
             else:
                 self.document.pop(key, None)
-        binary = b"".join(self._chunks)
+        binary = b"".join(self._chunks) or b"\0" * (4 * bool(self._missing))
         if binary:
-            first = (self.document.get("buffers") or [{}])[0]
+            whole = [b for _, b in objects(self.document, "buffers") if b not in self._missing]
+            first = whole[0] if whole else {}
             kept = {key: value for key, value in first.items() if key not in ("uri", "byteLength")}
-            self.document["buffers"] = [{**kept, "byteLength": len(binary)}]
+            self.document["buffers"] = [{**kept, "byteLength": len(binary)}, *self._missing]
         else:
             self.document.pop("buffers", None)
-        text = json.dumps(self.document, separators=(",", ":"), allow_nan=False).encode()
+        text = _dump(self.document)
         text += b" " * (-len(text) % 4)
-        parts = [struct.pack("<II", len(text), _JSON_CHUNK), text]
+        parts = [struct.pack("<II", len(text), CHUNK_JSON), text]
         if binary:
-            parts += [struct.pack("<II", len(binary), _BIN_CHUNK), binary]
+            parts += [struct.pack("<II", len(binary), CHUNK_BIN), binary]
+        for kind, data in self.chunks:
+            padded = data + b"\0" * (-len(data) % 4)
+            parts += [struct.pack("<II", len(padded), kind), padded]
         total = 12 + sum(map(len, parts))
         if total >= 2**32:
             raise ResourceError(
@@ -158,15 +189,36 @@ class Packer:
         return self._cache[name]
 
 
+def _dump(document: Json) -> bytes:
+    try:
+        return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    except ValueError:
+        # Numbers like 1e999 in extras: legal JSON, but beyond what Python can say again.
+        return json.dumps(_finite(document), separators=(",", ":"), allow_nan=False).encode()
+
+
+def _finite(node: Any) -> Any:
+    """Return a JSON value with infinite numbers replaced by the largest ones."""
+    if isinstance(node, dict):
+        return {key: _finite(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_finite(value) for value in node]
+    if isinstance(node, float) and math.isinf(node):
+        return math.copysign(sys.float_info.max, node)
+    return node
+
+
 _OWN_KEYS = {"bufferView", "byteOffset", "count", "sparse", "min", "max"}
 
 
 def primitive_accessors(primitive: Json) -> Iterator[int]:
     """List the accessors that a primitive names."""
-    yield from primitive.get("attributes", {}).values()
-    for target in primitive.get("targets", []):
-        yield from target.values()
-    if "indices" in primitive:
+    targets = primitive.get("targets")
+    holders = [primitive.get("attributes"), *(targets if isinstance(targets, list) else [])]
+    for holder in holders:
+        if isinstance(holder, dict):
+            yield from filter(is_index, holder.values())
+    if is_index(primitive.get("indices")):
         yield primitive["indices"]
 
 
@@ -200,29 +252,40 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
     """Find which replaced accessors, and which views of theirs, nothing else may name."""
     used: set[int] = set()
-    for mesh in document.get("meshes", []):
-        for primitive in mesh["primitives"]:
+    for _, mesh in objects(document, "meshes"):
+        for _, primitive in objects(mesh, "primitives"):
             used.update(primitive_accessors(primitive))
-    for skin in document.get("skins", []):
-        used.update(skin[key] for key in ("inverseBindMatrices",) if key in skin)
-    for animation in document.get("animations", []):
-        for sampler in animation.get("samplers", []):
-            used.update((sampler["input"], sampler["output"]))
+    for _, skin in objects(document, "skins"):
+        used.update(filter(is_index, [skin.get("inverseBindMatrices")]))
+    for _, animation in objects(document, "animations"):
+        for _, sampler in objects(animation, "samplers"):
+            used.update(filter(is_index, [sampler.get("input"), sampler.get("output")]))
     named = set(_numbers(document, False))
     accessors = document.get("accessors", [])
-    free = sorted(replaced - used - named)
+    free = sorted(index for index in replaced - used - named if index < len(accessors))
     gone = set(free)
     views = {view for index in free for view in _views_of(accessors[index])}
-    kept = {view for index, item in enumerate(accessors) if index not in gone for view in _views_of(item)}
-    kept.update(image["bufferView"] for image in document.get("images", []) if "bufferView" in image)
-    extended = {index for index, view in enumerate(document.get("bufferViews", [])) if view.get("extensions")}
-    return free, sorted(views - kept - named - extended)
+    kept = {
+        view
+        for index, item in objects(document, "accessors")
+        if index not in gone
+        for view in _views_of(item)
+    }
+    kept.update(
+        image["bufferView"] for _, image in objects(document, "images") if is_index(image.get("bufferView"))
+    )
+    extended = {index for index, view in objects(document, "bufferViews") if view.get("extensions")}
+    known = len(document.get("bufferViews", []))
+    return free, sorted(view for view in views - kept - named - extended if view < known)
 
 
 def _views_of(accessor: Json) -> Iterator[int]:
-    sparse = accessor.get("sparse", {})
-    for holder in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
-        if "bufferView" in holder:
+    sparse = accessor.get("sparse")
+    holders = [accessor]
+    if isinstance(sparse, dict):
+        holders += [sparse.get("indices", {}), sparse.get("values", {})]
+    for holder in holders:
+        if isinstance(holder, dict) and is_index(holder.get("bufferView")):
             yield holder["bufferView"]
 
 
@@ -242,39 +305,51 @@ def _numbers(node: Any, collect: bool) -> Iterator[int]:
         yield node
 
 
-def _merge(views: list[Json], buffers: tuple[bytes, ...], free: list[int]) -> tuple[list[bytes], int]:
-    """Join all buffers without the bytes that only free views cover, and move the views along."""
+def _merge(
+    views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
+) -> tuple[list[bytes], int]:
+    """Join all buffers without the bytes that only free views cover, and move the views along.
+
+    Views of missing buffers follow theirs, which come behind the joined one.
+    """
     gone = set(free)
     chunks: list[bytes] = []
     length = 0
-    holders = [(index, view) for index, view in enumerate(views)]
+    holders = [(index, view) for index, view in enumerate(views) if isinstance(view, dict)]
     # Compressed views say once more, in their extension, where their bytes are.
     holders += [
         (-1, extension)
-        for view in views
-        for extension in view.get("extensions", {}).values()
+        for _, view in holders
+        for extension in _extensions(view)
         if isinstance(extension, dict) and "buffer" in extension
     ]
     moved: list[tuple[Json, int]] = []
     for number, data in enumerate(buffers):
+        if number in missing:
+            continue
         words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
         drop = np.zeros(len(words), bool)
-        mine = [(index, holder) for index, holder in holders if holder["buffer"] == number]
-        for index, holder in mine:
+        # A view that is no part of its buffer is one that nothing needs: it is left as it is.
+        mine = [
+            (index, holder, span)
+            for index, holder in holders
+            if holder.get("buffer") == number and (span := _span(holder, len(data))) is not None
+        ]
+        for index, _, (start, end) in mine:
             if index in gone:
-                start, end = _span(holder)
                 drop[-(-start // 4) : end // 4] = True
-        for index, holder in mine:
+        for index, _, (start, end) in mine:
             if index not in gone:
-                start, end = _span(holder)
                 drop[start // 4 : -(-end // 4)] = False
         before = np.concatenate([[0], np.cumsum(drop, dtype=np.int64)])
-        for index, holder in mine:
+        for index, holder, (start, _) in mine:
             if index not in gone:
-                start = holder.get("byteOffset", 0)
                 moved.append((holder, length + start - 4 * int(before[start // 4])))
         chunks.append(words[~drop].tobytes() if drop.any() else words.tobytes())
         length += len(chunks[-1])
+    for _, holder in holders:
+        if holder.get("buffer") in missing:
+            holder["buffer"] = 1 + missing.index(holder["buffer"])
     for holder, offset in moved:
         holder["buffer"] = 0
         if offset or "byteOffset" in holder:
@@ -282,6 +357,14 @@ def _merge(views: list[Json], buffers: tuple[bytes, ...], free: list[int]) -> tu
     return chunks, length
 
 
-def _span(view: Json) -> tuple[int, int]:
-    start = view.get("byteOffset", 0)
-    return start, start + view["byteLength"]
+def _extensions(holder: Json) -> list[Any]:
+    extensions = holder.get("extensions")
+    return list(extensions.values()) if isinstance(extensions, dict) else []
+
+
+def _span(view: Json, size: int) -> tuple[int, int] | None:
+    """Return the first and the last byte (exclusive) of a view, or None if it is not within its buffer."""
+    start, length = view.get("byteOffset", 0), view.get("byteLength")
+    if not is_index(start) or not is_index(length) or start + length > size:
+        return None
+    return start, start + length

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.scene import SourceDocument
-from baker.io.glb_pack import Json
+from baker.io.glb_pack import Json, objects
 from baker.io.glb_rows import gather_rows
 
 # Extensions of primitives and meshes that neither hold nor count vertices.
@@ -62,7 +62,7 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
             return f"it is compressed with {name}"
     if primitive.get("targets"):
         return "it has morph targets"
-    skinned = any("skin" in node and node.get("mesh") == mesh for node in document.get("nodes", []))
+    skinned = any("skin" in node and node.get("mesh") == mesh for _, node in objects(document, "nodes"))
     if skinned or any(name.startswith("JOINTS_") for name in primitive["attributes"]):
         return "it is skinned"
     count = document["accessors"][primitive["attributes"]["POSITION"]]["count"]

@@ -50,6 +50,8 @@ def gather_rows(
         If the accessor is malformed, points outside its buffer or has too few elements.
     """
     name = f"accessor {index}"
+    if not isinstance(index, int) or not 0 <= index < len(document.get("accessors", [])):
+        raise InputError("its data cannot be read: there is no such accessor", object=name)
     try:
         accessor = document["accessors"][index]
         size, count = element_size(accessor), accessor["count"]
@@ -62,9 +64,19 @@ def gather_rows(
             data = np.zeros((len(rows), size), np.uint8)
         if "sparse" in accessor:
             _substitute(document, buffers, accessor, rows, data)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"its data cannot be read ({error!r}); repair the file", object=name) from None
     return data
+
+
+def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int) -> InputError | None:
+    """Return why an accessor does not give `n_rows` rows, or None if it does."""
+    try:
+        # Its first and last row, for the window on the buffer is checked as a whole.
+        gather_rows(document, buffers, index, np.array([0, max(n_rows - 1, 0)], np.int32))
+    except InputError as error:
+        return error
+    return None
 
 
 def _elements(

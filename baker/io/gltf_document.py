@@ -1,32 +1,29 @@
-"""Opens glTF 2.0 containers: GLB chunks, JSON, buffers, and the bytes of images.
+"""Opens glTF 2.0 documents: JSON, buffers, and the bytes of images.
 
-Based on: Khronos Group, glTF 2.0 Specification, sections 3.2 (asset), 3.6 (buffers), 4 (GLB).
+A buffer or image that cannot be read is no error before something needs it.
+
+Based on: Khronos Group, glTF 2.0 Specification, sections 3.2 (asset) and 3.6 (buffers).
 """
 
 from __future__ import annotations
 
-import base64
-import binascii
 import hashlib
 import json
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
-from urllib.parse import unquote, unquote_to_bytes
 
 from baker.core.errors import InputError
 from baker.core.scene import SceneWarning
+from baker.io.glb_chunks import MAGIC, Chunks, split_glb
 from baker.io.gltf_json import JsonObject
-
-_MAGIC = b"glTF"
-_CHUNK_JSON = 0x4E4F534A
-_CHUNK_BIN = 0x004E4942
+from baker.io.uri import UriError, is_data, read_uri
 
 UNDERSTOOD = frozenset(
     {
         "KHR_lights_punctual",
         "KHR_materials_emissive_strength",
+        "KHR_materials_pbrSpecularGlossiness",
         "KHR_materials_unlit",
         "KHR_mesh_quantization",
         "KHR_texture_transform",
@@ -59,9 +56,13 @@ class GltfDocument:
     ----------
     root : JsonObject
     buffers : tuple of bytes
-        Each cut to its `byteLength`.
+        Each cut to its `byteLength`; what there is of those in `buffer_faults`.
     image_files : dict of int to bytes
         Content of the images that have a URI, by image index.
+    buffer_faults, image_faults : dict of int to InputError
+        Why a buffer or an image's file cannot be used.
+    chunks : tuple of (int, bytes)
+        GLB chunks other than JSON and BIN.
     sha256 : str
         Over the scene file, then its outside buffers, then its outside images.
     warnings : tuple of SceneWarning
@@ -70,6 +71,9 @@ class GltfDocument:
     root: JsonObject
     buffers: tuple[bytes, ...]
     image_files: dict[int, bytes]
+    buffer_faults: dict[int, InputError]
+    image_faults: dict[int, InputError]
+    chunks: tuple[tuple[int, bytes], ...]
     folder: Path
     sha256: str
     warnings: tuple[SceneWarning, ...]
@@ -80,7 +84,7 @@ class GltfDocument:
         Raises
         ------
         InputError
-            If the view leaves its buffer or is compressed by an extension.
+            If the view leaves its buffer, is compressed by an extension, or the buffer cannot be used.
         """
         view = self.root.children("bufferViews")[index]
         for name in _COMPRESSED_VIEW:
@@ -91,7 +95,10 @@ class GltfDocument:
                     view.fail(
                         f"the data is compressed with {name}, which is not understood; export without it"
                     )
-        data = self.buffers[view.index("buffer", len(self.buffers), "buffers")]
+        number = view.index("buffer", len(self.buffers), "buffers")
+        if number in self.buffer_faults:
+            raise self.buffer_faults[number]
+        data = self.buffers[number]
         offset, length = view.integer("byteOffset", 0), view.integer("byteLength", minimum=1)
         if offset + length > len(data):
             view.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {len(data)} bytes")
@@ -111,49 +118,42 @@ def open_document(path: Path, data: bytes) -> GltfDocument:
     Raises
     ------
     InputError
-        For a broken container, JSON that is none, another version than 2.x, a required extension that is
-        not understood, and a missing or short buffer or image file.
+        For a broken container, JSON that is none, another version than 2.x, and a required extension that
+        is not understood.
     """
-    file = str(path)
-    text, chunk = _split_glb(data, file) if data[:4] == _MAGIC else (data, None)
-    root = JsonObject(_parse_json(text, file), "", file)
+    file, folder = str(path), path.parent
+    chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
+    root = JsonObject(_parse_json(chunks.json, file), "", file)
     _check_version(root)
     warnings = _check_extensions(root)
     digest = hashlib.sha256(data)
-    buffers = tuple(_read_buffers(root, chunk, path.parent, digest))
-    images = _read_image_files(root, path.parent, digest)
-    return GltfDocument(root, buffers, images, path.parent, digest.hexdigest(), tuple(warnings))
-
-
-def _split_glb(data: bytes, file: str) -> tuple[bytes, bytes | None]:
-    def fail(message: str) -> NoReturn:
-        raise InputError(message, file=file)
-
-    if len(data) < 20:
-        fail(f"the GLB is cut off after {len(data)} bytes, inside its header; export it again")
-    version, length = struct.unpack_from("<II", data, 4)
-    if version != 2:
-        fail(f"this is binary glTF version {version}; only glTF 2.0 is read, so convert it first")
-    if length > len(data):
-        fail(f"the GLB is cut off: its header says {length} bytes, the file has {len(data)}")
-    text: bytes | None = None
-    chunk: bytes | None = None
-    offset = 12
-    while offset + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, offset)
-        offset += 8
-        if offset + size > length:
-            fail(f"a GLB chunk of {size} bytes at byte {offset} runs past the end of the file")
-        if text is None:
-            if kind != _CHUNK_JSON:
-                fail("the first chunk of the GLB is not JSON")
-            text = data[offset : offset + size]
-        elif kind == _CHUNK_BIN and chunk is None:
-            chunk = data[offset : offset + size]
-        offset += size
-    if text is None:
-        fail("the GLB has no JSON chunk")
-    return text, chunk
+    buffers: list[bytes] = []
+    buffer_faults: dict[int, InputError] = {}
+    for i, buffer in enumerate(root.children("buffers")):
+        own = chunks.binary if i == 0 else None
+        content, fault = _read_buffer(buffer, own, folder, digest)
+        buffers.append(content)
+        if fault is not None:
+            buffer_faults[i] = fault
+    images: dict[int, bytes] = {}
+    image_faults: dict[int, InputError] = {}
+    for i, image in enumerate(root.children("images")):
+        try:
+            if "uri" in image:
+                images[i] = _read_file(image, folder, digest)
+        except InputError as error:
+            image_faults[i] = error
+    return GltfDocument(
+        root=root,
+        buffers=tuple(buffers),
+        image_files=images,
+        buffer_faults=buffer_faults,
+        image_faults=image_faults,
+        chunks=chunks.others,
+        folder=folder,
+        sha256=digest.hexdigest(),
+        warnings=tuple(warnings),
+    )
 
 
 def _parse_json(text: bytes, file: str) -> dict[str, Any]:
@@ -198,13 +198,16 @@ def _check_extensions(root: JsonObject) -> list[SceneWarning]:
     ]
 
 
-def _read_buffers(root: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash) -> list[bytes]:
-    buffers = []
-    for i, buffer in enumerate(root.children("buffers")):
+def _read_buffer(
+    buffer: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash
+) -> tuple[bytes, InputError | None]:
+    """Return a buffer's bytes, as many as there are, and why they cannot be used."""
+    data = b""
+    try:
         length = buffer.integer("byteLength", minimum=1)
         if "uri" in buffer:
-            data = read_uri(buffer, folder, digest)
-        elif i == 0 and chunk is not None:
+            data = _read_file(buffer, folder, digest)
+        elif chunk is not None:
             data = chunk
         else:
             for name in _COMPRESSED_VIEW:
@@ -212,48 +215,21 @@ def _read_buffers(root: JsonObject, chunk: bytes | None, folder: Path, digest: h
                     buffer.fail(
                         f"the data is compressed with {name}, which is not understood; export without it"
                     )
-            buffer.fail("the buffer has neither a uri nor a BIN chunk")
+            buffer.fail("the buffer has neither a uri nor a BIN chunk; export the file again")
         if len(data) < length:
             buffer.fail(f"the buffer is too short: byteLength is {length}, its data has {len(data)} bytes")
-        buffers.append(data if len(data) == length else data[:length])
-    return buffers
+    except InputError as error:
+        return data, error
+    return (data if len(data) == length else data[:length]), None
 
 
-def _read_image_files(root: JsonObject, folder: Path, digest: hashlib._Hash) -> dict[int, bytes]:
-    images = root.children("images")
-    return {i: read_uri(image, folder, digest) for i, image in enumerate(images) if "uri" in image}
-
-
-def read_uri(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
-    """Return the bytes behind `holder`'s "uri": a data URI, or a file that is also added to `digest`."""
+def _read_file(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
+    """Return the bytes behind `holder`'s "uri"; those of a file are also added to `digest`."""
     uri = holder.string("uri")
-    if uri[:5].lower() == "data:":
-        return _decode_data_uri(holder, uri)
-    scheme, colon, _ = uri.partition("://")
-    if colon and scheme.isalnum():
-        holder.fail(f"'{uri[:80]}' is not a file beside the scene; store it there", "uri")
-    # A name may hold a bare % sign, against the rules: the literal name counts if such a file exists.
-    names = dict.fromkeys((unquote(uri), uri))
-    for name in names:
-        try:
-            data = (folder / name).read_bytes()
-        except FileNotFoundError:
-            continue
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            holder.fail(f"the file '{uri[:80]}' cannot be read: {why}", "uri")
-        digest.update(data)
-        return data
-    holder.fail(f"the file '{uri[:80]}' is missing; put it beside the scene", "uri")
-
-
-def _decode_data_uri(holder: JsonObject, uri: str) -> bytes:
-    head, comma, body = uri.partition(",")
-    if not comma:
-        holder.fail("the data URI has no comma before its data", "uri")
-    if not head.lower().endswith(";base64"):
-        return unquote_to_bytes(body)
     try:
-        return base64.b64decode(unquote(body) if "%" in body else body, validate=True)
-    except (binascii.Error, ValueError) as error:
-        holder.fail(f"the data URI is not valid base64 ({error})", "uri")
+        data = read_uri(uri, folder)
+    except UriError as error:
+        holder.fail(str(error), "uri")
+    if not is_data(uri):
+        digest.update(data)
+    return data

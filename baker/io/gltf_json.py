@@ -15,17 +15,31 @@ class JsonObject:
     Parameters
     ----------
     value : dict
+        Anything else fails when a member is asked for.
     where : str
         Its place, like "accessors[3].sparse"; empty for the root.
     file : str
         The file concerned, for messages.
     """
 
-    def __init__(self, value: dict[str, Any], where: str, file: str) -> None:
-        self.value = value
+    def __init__(self, value: Any, where: str, file: str) -> None:
+        self._value = value
         self.where = where
         self.file = file
         self._lists: dict[str, list[JsonObject]] = {}
+
+    @property
+    def value(self) -> dict[str, Any]:
+        """Return the members.
+
+        Raises
+        ------
+        InputError
+            If the document has something else than an object here: nobody minds until it is needed.
+        """
+        if not isinstance(self._value, dict):
+            self.fail(f"expected an object, found {_show(self._value)}")
+        return self._value
 
     def __contains__(self, key: str) -> bool:
         """Tell whether the member is there."""
@@ -117,7 +131,7 @@ class JsonObject:
         return self.child(key) if key in self.value else JsonObject({}, self.place(key), self.file)
 
     def children(self, key: str) -> list[JsonObject]:
-        """Return the list of objects under `key` (empty if absent)."""
+        """Return the list of objects under `key` (empty if absent); each is looked at when it is needed."""
         # Kept: a file with ten thousand accessors asks for the same list as many times.
         if key not in self._lists:
             self._lists[key] = list(self._children(key))
@@ -128,8 +142,6 @@ class JsonObject:
         if not isinstance(value, list):
             self.fail(f"expected a list, found {_show(value)}", key)
         for i, item in enumerate(value):
-            if not isinstance(item, dict):
-                self.fail(f"expected an object, found {_show(item)}", f"{key}[{i}]")
             yield JsonObject(item, self.place(f"{key}[{i}]"), self.file)
 
     def extension(self, name: str) -> JsonObject | None:

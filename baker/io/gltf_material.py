@@ -12,9 +12,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.scene import Material, Texture
+from baker.core.errors import InputError
+from baker.core.scene import Material, SceneWarning, Texture
 from baker.io.gltf_document import GltfDocument
 from baker.io.gltf_json import JsonObject
+from baker.io.gltf_surface import read_surface
+from baker.io.gltf_unread import image_bytes, unreadable_textures
 from baker.io.images import decode_image
 
 DEFAULT_MATERIAL = Material(name="default")
@@ -24,8 +27,8 @@ _WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 _ALPHA = ("OPAQUE", "MASK", "BLEND")
 
 
-def read_materials(document: GltfDocument, *, reflections: bool = False) -> list[Material]:
-    """Return the file's materials in its order.
+class MaterialReader:
+    """Reads the materials of a file when a surface needs them.
 
     Parameters
     ----------
@@ -33,52 +36,96 @@ def read_materials(document: GltfDocument, *, reflections: bool = False) -> list
     reflections : bool
         Also decode textures that only say how mirror-like a surface is.
 
-    Raises
-    ------
-    InputError
-        For values of a wrong type or out of range, and images that cannot be decoded.
+    Attributes
+    ----------
+    materials : list of Material
+        In the file's order. Those that no surface has needed so far are plain.
+    warnings : list of SceneWarning
+    told : set of int
+        Images that the warnings name.
     """
-    images: dict[int, NDArray[np.uint8]] = {}
-    materials = document.root.children("materials")
-    return [_material(document, m, i, images, reflections) for i, m in enumerate(materials)]
 
+    def __init__(self, document: GltfDocument, *, reflections: bool = False) -> None:
+        self._document = document
+        self._reflections = reflections
+        self._images: dict[int, NDArray[np.uint8]] = {}
+        self._unread = document.root.children("materials")
+        self.materials = [Material(name=_name(m, i)) for i, m in enumerate(self._unread)]
+        self._read: set[int] = set()
+        self.warnings: list[SceneWarning] = []
+        self.told: set[int] = set()
 
-def _material(
-    document: GltfDocument,
-    material: JsonObject,
-    number: int,
-    images: dict[int, NDArray[np.uint8]],
-    reflections: bool,
-) -> Material:
-    surface = material.child_or_empty("pbrMetallicRoughness")
-    red, green, blue, alpha = surface.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0))
-    emission = material.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))
-    if min(red, green, blue, alpha) < 0 or min(emission) < 0:
-        material.fail("a colour factor is negative")
-    glow = material.extension("KHR_materials_emissive_strength")
-    strength = glow.number("emissiveStrength", 1.0, low=0.0) if glow is not None else 1.0
-    mode = material.string("alphaMode", "OPAQUE")
-    if mode not in _ALPHA:
-        material.fail(f"'{mode[:20]}' is none of {', '.join(_ALPHA)}", "alphaMode")
-    emission_texture = _texture(document, material, "emissiveTexture", images)
-    if material.extension("KHR_materials_unlit") is not None:
+    def need(self, number: int) -> Material:
+        """Return a material; the number behind the last one is glTF's default material.
+
+        Raises
+        ------
+        InputError
+            For values of a wrong type or out of range, and textures of base colour or emission that cannot
+            be read.
+        """
+        if number == len(self._unread):
+            if len(self.materials) == number:
+                self.materials.append(DEFAULT_MATERIAL)
+        elif number not in self._read:
+            self._read.add(number)
+            self.materials[number] = self._material(self._unread[number], number)
+        return self.materials[number]
+
+    def _material(self, material: JsonObject, number: int) -> Material:
+        name = material.string("name", f"material_{number}")
+        unlit = material.extension("KHR_materials_unlit") is not None
+        surface = read_surface(material, name, self.warnings)
+        emission = material.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))
+        if min(surface.colour) < 0 or min(emission) < 0:
+            material.fail("a colour factor is negative")
+        glow = material.extension("KHR_materials_emissive_strength")
+        strength = glow.number("emissiveStrength", 1.0, low=0.0) if glow is not None else 1.0
         # An unlit surface shows its base colour and nothing else; here that colour reflects.
-        strength, emission_texture = 0.0, None
-    return Material(
-        name=material.string("name", f"material_{number}"),
-        base_colour=(red, green, blue, alpha),
-        base_colour_texture=_texture(document, surface, "baseColorTexture", images),
-        emission=(emission[0] * strength, emission[1] * strength, emission[2] * strength),
-        emission_texture=emission_texture,
-        double_sided=material.boolean("doubleSided", False),
-        alpha_mode=mode,
-        alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0),
-        metallic=surface.number("metallicFactor", 1.0, low=0.0, high=1.0),
-        roughness=surface.number("roughnessFactor", 1.0, low=0.0, high=1.0),
-        metallic_roughness_texture=(
-            _texture(document, surface, "metallicRoughnessTexture", images) if reflections else None
-        ),
-    )
+        strength = 0.0 if unlit else strength
+        mode = material.string("alphaMode", "OPAQUE")
+        if mode not in _ALPHA:
+            material.fail(f"'{mode[:20]}' is none of {', '.join(_ALPHA)}", "alphaMode")
+        read = {(surface.holder.where, surface.texture)}
+        needs_glow = strength > 0 and max(emission) > 0
+        if needs_glow:
+            read.add((material.where, "emissiveTexture"))
+        self.warnings += unreadable_textures(self._document, material, name, read, self.told)
+        return Material(
+            name=name,
+            base_colour=surface.colour,
+            base_colour_texture=self._texture(surface.holder, surface.texture),
+            emission=(emission[0] * strength, emission[1] * strength, emission[2] * strength),
+            emission_texture=(
+                None if unlit else self._texture(material, "emissiveTexture", needed=needs_glow)
+            ),
+            double_sided=material.boolean("doubleSided", False),
+            alpha_mode=mode,
+            alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0),
+            metallic=surface.metallic,
+            roughness=surface.roughness,
+            metallic_roughness_texture=(
+                self._texture(surface.holder, "metallicRoughnessTexture", needed=False)
+                if self._reflections
+                else None
+            ),
+        )
+
+    def _texture(self, holder: JsonObject, key: str, *, needed: bool = True) -> Texture | None:
+        try:
+            return _texture(self._document, holder, key, self._images)
+        except InputError:
+            if needed:
+                raise
+            return None
+
+
+def _name(material: JsonObject, number: int) -> str:
+    """Return the name of a material that may be broken: nothing may need it."""
+    try:
+        return material.string("name", f"material_{number}")
+    except InputError:
+        return f"material_{number}"
 
 
 def _texture(
@@ -152,16 +199,6 @@ def _image(
     number = source.index("source", len(known), "images")
     if number not in images:
         images[number] = decode_image(
-            _image_bytes(document, known[number], number), file=known[number].file, object=known[number].where
+            image_bytes(document, number), file=known[number].file, object=known[number].where
         )
     return images[number]
-
-
-def _image_bytes(document: GltfDocument, image: JsonObject, number: int) -> bytes:
-    if number in document.image_files:
-        return document.image_files[number]
-    if "bufferView" not in image:
-        image.fail("the image has neither a uri nor a bufferView")
-    views = len(document.root.children("bufferViews"))
-    data, offset, length, _ = document.view(image.index("bufferView", views, "bufferViews"))
-    return data[offset : offset + length]

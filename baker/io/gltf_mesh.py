@@ -9,20 +9,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.errors import InputError
 from baker.core.raw import PrimitiveArrays
 from baker.core.scene import SceneWarning
-from baker.io.glb_rows import gather_rows
+from baker.io.glb_rows import fault_of, gather_rows
 from baker.io.gltf_accessor import FLOAT, component_type, read_accessor, read_indices
 from baker.io.gltf_document import GltfDocument
 from baker.io.gltf_json import JsonObject
-from baker.io.gltf_material import MOST_TEXCOORDS
+from baker.io.gltf_material import MOST_TEXCOORDS, MaterialReader
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DRACO = "KHR_draco_mesh_compression"
 
 
 def read_primitives(
-    document: GltfDocument, mesh: JsonObject, name: str, default_material: int, *, lenient: bool = False
+    document: GltfDocument, mesh: JsonObject, name: str, materials: MaterialReader, *, lenient: bool = False
 ) -> tuple[list[PrimitiveArrays], list[SceneWarning]]:
     """Return the triangle primitives of a mesh; points and lines are left out with a warning.
 
@@ -32,8 +33,8 @@ def read_primitives(
     mesh : JsonObject
     name : str
         The mesh's name, for warnings.
-    default_material : int
-        Index of the material of primitives that name none.
+    materials : MaterialReader
+        Reads those that the primitives name.
     lenient : bool
         Let indices out of range pass.
 
@@ -55,7 +56,8 @@ def read_primitives(
         if primitive.children("targets"):
             message = f"primitive {i} has morph targets; its base shape is baked"
             warnings.append(SceneWarning("morphed", message, name))
-        arrays.append(_primitive(document, primitive, i, mode, default_material, lenient))
+        arrays.append(_primitive(document, primitive, i, mode, materials, lenient))
+        warnings += _unreadable(document, primitive, arrays[-1], name)
         left = _corner_count(document, primitive, arrays[-1]) % 3
         if mode == _TRIANGLES and left:
             warnings.append(
@@ -79,7 +81,7 @@ def _primitive(
     primitive: JsonObject,
     number: int,
     mode: int,
-    default_material: int,
+    materials: MaterialReader,
     lenient: bool,
 ) -> PrimitiveArrays:
     accessors = document.root.children("accessors")
@@ -103,20 +105,33 @@ def _primitive(
             attributes.fail(f"the accessor has {len(value)} rows, POSITION has {len(position)}", key)
         return value
 
-    texcoord = {k: optional(f"TEXCOORD_{k}", ("VEC2",)) for k in range(MOST_TEXCOORDS)}
+    n_materials = len(document.root.children("materials"))
+    material = (
+        primitive.index("material", n_materials, "materials") if "material" in primitive else n_materials
+    )
+    read = materials.need(material)
+    textures = (read.base_colour_texture, read.emission_texture)
+    needed = {texture.texcoord for texture in textures if texture is not None}
+
+    def texcoord(k: int) -> NDArray[np.float32] | None:
+        try:
+            return optional(f"TEXCOORD_{k}", ("VEC2",))
+        except InputError:
+            if k in needed:
+                raise
+            return None
+
+    texcoords = {k: texcoord(k) for k in range(MOST_TEXCOORDS)}
     colour = optional("COLOR_0", ("VEC3", "VEC4"))
     if colour is not None:
         colour = _colour(document, attributes.integer("COLOR_0"), colour)
-    n_materials = len(document.root.children("materials"))
     return PrimitiveArrays(
         index=number,
-        material=primitive.index("material", n_materials, "materials")
-        if "material" in primitive
-        else default_material,
+        material=material,
         position=position,
         triangle=triangles_of(_corners(document, primitive, len(position), lenient), mode),
         normal=optional("NORMAL", ("VEC3",)),
-        texcoord={k: value for k, value in texcoord.items() if value is not None},
+        texcoord={k: value for k, value in texcoords.items() if value is not None},
         colour=colour,
         further=_further(document, attributes, len(position)) if lenient else None,
         stitched=mode == _STRIP,
@@ -131,9 +146,31 @@ def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) ->
     found = [
         gather_rows(root, document.buffers, attributes.integer(name), row)
         for name in sorted(set(attributes.value) - known)
-        if root["accessors"][attributes.integer(name)]["count"] >= n_vertices
+        if fault_of(root, document.buffers, attributes.value[name], n_vertices) is None
     ]
     return np.concatenate(found, axis=1) if found else None
+
+
+def _unreadable(
+    document: GltfDocument, primitive: JsonObject, arrays: PrimitiveArrays, mesh: str
+) -> list[SceneWarning]:
+    """Return a warning for each vertex attribute that cannot be read and that no bake needs."""
+    root, buffers, n_vertices = document.root.value, document.buffers, len(arrays.position)
+    read = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in arrays.texcoord)}
+    attributes = primitive.child("attributes").value
+    named = [(name, index) for name, index in attributes.items() if name not in read]
+    for k, target in enumerate(primitive.children("targets")):
+        named += [(f"{name} of morph target {k}", index) for name, index in target.value.items()]
+    found = []
+    for label, index in named:
+        fault = fault_of(root, buffers, index, n_vertices)
+        if fault is not None:
+            message = (
+                f"{label} of primitive {arrays.index} cannot be read ({fault.object}: {fault.message}); "
+                "a bake does not need it, and scene.glb goes without"
+            )
+            found.append(SceneWarning("broken-attribute", message, mesh))
+    return found
 
 
 def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list[JsonObject]) -> None:

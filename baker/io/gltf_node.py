@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
     Parameters
     ----------
     nodes : sequence of JsonObject
-        All nodes of the file.
+        All nodes of the file; those that no root leads to may be broken.
     roots : sequence of int
         The scene's own nodes.
 
@@ -42,49 +43,43 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
     InputError
         If nodes form a cycle, a node has two places, or a matrix is not a finite affine map.
     """
-    children = [node.indices("children", len(nodes), "nodes") for node in nodes]
-    _check_tree(nodes, children)
     placed: list[Placed] = []
-    seen: set[int] = set()
-    waiting = [(k, np.eye(4)) for k in reversed(roots)]
+    parent: dict[int, int | None] = {}
+    waiting: list[tuple[int, int | None, NDArray[np.float64]]] = [
+        (k, None, np.eye(4)) for k in reversed(roots)
+    ]
     while waiting:
-        index, parent = waiting.pop()
-        if index in seen:
-            nodes[index].fail("the node is used twice in the scene; a node may have one place only")
-        seen.add(index)
+        index, above, outer = waiting.pop()
+        if index in parent:
+            _refuse_second_place(nodes, parent, index, above)
+        parent[index] = above
         with np.errstate(over="ignore", invalid="ignore"):
-            matrix = parent @ local_matrix(nodes[index])
+            matrix = outer @ local_matrix(nodes[index])
         if not np.isfinite(matrix).all():
             nodes[index].fail("the node's place in the world is not finite")
         placed.append(Placed(index, nodes[index], matrix))
-        waiting += [(k, matrix) for k in reversed(children[index])]
+        children = nodes[index].indices("children", len(nodes), "nodes")
+        waiting += [(k, index, matrix) for k in reversed(children)]
     return placed
 
 
-def _check_tree(nodes: Sequence[JsonObject], children: Sequence[Sequence[int]]) -> None:
-    parent: dict[int, int] = {}
-    for index, below in enumerate(children):
-        for child in below:
-            if child in parent:
-                nodes[child].fail(
-                    f"the node is used twice: below node {parent[child]} and below node {index}"
-                )
-            parent[child] = index
-    # With one parent each, every walk upwards ends at a root or goes round; known good nodes end it early.
-    good: set[int] = set()
-    for index in range(len(nodes)):
-        path: dict[int, None] = {}
-        at: int | None = index
-        while at is not None and at not in good:
-            if at in path:
-                ring = [*path][[*path].index(at) :]
-                # The walk went upwards; people read downwards.
-                downwards = [str(k) for k in (ring[0], *reversed(ring[1:]), ring[0])]
-                shown = " -> ".join(downwards if len(ring) < 8 else [*downwards[:7], "..."])
-                nodes[at].fail(f"the nodes form a cycle ({shown}); a node may not be below itself")
-            path[at] = None
-            at = parent.get(at)
-        good.update(path)
+def _refuse_second_place(
+    nodes: Sequence[JsonObject], parent: dict[int, int | None], index: int, above: int | None
+) -> NoReturn:
+    """Say whether a node is met again because nodes form a cycle, or because two others hold it."""
+    ring: list[int] = []
+    at = above
+    while at is not None:
+        ring.append(at)
+        if at == index:
+            downwards = [str(k) for k in (*reversed(ring), index)]
+            shown = " -> ".join(downwards if len(downwards) < 9 else [*downwards[:7], "..."])
+            nodes[index].fail(f"the nodes form a cycle ({shown}); a node may not be below itself")
+        at = parent[at]
+    first = parent[index]
+    if first is None or above is None:
+        nodes[index].fail("the node is used twice in the scene; a node may have one place only")
+    nodes[index].fail(f"the node is used twice: below node {first} and below node {above}")
 
 
 def local_matrix(node: JsonObject) -> NDArray[np.float64]:

@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.raw import RawInstance, RawMesh, RawScene
-from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
+from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
 from baker.core.triangle_check import LARGEST_COORDINATE
 from baker.io.gltf_camera import read_cameras
 from baker.io.gltf_document import GltfDocument, open_document
 from baker.io.gltf_json import JsonObject
 from baker.io.gltf_light import read_light
-from baker.io.gltf_material import DEFAULT_MATERIAL, read_materials
+from baker.io.gltf_material import MaterialReader
 from baker.io.gltf_mesh import read_primitives
 from baker.io.gltf_node import Placed, place_nodes
+from baker.io.gltf_unread import unneeded_faults
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_build import build_mesh
 
@@ -51,9 +52,11 @@ def import_gltf(source: SceneFile) -> Scene:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
     number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
-    materials = read_materials(document, reflections=source.reflections)
-    meshes, instances, raw = _instances(document, placed, materials, warnings, lenient=source.lenient)
+    reader = MaterialReader(document, reflections=source.reflections)
+    meshes, instances, raw = _instances(document, placed, reader, warnings, lenient=source.lenient)
     lights = _lights(placed, document, warnings, lenient=source.lenient)
+    cameras = read_cameras(placed, document, warnings)
+    warnings += [*reader.warnings, *unneeded_faults(document, reader.told)]
     if not instances and not source.lenient:
         where = f"scenes[{number}]" if number is not None else None
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
@@ -66,13 +69,20 @@ def import_gltf(source: SceneFile) -> Scene:
         name=source.path.name.split(".")[0],
         path=source.path,
         meshes=tuple(meshes),
-        materials=tuple(materials),
+        materials=tuple(reader.materials),
         instances=tuple(instances),
         lights=tuple(lights),
         warnings=tuple(warnings),
-        source=SourceDocument(document.root.value, document.buffers, Path(document.folder)),
+        source=SourceDocument(
+            document.root.value,
+            document.buffers,
+            Path(document.folder),
+            missing=frozenset(document.buffer_faults),
+            missing_images=frozenset(document.image_faults),
+            chunks=document.chunks,
+        ),
         sha256=document.sha256,
-        cameras=tuple(read_cameras(placed, document)),
+        cameras=tuple(cameras),
         raw=raw,
     )
 
@@ -101,14 +111,13 @@ def _choose_scene(
 def _instances(
     document: GltfDocument,
     placed: list[Placed],
-    materials: list[Material],
+    reader: MaterialReader,
     warnings: list[SceneWarning],
     *,
     lenient: bool,
 ) -> tuple[list[Mesh], list[Instance], RawScene | None]:
-    """Return the meshes that are used, each once, and where they stand. May append the default material."""
+    """Return the meshes that are used, each once, and where they stand."""
     sources = document.root.children("meshes")
-    default = len(materials)
     built: dict[int, int | None] = {}
     meshes: list[Mesh] = []
     extents: list[NDArray[np.float64]] = []
@@ -121,10 +130,8 @@ def _instances(
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
         if number not in built:
-            arrays, found = read_primitives(document, sources[number], name, default, lenient=lenient)
-            if len(materials) == default and any(a.material == default for a in arrays):
-                materials.append(DEFAULT_MATERIAL)
-            mesh, defects = build_mesh(name, arrays, materials)
+            arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
+            mesh, defects = build_mesh(name, arrays, reader.materials)
             if lenient:
                 raw[number] = RawMesh(name, tuple(arrays))
             warnings += found + defects

@@ -5,13 +5,12 @@ Every index of the input stays valid: nodes, meshes, materials, accessors. What 
 
 from __future__ import annotations
 
-import base64
 import copy
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote, unquote_to_bytes
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +19,10 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, Scene, SourceDocument
 from baker.io.glb_materials import BakedUse, add_ao_textures, assign_materials, reads_texcoord_1
-from baker.io.glb_pack import Json, Packer, primitive_accessors
+from baker.io.glb_pack import Json, Packer, is_index, objects, primitive_accessors
 from baker.io.glb_rows import gather_rows
 from baker.io.gltf_new import new_document
+from baker.io.uri import UriError, is_data, read_uri
 
 _COMPRESSED_PRIMITIVE = "KHR_draco_mesh_compression"
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -121,7 +121,8 @@ def _rewrite(
             replaced.update(primitive_accessors(piece.source))
             for key in ("attributes", "targets", "indices"):
                 piece.primitive.pop(key, None)
-    packer = Packer(document, source.buffers, frozenset(replaced))
+    packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
+    packer.chunks = source.chunks
     uses = []
     for piece in pieces:
         moved = None if piece.kept else _rewrite_primitive(packer, source, piece, ao=ao)
@@ -142,7 +143,9 @@ def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -
     baked = {instance.node for instance in instances}
     if len(baked) < len(instances):
         raise InputError("a node stands for several instances; baking them apart is not possible")
-    taken = {node["mesh"] for i, node in enumerate(source["nodes"]) if "mesh" in node and i not in baked}
+    taken = {
+        node["mesh"] for i, node in objects(source, "nodes") if i not in baked and is_index(node.get("mesh"))
+    }
     result = []
     for instance in instances:
         mesh = source["nodes"][instance.node]["mesh"]
@@ -180,7 +183,14 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
     compressed = _COMPRESSED_PRIMITIVE in piece.source.get("extensions", {})
     written = {}
     for name, index in attributes.items():
-        written[name] = _rewrite_accessor(packer, source, index, piece.row, name == "POSITION", compressed)
+        try:
+            written[name] = _rewrite_accessor(
+                packer, source, index, piece.row, name == "POSITION", compressed
+            )
+        except InputError:
+            # The importer has told that this attribute cannot be read and is left out.
+            if name in ("POSITION", "NORMAL", "COLOR_0"):
+                raise
     written["TEXCOORD_1"] = packer.add_floats(piece.uv)
     # glTF wants the sets numbered without a gap, so a primitive without uv gets the lightmap's twice.
     written.setdefault("TEXCOORD_0", written["TEXCOORD_1"])
@@ -188,10 +198,7 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
     piece.primitive["indices"] = packer.add_indices(piece.triangle)
     if "targets" in piece.source:
         piece.primitive["targets"] = [
-            {
-                name: _rewrite_accessor(packer, source, index, piece.row, name == "POSITION", compressed)
-                for name, index in target.items()
-            }
+            {name: _rewrite_target(packer, source, index, piece.row, name) for name, index in target.items()}
             for target in piece.source["targets"]
         ]
     # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
@@ -214,37 +221,52 @@ def _rewrite_accessor(
     return packer.add_rows(gather_rows(source.json, source.buffers, index, row), accessor, bounds=bounds)
 
 
+def _rewrite_target(
+    packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], name: str
+) -> int:
+    """Write one attribute of a morph target; one that cannot be read moves nothing."""
+    bounds = name == "POSITION"
+    try:
+        return _rewrite_accessor(packer, source, index, row, bounds, False)
+    except InputError:
+        return packer.add_floats(np.zeros((len(row), 3), np.float32), bounds=bounds)
+
+
 def _decompress_views(document: Json, source: SourceDocument) -> None:
-    """Point views away from meshopt data, to the plain copy that the reader needed as well."""
-    for index, view in enumerate(document.get("bufferViews", [])):
+    """Point views away from meshopt data, to the plain copy if there is one; what is baked has one."""
+    for _, view in objects(document, "bufferViews"):
         for name in _COMPRESSED_VIEW:
             if name in view.get("extensions", {}):
-                end = view.get("byteOffset", 0) + view["byteLength"]
-                if end > len(source.buffers[view["buffer"]]):
-                    message = f"its data is only there in {name}; decompress the file first"
-                    raise InputError(message, object=f"buffer view {index}")
+                number = view.get("buffer")
+                if not is_index(number) or number in source.missing or number >= len(source.buffers):
+                    continue
+                if view.get("byteOffset", 0) + view["byteLength"] > len(source.buffers[number]):
+                    continue
                 del view["extensions"][name]
                 if not view["extensions"]:
                     del view["extensions"]
 
 
 def embed_images(packer: Packer, source: SourceDocument) -> None:
-    """Move image files and data URIs into the buffer, so that the GLB stands alone."""
-    for index, image in enumerate(packer.document.get("images", [])):
+    """Move image files and data URIs into the buffer, so that the GLB stands alone.
+
+    An image that could not be read keeps its URI: nothing that is baked needs it.
+
+    Raises
+    ------
+    InputError
+        If an image file has gone since the scene was read.
+    """
+    for number, image in objects(packer.document, "images"):
         uri = image.get("uri")
-        if uri is None:
+        if number in source.missing_images or not isinstance(uri, str):
             continue
-        if uri.startswith("data:"):
-            head, _, body = uri.partition(",")
-            data = base64.b64decode(body) if head.endswith(";base64") else unquote_to_bytes(body)
-        else:
-            path = (source.folder or Path()) / unquote(uri)
-            try:
-                data = path.read_bytes()
-            except OSError as error:
-                message = f"the image file '{uri}' cannot be read ({error.strerror})"
-                raise InputError(message, object=f"image {index}") from None
-            image.setdefault("name", Path(unquote(uri)).stem)
+        try:
+            data = read_uri(uri, source.folder or Path())
+        except UriError as error:
+            raise InputError(str(error), object=f"image {number}") from None
+        if not is_data(uri):
+            image.setdefault("name", Path(unquote(uri).replace("\\", "/")).stem)
         del image["uri"]
         image["mimeType"] = _mime_type(data) or image.get("mimeType", "image/png")
         image["bufferView"] = packer.add_bytes(data)

@@ -10,16 +10,21 @@ from baker.lint.subject import Subject
 
 # Importer's code: severity, what to do. Codes of the same name as a check are left to that check.
 NOTES = {
+    "broken-attribute": ("warning", "export the attribute again if the level needs it"),
+    "broken-camera": ("info", "export the camera again if the level needs it"),
     "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
     "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
+    "missing-file": ("info", "put the file beside the scene if the level needs it"),
     "missing-mtl": ("warning", "put the material library beside the scene"),
     "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
+    "missing-texture": ("warning", "put the image beside the scene, or take the texture off the material"),
     "morphed": ("info", "bake the shape that is shown most, or leave the object out"),
     "no-material": ("info", "name a material for these faces"),
     "not-triangles": ("info", "nothing to do, if points and lines are not to be baked"),
     "odd-indices": ("warning", "export the mesh again: its index buffer is cut off"),
     "several-scenes": ("info", "export the scene wanted by itself"),
     "skinned": ("info", "nothing to do, if the bind pose is what is to be baked"),
+    "unknown-material": ("warning", "export the material with a base colour"),
     "up-and-scale-ignored": ("info", "leave --up and --scale away for glTF"),
 }
 
@@ -30,7 +35,8 @@ def file_note(subject: Subject) -> Iterator[Found]:
 
     The importer's own code is in `note`: unknown extensions, skins and morph targets (the base shape is
     baked), primitives of points and lines, several scenes in one file, missing texture
-    coordinates or material libraries.
+    coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
+    needed: normal maps, unused files, tangents, cameras.
     """
     for warning in subject.scene.warnings:
         if warning.code in NOTES:

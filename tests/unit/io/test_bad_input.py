@@ -99,6 +99,9 @@ def test_compressed_data_without_a_plain_copy_is_refused(tmp_path):
     builder = quad_builder()
     fallback = {"byteLength": 400, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}
     builder.json["buffers"] = [{"byteLength": len(builder.blob)}, fallback]
+    assert load_scene(write(tmp_path / "a.glb", builder)).n_triangles == 2
+    for view in builder.json["bufferViews"]:
+        view["buffer"] = 1
     refuse(write(tmp_path / "a.glb", builder), "EXT_meshopt_compression", "buffers[1]")
 
 
@@ -114,13 +117,13 @@ def test_missing_and_short_outside_files(tmp_path):
     refuse(write(tmp_path / "a.gltf", builder), "buffers[0].uri", "base64")
     builder.json["buffers"][0]["uri"] = "data:nothing"
     refuse(write(tmp_path / "a.gltf", builder), "no comma")
-    builder = quad_builder()
-    builder.json["images"] = [{"uri": "wood.png"}]
+    builder = quad_builder(pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
+    builder.json |= {"images": [{"uri": "wood.png"}], "textures": [{"source": 0}]}
     refuse(write(tmp_path / "a.glb", builder), "images[0].uri", "wood.png", "missing")
 
 
 def test_images_that_are_none(tmp_path):
-    builder = quad_builder(emissiveTexture={"index": 0})
+    builder = quad_builder(emissiveTexture={"index": 0}, emissiveFactor=[1, 1, 1])
     builder.image(b"\x89PNG\r\n\x1a\n and then nothing")
     refuse(write(tmp_path / "a.glb", builder), "images[0]", "cannot be decoded")
 
@@ -158,7 +161,7 @@ def _set(path, value):
         ),
         (_set(["meshes", 0, "primitives", 0, "mode"], 7), ["primitives[0].mode", "7"]),
         (_set(["meshes", 0, "primitives", 0, "attributes"], {}), ["primitives[0]", "no POSITION"]),
-        (_set(["meshes", 0, "primitives", 0, "material"], 4), ["primitives[0].material", "0 materials"]),
+        (_set(["meshes", 0, "primitives", 0, "material"], 4), ["primitives[0].material", "1 materials"]),
         (_set(["meshes", 0, "primitives"], {}), ["meshes[0].primitives", "expected a list"]),
         (_set(["meshes", 0], 5), ["meshes[0]", "expected an object"]),
         (_set(["nodes", 0, "mesh"], 1), ["nodes[0].mesh", "1 meshes"]),
@@ -178,14 +181,17 @@ def _set(path, value):
         (_set(["nodes", 0], {}), ["scenes[0]", "nothing to bake"]),
         (_set(["materials"], [{"emissiveFactor": [1, 2]}]), ["materials[0].emissiveFactor", "3 numbers"]),
         (_set(["materials"], [{"alphaMode": "GLASS"}]), ["materials[0].alphaMode", "GLASS"]),
-        (_set(["materials"], [{"emissiveTexture": {"index": 0}}]), ["emissiveTexture.index", "0 textures"]),
+        (
+            _set(["materials"], [{"emissiveTexture": {"index": 0}, "emissiveFactor": [1, 1, 1]}]),
+            ["emissiveTexture.index", "0 textures"],
+        ),
         (_set(["materials"], [{"doubleSided": 1}]), ["materials[0].doubleSided", "true or false"]),
         (_set(["materials"], [{"emissiveFactor": [-1, 0, 0]}]), ["materials[0]", "negative"]),
         (_set(["extensionsRequired"], "x"), ["extensionsRequired", "list of strings"]),
     ],
 )
 def test_wrong_members_are_named_with_their_place(tmp_path, change, words):
-    document = copy.deepcopy(quad_builder().document())
+    document = copy.deepcopy(quad_builder(name="plain").document())
     change(document)
     refuse(write(tmp_path / "a.glb", pack_glb(document, quad_builder().blob)), *words)
 

@@ -12,6 +12,7 @@ from gltf_builder import quad_builder, write
 from PIL import Image
 
 from baker.core.colour import linear_from_srgb
+from baker.core.errors import InputError
 from baker.io.gltf_material import texture_transform
 from baker.io.images import decode_image
 from baker.io.load import load_scene
@@ -69,6 +70,77 @@ def test_unlit_reflects_its_base_colour_and_emits_nothing(tmp_path):
     )
     assert material.base_colour[:3] == (0.5, 0.25, 0)
     assert material.emission == (0, 0, 0)
+
+
+GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+
+
+def test_specular_glossiness_gives_the_base_colour_in_place_of_metallic_roughness(tmp_path):
+    moved = {"KHR_texture_transform": {"offset": [0.25, 0], "texCoord": 1}}
+    glossy = {
+        "diffuseFactor": [0.5, 0.25, 0.125, 0.75],
+        "diffuseTexture": {"index": 0, "extensions": moved},
+        "specularFactor": [0, 0, 0],
+        "glossinessFactor": 0.25,
+    }
+    plain = {"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1], "baseColorTexture": {"index": 99}}}
+    for more in ({}, plain):
+        builder = quad_builder(
+            name="g",
+            **more,
+            extensions={GLOSSY: glossy, "KHR_materials_emissive_strength": {"emissiveStrength": 4}},
+            emissiveFactor=[1, 0.5, 0],
+            alphaMode="BLEND",
+            doubleSided=True,
+        )
+        builder.image(encode(PIXELS))
+        builder.json["extensionsUsed"] = builder.json["extensionsRequired"] = [GLOSSY]
+        scene = load_scene(write(tmp_path / "a.glb", builder))
+        material = scene.materials[0]
+        assert material.base_colour == (0.5, 0.25, 0.125, 0.75)
+        np.testing.assert_array_equal(material.base_colour_texture.image, PIXELS)
+        assert material.base_colour_texture.texcoord == 1
+        assert material.base_colour_texture.transform[0, 2] == 0.25
+        assert material.emission == (4, 2, 0)
+        assert (material.metallic, material.roughness) == (0, 0.75)
+        assert (material.alpha_mode, material.double_sided) == ("BLEND", True)
+        assert "extension-ignored" not in {w.code for w in scene.warnings}
+
+
+def test_specular_glossiness_without_a_colour_is_white_and_a_missing_texture_of_it_is_refused(tmp_path):
+    assert material_of(tmp_path, quad_builder(extensions={GLOSSY: {}})).base_colour == (1, 1, 1, 1)
+    builder = quad_builder(extensions={GLOSSY: {"diffuseTexture": {"index": 0}}})
+    builder.json |= {"images": [{"uri": "gone.png"}], "textures": [{"source": 0}]}
+    with pytest.raises(InputError, match=r"gone\.png.*missing"):
+        material_of(tmp_path, builder)
+
+
+@pytest.mark.parametrize(
+    "name", ["KHR_techniques_webgl", "VRMC_materials_mtoon", "ACME_materials_paint", "KHR_materials_common"]
+)
+def test_an_unknown_model_without_a_base_colour_reflects_half(tmp_path, name):
+    def load(**material):
+        builder = quad_builder(name="odd", extensions={name: {"colour": [1, 0, 0]}}, **material)
+        builder.json["extensionsUsed"] = [name]
+        scene = load_scene(write(tmp_path / "a.glb", builder))
+        return scene.materials[0], [w for w in scene.warnings if w.code == "unknown-material"]
+
+    for more in ({}, {"pbrMetallicRoughness": {"metallicFactor": 0}}):
+        material, found = load(**more)
+        assert material.base_colour == (0.5, 0.5, 0.5, 1)
+        assert len(found) == 1
+        assert found[0].object == "odd"
+        assert name in found[0].message
+    # A base colour beside it is the fallback that its author meant.
+    material, found = load(pbrMetallicRoughness={"baseColorFactor": [0.1, 0.2, 0.3, 1]})
+    assert (material.base_colour, found) == ((0.1, 0.2, 0.3, 1), [])
+
+
+@pytest.mark.parametrize("name", ["KHR_materials_clearcoat", "KHR_materials_volume", "KHR_materials_unlit"])
+def test_layers_leave_the_default_white(tmp_path, name):
+    scene = load_scene(write(tmp_path / "a.glb", quad_builder(extensions={name: {}})))
+    assert scene.materials[0].base_colour == (1, 1, 1, 1)
+    assert [w for w in scene.warnings if w.code == "unknown-material"] == []
 
 
 @pytest.mark.parametrize("how", ["view", "data", "file"])

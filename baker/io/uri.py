@@ -1,0 +1,76 @@
+"""Reads what a URI of a glTF file stands for: data in the URI itself, or a file beside the scene.
+
+Based on: RFC 2397 (data URIs), RFC 3986 (percent-encoding); glTF 2.0 Specification, section 2.8.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from pathlib import Path
+from urllib.parse import unquote, unquote_to_bytes
+
+_LONGEST = 80
+_URL_SAFE = bytes.maketrans(b"-_", b"+/")
+
+
+class UriError(Exception):
+    """The sentence that says why a URI gives no data."""
+
+
+def is_data(uri: str) -> bool:
+    """Tell whether the URI holds its data itself."""
+    return uri[:5].lower() == "data:"
+
+
+def read_uri(uri: str, folder: Path) -> bytes:
+    """Return the bytes behind a URI.
+
+    Parameters
+    ----------
+    uri : str
+        A data URI of any media type, or the relative name of a file. Names with percent signs or Windows
+        backslashes are understood although neither follows the rules.
+    folder : Path
+        Where relative names begin.
+
+    Raises
+    ------
+    UriError
+        If there is no such file, it cannot be read, or the data URI is malformed.
+    """
+    if is_data(uri):
+        return _decode_data(uri)
+    scheme, colon, _ = uri.partition("://")
+    if colon and scheme.isalnum():
+        raise UriError(f"'{uri[:_LONGEST]}' is not a file beside the scene; store it there")
+    for name in file_names(uri):
+        try:
+            return (folder / name).read_bytes()
+        except FileNotFoundError:
+            continue
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise UriError(f"the file '{uri[:_LONGEST]}' cannot be read: {why}") from None
+    raise UriError(f"the file '{uri[:_LONGEST]}' is missing; put it beside the scene")
+
+
+def file_names(uri: str) -> list[str]:
+    """Return the names that the URI of a file may mean, the likeliest first."""
+    # A name may hold a bare % sign, against the rules: the literal name counts if such a file exists.
+    names = [unquote(uri), uri]
+    return list(dict.fromkeys([*names, *(name.replace("\\", "/") for name in names)]))
+
+
+def _decode_data(uri: str) -> bytes:
+    head, comma, body = uri.partition(",")
+    if not comma:
+        raise UriError("the data URI has no comma before its data")
+    if not head.lower().rstrip().endswith(";base64"):
+        return unquote_to_bytes(body)
+    try:
+        data = (unquote(body) if "%" in body else body).encode("ascii").translate(_URL_SAFE, b" \t\r\n\f")
+        # Padding may be left out, as in browsers.
+        return base64.b64decode(data.rstrip(b"=") + b"=" * (-len(data.rstrip(b"=")) % 4), validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise UriError(f"the data URI is not valid base64 ({error})") from None
