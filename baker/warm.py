@@ -42,9 +42,8 @@ def suit(process: subprocess.Popen[bytes] | None, scene: Scene) -> subprocess.Po
     if process is None or not passing:
         return process
     stop(process)
-    blend = [material for material in passing if material.alpha_mode == "BLEND"]
-    tinted = any(m.base_colour_texture or m.base_colour[:3] != (1.0, 1.0, 1.0) for m in blend)
-    return _run("coloured" if tinted else "holes")
+    blend = any(material.alpha_mode == "BLEND" for material in passing)
+    return _run("glass" if blend else "holes")
 
 
 def _passes(material: Material) -> bool:
@@ -112,7 +111,7 @@ def cast_rays(kind: str = "") -> None:
     Parameters
     ----------
     kind : str
-        "holes" for a lamp that light passes, "coloured" for one that colours it, too.
+        "holes" for a lamp with a MASK material, "glass" for one with a BLEND material.
     """
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
@@ -130,10 +129,10 @@ def cast_rays(kind: str = "") -> None:
     face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
     up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     mesh = Mesh("lamp", corner, up, face, zero, zero, np.zeros(3, np.int32), np.arange(3, dtype=np.int32))
-    glass = (0.5, 1.0, 1.0, 0.5) if kind == "coloured" else (1.0, 1.0, 1.0, 0.5)
     material = Material(emission=(1.0, 1.0, 1.0))
     if kind:
-        material = replace(material, base_colour=glass, alpha_mode="BLEND")
+        mode = "BLEND" if kind == "glass" else "MASK"
+        material = replace(material, base_colour=(0.5, 1.0, 1.0, 0.4), alpha_mode=mode)
     scene = Scene("lamp", None, (mesh,), (material,), (Instance(0, "lamp", 0, np.eye(4)),))
     layout = InstanceLayout(0, 0, np.arange(3, dtype=np.int32), corner[:, :2], face, zero, False, 1.0)
     geometry = world_geometry(scene, Atlas(16, 1, (layout,), 1, 2))

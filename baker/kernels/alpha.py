@@ -14,8 +14,8 @@ from baker.kernels.textures import sample_alpha
 from baker.trace.jit import inner, larger, smaller
 
 # Columns of a row: image uv of corner 0, its two edges (2 each), factor times vertex alpha at corner 0 and
-# what corners 1 and 2 add to it, cutoff (-1: BLEND), texture (-1: none).
-UV, ALPHA, CUTOFF, TEXTURE = 0, 6, 9, 10
+# what corners 1 and 2 add to it, cutoff (-1: BLEND), texture (-1: none), connected surface (a whole number).
+UV, ALPHA, CUTOFF, TEXTURE, SURFACE = 0, 6, 9, 10, 11
 ROW_LENGTH = 16
 
 

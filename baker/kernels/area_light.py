@@ -28,9 +28,9 @@ from baker.kernels.polygon_light import clear_light
 from baker.kernels.rays import lane_seeds, new_seeds
 from baker.kernels.sampling import texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
-from baker.kernels.tint import count_coloured, follow, light_kept
+from baker.kernels.tint import count_coloured, light_kept, trace_shadow_lanes
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR, trace_lanes
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR
 
 _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
@@ -158,7 +158,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     n_samples = len(net)
     scene, occluded, width = caster.scene, caster.occluded, caster.width
     query = caster.query
-    on, rays = caster.lane_valid, caster.lane_floats
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, triangle, starts = lamps.row, lamps.triangle, lamps.first
     chance, cumulative = lamps.chance, lamps.cumulative
@@ -229,16 +229,17 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     if asked == 0:
                         continue
                     if not clear:
-                        trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
+                        trace_shadow_lanes(
+                            caster.tint, occluded, scene, width, query, on, rays, words, spare_on, spare
+                        )
                         cast += asked
                         looked += asked
                         for lane in range(LANES):
                             hidden = on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                        follow(caster.tint, occluded, width, on, rays, None, spare_on, spare)
-                        # Where a pane is in the way, each ray has to be asked for its colour; where none
-                        # is, all colours are 1 and stay so for the rays that are not cast.
+                        # Where a pane is in the way, each ray has its own transmittance; where none is,
+                        # all are 1 and stay so for the rays that are not cast.
                         blocked += count_coloured(caster.tint)
                     if shading is not None:
                         for lane in range(lanes):

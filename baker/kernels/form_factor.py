@@ -84,7 +84,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
 
 @inner
 def _note_colour(tint, colour, group, lanes, r):  # type: ignore[no-untyped-def]
-    if tint is None:
+    if tint is None or len(colour) == 0:
         return
     for lane in range(lanes):
         for c in range(3):

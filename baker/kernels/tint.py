@@ -1,11 +1,12 @@
-"""The colour that light takes on where it passes BLEND surfaces.
+"""What BLEND surfaces let through along rays.
 
     T = (1 - a) lerp(1, c, a)
 
-is what a surface of alpha a and colour c lets through. Whether a ray passes is decided at the hit, with
-probability 1 - a (`alpha_filter`); one that passed is multiplied by lerp(1, c, a) here. Embree asks about
-hits in no particular order, also about some behind the end of a ray: so the surfaces that colour light are a
-tree of their own, through which a second ray follows the first one as far as that got.
+is what a surface of alpha a and colour c lets through. Shadow rays are multiplied by T at each surface on
+their way (`alpha_filter`). For rays to the first hit, whether a ray passes is decided at the hit, with
+probability 1 - a; one that passed is multiplied by lerp(1, c, a) here. Embree asks about hits in no
+particular order, also about some behind the end of a ray: so the surfaces that colour light are a tree of
+their own, through which a second ray follows the first one as far as that got.
 
 c = factor * texture(base uv) * vertex colour, each of its parts between 0 and 1.
 """
@@ -28,25 +29,78 @@ from baker.trace.packets import (
     NO_HIT,
     PRIM_ID,
     TFAR,
+    call_embree,
     call_embree_with,
     copy_four,
+    trace_lanes,
 )  # fmt: skip
 
 _f = np.float32
 # Columns of a row: as of `alpha`, then factor times vertex colour at corner 0 and what corners 1 and 2 add
 # to it (3 each).
-COLOUR = 11
-ROW_LENGTH = 20
+COLOUR = 12
+ROW_LENGTH = 21
 
 
 class TintTable(NamedTuple):
     """The K triangles that colour light.
 
-    slot (T,) int32, row of each triangle of the scene or -1; row (K, 20) float32, see the column names.
+    slot (T,) int32, row of each triangle of the scene or -1; row (K, 21) float32, see the column names.
     """
 
     slot: NDArray[np.int32]
     row: NDArray[np.float32]
+
+
+def no_tint() -> TintTable:
+    """Return the table of a scene in which nothing colours light."""
+    return TintTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
+
+
+@inner
+def trace_shadow_lanes(tint, function, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Trace sixteen shadow rays; `light_kept` then tells the transmittance of those that are not blocked.
+
+    tint, scene, width, query, spare_on, spare : of a caster; function : its `occluded`
+    on, rays, words : (16,) int32 and (21 * 16,) float32 and uint32, see `trace_lanes`
+    """
+    if tint is None:
+        trace_lanes(function, scene, width, query, on, rays, spare_on, spare)
+        return
+    clear_colours(tint)
+    for lane in range(LANES):
+        words[ID * LANES + lane] = np.uint32(lane + 1)
+    trace_lanes(function, scene, width, tint.arguments, on, rays, spare_on, spare)
+    for lane in range(LANES):
+        words[ID * LANES + lane] = np.uint32(0)
+
+
+@inner
+def trace_shadow_packet(tint, function, scene, width, on, packet):  # type: ignore[no-untyped-def]
+    """Do the same for one packet, where it lies.
+
+    width : at most 16; packet : (12 * width or more,) float32
+    """
+    if tint is None:
+        call_embree(function, on, scene, packet)
+        return
+    clear_colours(tint)
+    words = packet.view(np.uint32)
+    for lane in range(width):
+        words[ID * width + lane] = np.uint32(lane + 1)
+    call_embree_with(function, on, scene, packet, tint.arguments)
+    for lane in range(width):
+        words[ID * width + lane] = np.uint32(0)
+
+
+@inner
+def clear_colours(tint):  # type: ignore[no-untyped-def]
+    """Set what sixteen rays are multiplied by to 1, and forget the edges that they met."""
+    colour, edges = tint.colour, tint.edges
+    for j in range(3 * LANES):
+        colour[j] = _f(1.0)
+    for lane in range(LANES):
+        edges[lane] = np.uint32(0)
 
 
 @inner
@@ -67,7 +121,7 @@ def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
 
 @inner
 def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Find what the light of sixteen rays is multiplied by, see `light_kept`; for tint None: nothing to do.
+    """Find the colours that sixteen rays passed, see `light_kept`; for tint None: nothing to do.
 
     tint, width : of a caster; function : its `occluded`
     on, rays : (16,) int32 and (21 * 16,) float32, the lanes as they were traced
@@ -76,14 +130,15 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
     """
     if tint is None:
         return
-    stop, colour = tint.stop, tint.colour
+    clear_colours(tint)
+    if tint.scene == 0:
+        return
+    stop = tint.stop
     for lane in range(LANES):
         stop[lane] = NO_HIT
         if hits is not None and hits[GEOM_ID * LANES + lane] != NO_HIT:
             # Where the ray ends no light passed.
             stop[lane] = hits[PRIM_ID * LANES + lane]
-    for j in range(3 * LANES):
-        colour[j] = _f(1.0)
     for first in range(0, LANES, width):
         some = False
         for lane in range(width):
@@ -107,13 +162,14 @@ def follow_packet(tint, function, width, on, packet, hits):  # type: ignore[no-u
     """
     if tint is None:
         return
-    stop, colour, words = tint.stop, tint.colour, packet.view(np.uint32)
+    clear_colours(tint)
+    if tint.scene == 0:
+        return
+    stop, words = tint.stop, packet.view(np.uint32)
     for lane in range(width):
         stop[lane] = NO_HIT
         if hits and words[GEOM_ID * width + lane] != NO_HIT:
             stop[lane] = words[PRIM_ID * width + lane]
-        for c in range(3):
-            colour[c * LANES + lane] = _f(1.0)
     _ask(tint, function, width, on, packet, 0)
 
 
@@ -122,7 +178,7 @@ def _ask(tint, function, width, on, packet, first):  # type: ignore[no-untyped-d
     """Have the filter function multiply the colours of rays `first` and on: no hit counts, each is asked."""
     words = packet.view(np.uint32)
     for lane in range(width):
-        words[ID * width + lane] = np.uint32(first + lane)
+        words[ID * width + lane] = np.uint32(first + lane + 1)
     call_embree_with(function, on, tint.scene, packet, tint.arguments)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(0)
@@ -130,7 +186,7 @@ def _ask(tint, function, width, on, packet, first):  # type: ignore[no-untyped-d
 
 @inner
 def light_kept(tint, c, lane):  # type: ignore[no-untyped-def]
-    """Return the share of channel c that the light along a lane's ray kept, after `follow`."""
+    """Return the share of channel c that the light along a lane's ray kept, after it was traced."""
     if tint is None:
         return _f(1.0)
     return tint.colour[c * LANES + lane]
@@ -138,7 +194,7 @@ def light_kept(tint, c, lane):  # type: ignore[no-untyped-def]
 
 @inner
 def count_coloured(tint):  # type: ignore[no-untyped-def]
-    """Count the colours that lost some of their light, after `follow`; no ray lost any if that is 0."""
+    """Count the colours that lost some of their light; no ray met anything BLEND if that is 0."""
     if tint is None:
         return 0
     colour = tint.colour

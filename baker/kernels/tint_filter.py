@@ -1,6 +1,6 @@
 """The function that Embree tells hits of coloured surfaces: it multiplies colours, and lets no hit count.
 
-It finds the ray's number (0 to 15) in the ray, and what to write behind the query's context (`packets.Tint`).
+It finds the ray's number (1 to 16) in the ray, and what to write behind the query's context (`packets.Tint`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
 """
@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
+from baker.kernels.alpha import SURFACE
+from baker.kernels.edge_hits import crossed_before, on_edge
 from baker.kernels.textures import MAX_LEVELS, TexturePack
 from baker.kernels.tint import ROW_LENGTH, TintTable, tint_at
 from baker.trace.embree import SeeThrough
@@ -22,6 +24,7 @@ from baker.trace.packets import (
     LANES,
     NG_X,
     PRIM_ID,
+    TFAR,
     TINT_COLOUR,
     TINT_STOP,
 )  # fmt: skip
@@ -48,7 +51,8 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
     data = carray(pointer(given[1]), (12,), np.int64)
     context = carray(pointer(given[2]), (CONTEXT_WORDS,), np.float32)
     context_words = carray(pointer(given[2]), (CONTEXT_WORDS,), np.uint32)
-    ray = carray(pointer(given[3]), (12 * n,), np.uint32)
+    ray = carray(pointer(given[3]), (12 * n,), np.float32)
+    ray_words = carray(pointer(given[3]), (12 * n,), np.uint32)
     hit = carray(pointer(given[4]), (6 * n,), np.float32)
     hit_words = carray(pointer(given[4]), (6 * n,), np.uint32)
     slot = carray(pointer(data[0]), (data[1],), np.int32)
@@ -65,10 +69,15 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
             continue
         valid[lane] = 0
         prim = hit_words[_PRIM * n + lane]
-        number = np.int64(ray[ID * n + lane])
+        number = np.int64(ray_words[ID * n + lane]) - 1
         if prim == context_words[TINT_STOP + number]:
             continue
+        k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
-        tint_at(row, np.int64(slot[prim]), pack, b1, b2, rgba, rgb)
+        if on_edge(b1, b2) and crossed_before(
+            context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
+        ):
+            continue
+        tint_at(row, k, pack, b1, b2, rgba, rgb)
         for c in range(3):
             context[TINT_COLOUR + c * LANES + number] *= np.float32(rgb[c])

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from baker.kernels.tint import follow_packet, light_kept
+from baker.kernels.tint import follow_packet, light_kept, trace_shadow_packet
 from baker.reference.bidirectional_lamps import (
     aim_both_ways,
     fade,
@@ -66,7 +66,7 @@ from baker.reference.vertex import (
 )
 from baker.reference.view import EMITTER, TEXTURED
 from baker.trace.jit import inner, kernel, scratch
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, ID, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
+from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
 # Working memory of a tile; kept vertices stand in column (vertex * MAX_WIDTH + lane).
@@ -297,7 +297,6 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                     path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
                     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
                 )  # fmt: skip
-                words[ID * width + lane] = np.uint32(0)
                 valid[lane] = -1
                 any_ray = True
                 rays += 1
@@ -391,17 +390,13 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                         path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
                         way[0], way[1], way[2], np.float32(way[3]),
                     )  # fmt: skip
-                    # Random bits, see `shadow_rays.cast_to_lamps`; directions to other vertices are random.
-                    bits = np.uint32(state[lane] >> np.uint64(32))
-                    words[ID * width + lane] = bits if step == 0 else np.uint32(0)
                     valid[lane] = -1
                     any_shadow = True
                     shadows += 1
                     for c in range(3):
                         values[c, lane] = value[c]
             if any_shadow:
-                trace(occluded, scene, valid, floats)
-                follow_packet(caster.tint, occluded, width, valid, floats, False)
+                trace_shadow_packet(caster.tint, occluded, scene, width, valid, floats)
                 for lane in range(width):
                     if valid[lane] == 0 or floats[TFAR * width + lane] < np.float32(0.0):
                         continue

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from baker.kernels.tint import follow_packet, light_kept
+from baker.kernels.tint import light_kept, trace_shadow_packet
 from baker.reference.lanes import (
     ALIVE,
     BIN_POINT,
     BIN_ROWS,
     BIN_VALUE,
     BINS,
-    CHOICE,
     LANES,
     POINT,
     REACH,
@@ -20,14 +19,14 @@ from baker.reference.lanes import (
     unsigned,
 )
 from baker.trace.jit import inner
-from baker.trace.packets import DIR_X, ID, ORG_X, TFAR, call_embree
+from baker.trace.packets import DIR_X, ORG_X, TFAR
 
 _f = np.float32
 
 
 @inner
 def cast_packet(bins, filled, k, occluded, scene, tint, on, out):  # type: ignore[no-untyped-def]
-    """Trace packet k, add the light of rays that nothing is in the way of to their points, and empty it.
+    """Trace packet k, add the light of rays that nothing blocks to their points, and empty it.
 
     tint : of the path memory; out : (m, 3) float64
     """
@@ -35,8 +34,7 @@ def cast_packet(bins, filled, k, occluded, scene, tint, on, out):  # type: ignor
     for lane in range(LANES):
         on[lane] = -1 if lane < n else 0
     packet = bins[start : start + BIN_ROWS * LANES]
-    call_embree(occluded, on, scene, packet)
-    follow_packet(tint, occluded, LANES, on, packet, False)
+    trace_shadow_packet(tint, occluded, scene, LANES, on, packet)
     for lane in range(n):
         if bins[start + TFAR * LANES + lane] >= _f(0.0):
             point = unsigned(bins[start + BIN_POINT * LANES + lane])
@@ -74,8 +72,6 @@ def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, o
             bins[place + (BIN_VALUE + a) * LANES] = s[here + (VALUE + a) * LANES]
         bins[place + TFAR * LANES] = s[here + REACH * LANES]
         bins[place + BIN_POINT * LANES] = s[here + POINT * LANES]
-        # Random bits: else all rays from a point to a light without area would be let through, or none.
-        bins[place + ID * LANES] = s[here + CHOICE * LANES]
         filled[k] += 1
         if filled[k] == LANES:
             cast_packet(bins, filled, k, occluded, scene, tint, on, out)

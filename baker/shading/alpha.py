@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
+from baker.core.rows import compact, first_equal
 from baker.core.scene import Scene
-from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, TEXTURE, UV, AlphaTable, no_alpha
+from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, SURFACE, TEXTURE, UV, AlphaTable, no_alpha
 from baker.kernels.textures import TexturePack
+from baker.kernels.tint import TintTable
 from baker.trace.embree import SeeThrough
 
 
@@ -58,23 +60,27 @@ def build_alpha(
     row[:, ALPHA + 1 : ALPHA + 3] = alpha[:, 1:] - alpha[:, :1]
     row[:, CUTOFF] = np.where(mode[material] == "MASK", blocks[material], np.float32(-1.0))
     row[:, TEXTURE] = base_texture[material]
+    blend = np.flatnonzero(row[:, CUTOFF] < 0)
+    row[blend, SURFACE] = _connected_surface(geometry, triangle[blend])
     return AlphaTable(slot, row)
 
 
-def see_through(shading: Any) -> SeeThrough | None:
+def see_through(shading: Any, tint: TintTable | None = None) -> SeeThrough | None:
     """Return what the ray tree has to know of triangles that let light through, None without any.
 
     Parameters
     ----------
     shading : Shading
         Materials as kernels see them.
+    tint : TintTable, optional
+        Those that colour it; None if none do.
     """
     if not len(shading.alpha.row):
         return None
     # Loading the compiled function takes time that other scenes need not spend.
     from baker.kernels.alpha_filter import filter_of
 
-    return filter_of(shading.alpha, shading.pack)
+    return filter_of(shading.alpha, tint, shading.pack)
 
 
 def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -88,6 +94,35 @@ def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64])
         if colour is not None:
             alpha[own] = colour[geometry.vertex_source[geometry.triangle[triangle[own]]], 3]
     return alpha
+
+
+def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return (n,) int64, below 2^24: equal numbers for triangles of an instance that hang together.
+
+    Corners at the same place are one vertex. Of triangles with the same three vertices each is a surface of
+    its own: they are layers, not neighbours.
+    """
+    if not len(triangle):
+        return np.zeros(0, np.int64)
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    corner = geometry.triangle[triangle].reshape(-1)
+    # Negative zeros are zeros.
+    place = geometry.position[corner] + np.float32(0.0)
+    instance = np.repeat(geometry.instance[triangle], 3)[:, None]
+    kept, vertex = compact(first_equal([place, instance], len(corner)))
+    vertex = np.sort(vertex.reshape(-1, 3), axis=1)
+    link = np.concatenate([vertex[:, :2], vertex[:, 1:]])
+    graph = coo_array((np.ones(len(link), bool), (link[:, 0], link[:, 1])), shape=(len(kept), len(kept)))
+    part = connected_components(graph, directed=False)[1][vertex[:, 0]].astype(np.int64)
+    same = first_equal([vertex], len(vertex))
+    order = np.argsort(same, kind="stable")
+    begins = np.flatnonzero(np.diff(same[order], prepend=-1))
+    layer = np.zeros(len(same), np.int64)
+    layer[order] = np.arange(len(same)) - np.repeat(begins, np.diff(begins, append=len(same)))
+    # float32 holds whole numbers up to 2^24.
+    return compact(first_equal([part[:, None], layer[:, None]], len(part)))[1] % (1 << 24)
 
 
 def _least(pack: TexturePack, k: int) -> float:

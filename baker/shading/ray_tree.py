@@ -6,7 +6,7 @@ from typing import Any
 
 from baker.core.geometry import Geometry
 from baker.shading.alpha import see_through
-from baker.shading.tint import tint
+from baker.shading.tint import build_tint, tint
 from baker.trace.embree import RayScene
 
 
@@ -21,7 +21,8 @@ def build_ray_tree(geometry: Geometry, shading: Any, *, threads: int) -> RayScen
     threads : int
         Threads of the build; 0 means all.
     """
-    passing, colouring = see_through(shading), tint(shading)
+    table = build_tint(shading)
+    passing, colouring = see_through(shading, table), tint(shading, table)
     return RayScene(
         geometry.position, geometry.triangle, threads=threads, see_through=passing, tint=colouring
     )

@@ -48,15 +48,16 @@ def build_tint(shading: Any) -> TintTable | None:
     return TintTable(slot, row)
 
 
-def tint(shading: Any) -> SeeThrough | None:
+def tint(shading: Any, table: TintTable | None) -> SeeThrough | None:
     """Return what the ray tree has to know of triangles that colour light, None without any.
 
     Parameters
     ----------
     shading : Shading
         Materials as kernels see them.
+    table : TintTable or None
+        `build_tint` of the same.
     """
-    table = build_tint(shading)
     if table is None:
         return None
     # Loading the compiled function takes time that other scenes need not spend.

@@ -109,7 +109,7 @@ class Tracer(NamedTuple):
     width : int
         N, the widest packet this CPU traces natively.
     tint : int or None
-        RTCScene of the triangles that colour what they let through, None if there are none.
+        None without BLEND triangles; else RTCScene of those that colour what they let through, 0 if none do.
     few : bool
         Whether the scene has so few triangles (`FEW`) that rays of neighbouring texels meet the same ones.
     """
@@ -138,12 +138,15 @@ class SeeThrough(NamedTuple):
         Address that the function finds as `geometryUserPtr`.
     owner : object
         Keeps function and data alive.
+    blend : bool
+        Whether some let a share of the light through: shadow rays then need `packets.Tint`.
     """
 
     chosen: NDArray[np.bool_]
     function: int
     data: int
     owner: Any
+    blend: bool = False
 
 
 class RayScene:
@@ -204,7 +207,7 @@ class RayScene:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
         parts = zip(self._triangles, (None, see_through), strict=False) if len(triangle) else ()
         scene = self._add_scene(list(parts), robust)
-        tinted = None
+        tinted = 0 if see_through is not None and see_through.blend else None
         if tint is not None:
             self._triangles.append(np.where(tint.chosen[:, None], whole, np.uint32(n)))
             tinted = self._add_scene([(self._triangles[-1], tint)], robust)

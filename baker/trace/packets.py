@@ -32,8 +32,12 @@ MAX_WIDTH = 16
 # Rays that the kernels of a bake handle together.
 LANES = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
-# Words of what the filter function of coloured triangles finds: context, `Tint.stop`, `Tint.colour`.
-TINT_STOP, TINT_COLOUR, CONTEXT_WORDS = 16, 16 + LANES, 16 + 4 * LANES
+# Words of what filter functions of BLEND triangles find: RTCRayQueryContext, `Tint.stop`, `Tint.colour`,
+# `Tint.edge_hits`, and so many hits on edges for each ray: distance and surface of each (`edge_hits`).
+EDGE_HITS = 32
+TINT_STOP, TINT_COLOUR, TINT_EDGES = 16, 16 + LANES, 16 + 4 * LANES
+TINT_EDGE_HITS = TINT_EDGES + LANES
+CONTEXT_WORDS = TINT_EDGE_HITS + LANES * EDGE_HITS * 2
 # RTC_RAY_QUERY_FLAG_COHERENT.
 _COHERENT = 1 << 16
 
@@ -99,18 +103,20 @@ copy_four: Any = intrinsic(_copy_four)
 
 
 class Tint(NamedTuple):
-    """What tells the colour of light along rays; each thread has its own.
+    """Memory for the transmittance of BLEND surfaces along rays; each thread has its own.
 
     scene : int, see `Tracer.tint`
-    arguments : (5,) int64, RTCOccludedArguments; they hand `stop` and `colour` to the tree's filter function
+    arguments : (5,) int64, RTCOccludedArguments; they hand the arrays below to filter functions
     stop : (16,) uint32, triangle at which each of sixteen rays ends: it lets nothing through
     colour : (3 * 16,) float32, what RGB is multiplied by
+    edges : (16,) uint32, hits on edges of triangles found so far, see `edge_hits`
     """
 
     scene: int
     arguments: NDArray[np.int64]
     stop: NDArray[np.uint32]
     colour: NDArray[np.float32]
+    edges: NDArray[np.uint32]
 
 
 class Caster(NamedTuple):
@@ -120,7 +126,7 @@ class Caster(NamedTuple):
     floats (21 * 16,) float32 and words, the same memory as uint32: a packet of the native width.
     lane_valid, lane_floats, lane_words: the same for sixteen rays, rows 16 numbers apart.
     query: (5,) int64, `arguments_of` rays of neighbouring texels in this scene.
-    tint: None if nothing colours light; Numba then compiles kernels without it.
+    tint: None if there are no BLEND triangles; Numba then compiles kernels without it.
     """
 
     scene: int
@@ -154,14 +160,16 @@ def new_caster(tracer: Tracer) -> Caster:
 
 
 def new_tint(scene: int) -> Tint:
-    """Return the memory that one thread needs to find the colour of light, for `Tracer.tint`."""
-    # RTCRayQueryContext (without instances), and what the filter function finds behind it.
+    """Return the memory that one thread needs for transmittance, for `Tracer.tint`."""
+    # RTCRayQueryContext (without instances), and what the filter functions find behind it.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:TINT_STOP] = NO_HIT
+    # Never coherent: Embree then follows the rays of each octant apart, but asks about all rays at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
-    return Tint(scene, arguments, words[TINT_STOP:TINT_COLOUR], memory[TINT_COLOUR:])
+    stop, edges = words[TINT_STOP:TINT_COLOUR], words[TINT_EDGES:TINT_EDGE_HITS]
+    return Tint(scene, arguments, stop, memory[TINT_COLOUR:TINT_EDGES], edges)
 
 
 def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:

@@ -127,20 +127,34 @@ def test_vertex_alpha_counts():
     assert (found[20:] == 0).all()
 
 
-@pytest.mark.parametrize("layers", [1, 2])
-def test_blend_lets_the_rest_of_alpha_through(layers):
-    light = (0.0, 2.0, 0.0)
-    builder, floor = floor_under(*[blended(0.25, albedo=1.0)] * layers, light="point", position=light)
-    found = floor.values(builder.bake(bounces=0))[..., 0]
-    truth = floor.texel_mean(lambda p: point_irradiance(light, p, (0, 1, 0)))
-    # 40 x 40 texels of 16 rays each: the mean's standard error would be 0.27 % without strata.
-    share = 0.75**layers
-    error = np.sqrt(share * (1 - share) / found.size / 16)
-    assert (found / truth).mean() == pytest.approx(share, abs=4 * error)
-    # A texel's 16 rays decide together: through one pane a quarter of them is exactly 4, but for texels
-    # that see both triangles of the pane, and for the light's own change within a texel.
-    scatter = (found / truth).std() / np.sqrt(share * (1 - share) / 16)
-    assert scatter < (0.2 if layers == 1 else 0.6)
+LIGHTS = {
+    "sun": {"light": "directional", "direction": SUN},
+    "point": {"light": "point", "position": (0.0, 2.0, 0.0)},
+    "spot": {
+        "light": "spot",
+        "position": (0.1, 2.0, 0.0),
+        "direction": SUN,
+        "inner_cone": 0.4,
+        "outer_cone": 0.6,
+    },
+}
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize(("alpha", "layers"), [(0.25, 2), (0.6, 1), (0.9, 1)])
+def test_blend_lets_the_rest_of_alpha_through(light, alpha, layers):
+    """Exactly so at every texel, also on the diagonal that the two triangles of each pane share."""
+    found, free = (
+        floor.values(builder.bake(bounces=0))[..., 0]
+        for builder, floor in (
+            floor_under(*[blended(alpha, albedo=1.0)] * n, **LIGHTS[light]) for n in (layers, 0)
+        )
+    )
+    assert (free > 0).sum() > 100
+    np.testing.assert_allclose(found, free * (1 - alpha) ** layers, rtol=2e-6)
+    if light == "point":
+        truth = floor_under(light="")[1].texel_mean(lambda p: point_irradiance((0.0, 2.0, 0.0), p, (0, 1, 0)))
+        assert (found / truth).mean() == pytest.approx((1 - alpha) ** layers, rel=1e-3)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.25, 1.0])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms import point_irradiance
 from judged import copies_of, traced
 from scenes import SceneBuilder
 from test_truth_tint import COLOUR, HALF, glass, passed
@@ -49,15 +50,15 @@ def test_estimators_agree_pairwise_below_a_pane():
 
 
 @pytest.mark.parametrize("estimator", ["mis", "bdpt"])
-def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator):
-    """All rays from the place are the same ray: each sample has to decide for itself whether it passes."""
+@pytest.mark.parametrize("place", [(0.1, 0.03, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, 0.0)])
+def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator, place):
+    """All rays from the place are the same ray: each brings the whole share, through the diagonal, too."""
     scene = quad_scene([Quad((-1, -1, 1), (2, 0, 0), (0, 2, 0), STAINED)])
     scene = replace(scene, lights=(PunctualLight("point", "p", 0, (4.0, 4.0, 4.0), (0.0, 0.0, 2.0)),))
-    found = traced(scene, copies_of((0.1, 0.03, 0.0), copies=16), estimator=estimator, max_bounces=0)
-    # 64 samples in each of 8 passes.
-    scatter = passed(COLOUR, HALF) * np.sqrt((1 - HALF) / HALF / 512)
-    assert (np.abs(found.mean - passed(COLOUR, HALF)) < 4 * scatter).all()
-    assert found.standard_error.mean(axis=0) == pytest.approx(scatter, rel=0.3)
+    found = traced(scene, copies_of(place, copies=2), estimator=estimator, max_bounces=0)
+    free = point_irradiance((0.0, 0.0, 2.0), np.float64(place), (0, 0, 1)) * 4.0
+    np.testing.assert_allclose(found.mean, np.tile(free * passed(COLOUR, HALF), (2, 1)), rtol=1e-5)
+    assert found.standard_error.max() < 1e-6
 
 
 @pytest.mark.parametrize("estimator", ["uniform", "mis", "bdpt"])

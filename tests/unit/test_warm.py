@@ -23,10 +23,10 @@ def material(mode, colour=(1.0, 1.0, 1.0), alpha=1.0, image=None):
         ([material("OPAQUE", alpha=0.0)], None),
         ([material("BLEND"), material("BLEND", image=SOLID)], None),
         ([material("OPAQUE"), material("MASK", (1, 0, 0), image=HOLED)], "holes"),
-        ([material("BLEND", alpha=0.5)], "holes"),
-        ([material("BLEND", (1, 0, 0), 0.5), material("MASK", image=HOLED)], "coloured"),
-        ([material("BLEND", image=HOLED)], "coloured"),
-        ([material("BLEND", image=HOLED.astype(np.float32) / 255)], "coloured"),
+        ([material("BLEND", alpha=0.5)], "glass"),
+        ([material("BLEND", (1, 0, 0), 0.5), material("MASK", image=HOLED)], "glass"),
+        ([material("BLEND", image=HOLED)], "glass"),
+        ([material("BLEND", image=HOLED.astype(np.float32) / 255)], "glass"),
     ],
 )
 def test_the_scene_tells_what_is_compiled(monkeypatch, materials, kind):
