@@ -150,6 +150,21 @@ class SceneBuilder:
             uv.reshape(-1, 2), np.zeros((3 * n, 2)),
         )  # fmt: skip
 
+    def sheet(self, point: np.ndarray, material: int, texels: tuple[float, float]) -> None:
+        """Add a flat-shaded grid of points (rows, columns, 3) as one chart; it faces along column x row."""
+        rows, columns = point.shape[:2]
+        x, y = self._cell(*(int(np.ceil(t)) for t in texels))
+        r, c = (a.reshape(-1) for a in np.indices((rows - 1, columns - 1)))
+        square = np.stack([(r, c), (r, c + 1), (r + 1, c + 1), (r + 1, c)], axis=-1)
+        own = square[:, :, [0, 1, 2, 0, 2, 3]].reshape(2, -1)
+        corner = point[own[0], own[1]].reshape(-1, 3, 3)
+        face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        normal = np.repeat(unit(face)[:, None], 3, axis=1).reshape(-1, 3)
+        share = own[::-1].T / np.array([columns - 1, rows - 1])
+        uv = (np.array([x, y]) + share * texels) / self.size
+        triangle = np.arange(len(share)).reshape(-1, 3)
+        self._add(corner.reshape(-1, 3), normal, triangle, material, uv, share)
+
     def light(self, kind: str, intensity: Any, **where: Any) -> None:
         """Add a punctual light."""
         colour = tuple(np.broadcast_to(np.asarray(intensity, float), 3).tolist())

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.finish.page import check_page
-from baker.finish.slope import match_lookups, move_to_centre
+from baker.finish.slope import highest_of_charts, match_lookups, move_to_centre
 from baker.finish.tiles import over_rows
 
 # Sub-positions place a fully covered texel's centroid only so well; below this nothing is gained.
@@ -33,7 +33,7 @@ def recentre(
     """Correct each covered texel: what a lookup at its centroid finds is what was measured there.
 
     Slopes and neighbours are those of its own chart. The result stays within the range of the 5 x 5 texels
-    around it, widened by half, and light never turns negative.
+    around it, widened by up to half where it rises or falls steadily, and light never turns negative.
 
     Parameters
     ----------
@@ -59,10 +59,11 @@ def recentre(
     """
     used = chart >= 0 if valid is None else valid & (chart >= 0)
     check_page(value, chart, centroid_offset=centroid_offset, valid=used)
+    highest = highest_of_charts(value, chart, used)
     moved = np.array(value)
     over_rows(
         lambda first, end: move_to_centre(
-            value, chart, used, centroid_offset, SMALLEST_OFFSET, moved, first, end
+            value, chart, used, centroid_offset, SMALLEST_OFFSET, highest, moved, first, end
         ),
         len(value),
         threads,
@@ -70,7 +71,7 @@ def recentre(
     out = np.array(moved)
     over_rows(
         lambda first, end: match_lookups(
-            value, chart, used, centroid_offset, SMALLEST_OFFSET, moved, out, first, end
+            value, chart, used, centroid_offset, SMALLEST_OFFSET, highest, moved, out, first, end
         ),
         len(value),
         threads,

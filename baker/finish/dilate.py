@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.finish.page import check_page
-from baker.finish.slope import extrapolate_outwards
+from baker.finish.slope import extrapolate_outwards, highest_of_charts
 from baker.finish.tiles import over_rows
 from baker.kernels.page_fill import nearest_texel
 
@@ -58,8 +58,11 @@ def dilate(
         return out, grown
     nearest = np.zeros(covered.shape, np.int32)
     nearest_texel(covered, nearest)
+    highest = highest_of_charts(value, chart, covered)
     over_rows(
-        lambda first, end: extrapolate_outwards(out, chart, covered, nearest, pixels, grown, first, end),
+        lambda first, end: extrapolate_outwards(
+            out, chart, covered, nearest, highest, pixels, grown, first, end
+        ),
         len(out),
         threads,
     )

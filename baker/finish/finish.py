@@ -95,11 +95,18 @@ def finish_page(
                 threads=threads,
                 progress=progress,
             )
-        total += recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
+        centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
+        total += np.minimum(centred, _brightest(repaired, plan.valid), out=centred)
     np.clip(total, 0.0, upper, out=total)
     grown_value, grown = dilate(total, plan.covered, plan.chart, dilation, threads=threads)
-    np.clip(grown_value, 0.0, upper, out=grown_value)
+    np.clip(grown_value, 0.0, np.minimum(_brightest(total, plan.covered), upper), out=grown_value)
     return grown_value, grown
+
+
+def _brightest(value: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return the largest value of each channel (C,): what is moved or continued must not be brighter."""
+    brightest: NDArray[np.float32] = value[where].max(axis=0, initial=0.0)
+    return brightest
 
 
 def _light(plan: PagePlan, layers: list[PageLayer]) -> NDArray[np.float32]:

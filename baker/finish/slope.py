@@ -7,6 +7,7 @@ The slope at a texel is the weighted least-squares plane through the covered tex
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,12 @@ from baker.kernels.page_slope import N_CHANNEL_COLUMNS, N_COLUMNS, window_sums
 RADIUS = 2
 # A ridge in the normal equations: where the texels lie on one line, the slope across it comes out 0.
 RIDGE = 1e-3
-# How far a result may leave the range of the window's values, as a share of that range.
+# How far a result may leave the range of the window's values, as a share of that range, and in units of the
+# steps between the three texels behind it: the last step and, times CURVED, the one before.
 HEADROOM = 0.5
+STEEP, CURVED = 2.0, 3.0
+# A plane must explain this share of the spread in a window before a value may leave the range of its chart.
+STRAIGHT = 0.95
 # Extrapolation stops growing this many texels outside the chart.
 MAX_STEP = 2.0
 # A value taken from a few texels must differ by this share to be believed instead of a plane's.
@@ -38,6 +43,7 @@ class Planes:
     centre : (n, C) float64, value at the place of the texel
     across, down : (n, C) float64, slope per column and per row
     low, high : (n, C) float64, smallest and largest value in the window
+    explained : (n, C) float64, share of the spread in the window that the plane explains
     """
 
     centre: NDArray[np.float64]
@@ -45,17 +51,37 @@ class Planes:
     down: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    explained: NDArray[np.float64]
 
     def at(self, index: NDArray[np.int64]) -> Planes:
         """Return the planes with these numbers."""
         return Planes(*(getattr(self, field.name)[index] for field in fields(self)))
 
-    def limit(self, estimate: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (n, C) estimates cut to the window's range and a little more; light never turns negative."""
+    def limit(
+        self, estimate: NDArray[np.float64], trend: Trend, highest: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Return (n, C) estimates cut to the window's range, and a little more where there is a trend.
+
+        Light never turns negative, and is brighter than the brightest texel of its chart, `highest` (n, C),
+        only where it rises as evenly as a plane.
+        """
         room = HEADROOM * (self.high - self.low)
-        floor = self.low - room
+        floor = self.low - np.minimum(room, trend.fall)
         floor[(self.low >= 0.0) & (floor < 0.0)] = 0.0
-        return np.minimum(np.maximum(estimate, floor), self.high + room)
+        limited = np.minimum(np.maximum(estimate, floor), self.high + np.minimum(room, trend.rise))
+        even = np.maximum(self.explained - STRAIGHT, 0.0) / (1.0 - STRAIGHT)
+        return limited - (1.0 - even) * np.maximum(limited - highest, 0.0)
+
+
+class Trend(NamedTuple):
+    """How much further values may rise and fall outwards of n texels, (n, C) float64, not negative.
+
+    The two steps between a texel and those behind it must go the same way: then the value goes on as it
+    came. At the edge of a shadow, between faces that differ and in noise they do not.
+    """
+
+    rise: NDArray[np.float64]
+    fall: NDArray[np.float64]
 
 
 class _Sums:
@@ -91,6 +117,11 @@ class _Sums:
         """Return (n, C) of a column of `page_slope`."""
         return self._by_channel[:, :, column]
 
+    def spread(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the weighted sum of squares about the mean, and what of it the plane explains, (n, C)."""
+        spread = np.maximum(self.channel(page_slope.WVV) - self.mean * self.channel(page_slope.WV), 0.0)
+        return spread, np.minimum(np.maximum(self.across * self.bx + self.down * self.by, 0.0), spread)
+
 
 def fit_planes(
     value: NDArray[np.float32],
@@ -114,7 +145,10 @@ def fit_planes(
     places = np.zeros((0, 0, 2), np.float32) if offset is None else offset
     s = _Sums(value, chart, covered, places, texel, RADIUS, 1.0)
     centre = s.mean - s.across * s.mx - s.down * s.my
-    return Planes(centre, s.across, s.down, s.channel(page_slope.LOW), s.channel(page_slope.HIGH))
+    low, high = s.channel(page_slope.LOW), s.channel(page_slope.HIGH)
+    spread, explained = s.spread()
+    share = np.where(spread > 0.0, explained / np.where(spread > 0.0, spread, 1.0), 0.0)
+    return Planes(centre, s.across, s.down, low, high, share)
 
 
 def noisy_planes(
@@ -139,8 +173,7 @@ def noisy_planes(
     """
     s = _Sums(value, chart, covered, np.zeros((0, 0, 2), np.float32), texel, radius, _NOISY_FLAT)
     # Explained against unexplained spread, per degree of freedom: the F ratio of the slope.
-    spread = np.maximum(s.channel(page_slope.WVV) - s.mean * s.channel(page_slope.WV), 0.0)
-    explained = np.minimum(np.maximum(s.across * s.bx + s.down * s.by, 0.0), spread)
+    spread, explained = s.spread()
     sure = (s.count > 3) & (explained > 0.0)
     left = (spread - explained) / np.where(s.count > 3, s.count - 3, 1.0)
     doubt = DOUBT * left / np.where(sure, explained / 2.0, 1.0)
@@ -149,11 +182,54 @@ def noisy_planes(
     return np.stack([centre, trust * s.across, trust * s.down], axis=1).astype(np.float32)
 
 
+def outward_trend(
+    value: NDArray[np.float32],
+    chart: NDArray[np.int32],
+    covered: NDArray[np.bool_],
+    texel: NDArray[np.int64],
+    outward: NDArray[np.float64],
+) -> Trend:
+    """Return by how much values may leave their surroundings on a way outwards; see `Trend`.
+
+    Parameters
+    ----------
+    value, chart, covered, texel : see `fit_planes`
+    outward : (n, 2) float64
+        The way (column, row), texels.
+    """
+    height, width = chart.shape
+    reach = np.abs(outward).max(axis=1)
+    step = np.rint(outward / np.maximum(reach, 1e-12)[:, None]).astype(np.int64)
+    row, column = np.divmod(texel, width)
+    behind = [value[row, column].astype(np.float64)]
+    known = np.ones(len(texel), bool)
+    for k in (1, 2):
+        r, c = row - k * step[:, 1], column - k * step[:, 0]
+        known &= (r >= 0) & (r < height) & (c >= 0) & (c < width)
+        r, c = np.where(known, r, row), np.where(known, c, column)
+        known &= covered[r, c] & (chart[r, c] == chart[row, column])
+        behind.append(value[r, c].astype(np.float64))
+    last, before = behind[0] - behind[1], CURVED * (behind[1] - behind[2])
+    scale = (STEEP * reach * known)[:, None]
+    rise, fall = np.minimum(last, before), np.minimum(-last, -before)
+    return Trend(scale * np.maximum(rise, 0.0), scale * np.maximum(fall, 0.0))
+
+
+def highest_of_charts(
+    value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return the largest value of each chart's covered texels, (n_charts, C) float32; -inf if it has none."""
+    highest = np.full((int(chart.max(initial=-1)) + 1, value.shape[2]), -np.inf, np.float32)
+    np.maximum.at(highest, chart[covered], value[covered])
+    return highest
+
+
 def extrapolate_outwards(
     value: NDArray[np.float32],
     chart: NDArray[np.int32],
     covered: NDArray[np.bool_],
     nearest: NDArray[np.int32],
+    highest: NDArray[np.float32],
     pixels: int,
     grown: NDArray[np.bool_],
     first_row: int,
@@ -167,6 +243,7 @@ def extrapolate_outwards(
     chart : (H, W) int32
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
+    highest : (n_charts, C) float32, from `highest_of_charts`
     pixels : int
         How many rings of 8-neighbours a chart grows.
     grown : (H, W) bool, set at the texels that got a value
@@ -185,10 +262,11 @@ def extrapolate_outwards(
     # Many texels continue the same one.
     border, owner = np.unique(source, return_inverse=True)
     plane = fit_planes(value, chart, covered, border)
-    shrink = np.minimum(1.0, MAX_STEP / ring[near])[:, None]
+    way = np.stack([right[near], down[near]], axis=1) * np.minimum(1.0, MAX_STEP / ring[near])[:, None]
     plane = plane.at(owner)
-    rise = plane.across * right[near, None] + plane.down * down[near, None]
-    value[row, column] = plane.limit(plane.centre + shrink * rise)
+    trend = outward_trend(value, chart, covered, source, way)
+    estimate = plane.centre + plane.across * way[:, :1] + plane.down * way[:, 1:]
+    value[row, column] = plane.limit(estimate, trend, highest[chart.reshape(-1)[source]])
     grown[row, column] = True
 
 
@@ -198,6 +276,7 @@ def move_to_centre(
     covered: NDArray[np.bool_],
     offset: NDArray[np.float32],
     smallest: float,
+    highest: NDArray[np.float32],
     out: NDArray[np.float32],
     first_row: int,
     end_row: int,
@@ -213,14 +292,18 @@ def move_to_centre(
         Centroid minus texel centre (column, row), texels.
     smallest : float
         Offsets below this are left alone, texels.
+    highest : (n_charts, C) float32, from `highest_of_charts`
     out : (H, W, C) float32, changed in rows first_row to end_row - 1
     """
     row, column = _partly_covered(covered, offset, smallest, first_row, end_row)
     if not len(row):
         return
-    plane = fit_planes(value, chart, covered, row * value.shape[1] + column, offset)
-    x, y = offset[row, column].astype(np.float64).T[..., None]
-    out[row, column] = plane.limit(value[row, column] - plane.across * x - plane.down * y)
+    texel, way = row * value.shape[1] + column, -offset[row, column].astype(np.float64)
+    plane = fit_planes(value, chart, covered, texel, offset)
+    estimate = value[row, column] + plane.across * way[:, :1] + plane.down * way[:, 1:]
+    out[row, column] = plane.limit(
+        estimate, outward_trend(value, chart, covered, texel, way), highest[chart[row, column]]
+    )
 
 
 def match_lookups(
@@ -229,6 +312,7 @@ def match_lookups(
     covered: NDArray[np.bool_],
     offset: NDArray[np.float32],
     smallest: float,
+    highest: NDArray[np.float32],
     moved: NDArray[np.float32],
     out: NDArray[np.float32],
     first_row: int,
@@ -241,7 +325,7 @@ def match_lookups(
 
     Parameters
     ----------
-    value, chart, covered, offset, smallest : see `move_to_centre`
+    value, chart, covered, offset, smallest, highest : see `move_to_centre`
     moved : (H, W, C) float32, from `move_to_centre`
     out : (H, W, C) float32, changed in rows first_row to end_row - 1
     """
@@ -257,11 +341,14 @@ def match_lookups(
         return
     row, column, below, beside = row[known], column[known], below[known], beside[known]
     x, y = x[known, None], y[known, None]
-    plane = fit_planes(value, chart, covered, row * width + column, offset)
+    texel = row * width + column
+    plane = fit_planes(value, chart, covered, texel, offset)
+    trend = outward_trend(value, chart, covered, texel, -offset[row, column].astype(np.float64))
+    bound = highest[chart[row, column]]
     measured, plain = value[row, column].astype(np.float64), moved[row, column].astype(np.float64)
     others = x * (1.0 - y) * moved[row, beside] + (1.0 - x) * y * moved[below, column]
     others += x * y * moved[below, beside]
-    way = plane.limit((measured - others) / ((1.0 - x) * (1.0 - y))) - plain
+    way = plane.limit((measured - others) / ((1.0 - x) * (1.0 - y)), trend, bound) - plain
     excess = np.maximum(np.abs(way) - NOISY * np.abs(measured), 0.0)
     out[row, column] = plain + np.where(way > 0.0, excess, -excess)
 

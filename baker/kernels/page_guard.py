@@ -1,8 +1,9 @@
 """Kernels that hold a denoised page to what its noisy samples allow.
 
-A denoiser may remove noise, not light: over a small in-chart window the difference between noisy and denoised
-page must vanish within its own standard error, and no texel may move by more than a few of them. What is left
-is mixed with the samples by inverse variance, so that a converged page stays as it is.
+A denoiser may remove noise, not light: over a small in-chart window the difference between noisy and
+denoised page must vanish within its own standard error. No texel may move by more than a few standard errors,
+or out of the range of the samples around it. What is left is mixed with the samples by inverse variance: a
+converged page stays as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ TEXEL_SIGMAS = 5.0
 OWN_ERROR = 0.005
 # The same within two texels of a chart's border, where partly covered texels step from row to row.
 OWN_ERROR_BORDER = 0.02
-_three = scratch((3,), np.float64)
+_three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
 
 
 @kernel
@@ -72,14 +73,16 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
     out : (H, W, 3) float32, changed at covered texels of rows first_row to end_row - 1
     """
     height, width = chart.shape
-    residual = _three()
+    residual, extent = _three(), _range()
     for r in range(first_row, end_row):
         for c in range(width):
             if not covered[r, c]:
                 continue
             sw = sww = se = 0.0
             n = 0
-            residual[0] = residual[1] = residual[2] = 0.0
+            for j in range(3):
+                residual[j] = 0.0
+                extent[0, j] = extent[1, j] = float(noisy[r, c, j])
             for rr in range(larger(r - RADIUS, 0), smaller(r + RADIUS + 1, height)):
                 for cc in range(larger(c - RADIUS, 0), smaller(c + RADIUS + 1, width)):
                     if not covered[rr, cc] or chart[rr, cc] != chart[r, c]:
@@ -91,7 +94,10 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                     e = float(error[rr, cc])
                     se += w * e * e
                     for j in range(3):
-                        residual[j] += w * (float(noisy[rr, cc, j]) - float(denoised[rr, cc, j]))
+                        sample = float(noisy[rr, cc, j])
+                        residual[j] += w * (sample - float(denoised[rr, cc, j]))
+                        extent[0, j] = smaller(extent[0, j], sample)
+                        extent[1, j] = larger(extent[1, j], sample)
             # Pooled over the window: a texel that missed all rare bright samples underrates its own error.
             texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
@@ -113,6 +119,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                 far = TEXEL_SIGMAS * texel_error * scale
                 own = float(noisy[r, c, j])
                 value = smaller(larger(value, own - far), own + far)
+                value = smaller(larger(value, extent[0, j]), extent[1, j])
                 noise = (texel_error * scale) ** 2
                 bias = (own_error * value) ** 2
                 if noise + bias > 0.0:

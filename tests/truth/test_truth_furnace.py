@@ -107,3 +107,26 @@ def test_sky_light_bounces_once_from_a_wall():
     speck = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))
     means = [speck.values(builder.bake(seed=seed, sky="1"))[..., 0].mean() for seed in range(SEEDS)]
     assert_unbiased(means, np.pi * (0.5 + 0.5 * 0.6), least=0.002)
+
+
+@pytest.mark.parametrize("denoise", [False, True])
+def test_rough_ground_under_an_even_sky_is_never_brighter_than_flat_ground(denoise):
+    """E <= pi L and 0 <= AO <= 1 at every texel: ends of charts and what they grow into are no brighter."""
+    builder = SceneBuilder(64)
+    rng = np.random.default_rng(5)
+    for texels in ((40.3, 17.6), (23.7, 25.2), (11.4, 9.7)):
+        x, y = np.meshgrid(np.linspace(0, 4, 14), np.linspace(0, 3, 10))
+        point = np.stack([x, y, 10.0 * len(builder.meshes) + 0.25 * rng.random(x.shape)], axis=-1)
+        builder.sheet(point, builder.material(0.5), texels)
+    result = builder.bake(
+        sky="1", bounces=0, channels=["irradiance", "ao"], ao_distance="inf", denoise=denoise, samples=32
+    )
+    for channel, most in (("irradiance", np.pi), ("ao", 1.0)):
+        value = result.lightmaps[channel].value
+        # Rounding of sums of 32 rays.
+        assert value.max() <= most * (1 + 1e-5)
+        assert value.max() > 0.95 * most
+        assert value.min() >= 0.0
+        assert value[result.status == 1].min() > 0.05 * most
+        # A stray value of the filter, or of a slope, would stand out from its surroundings.
+        assert value[result.status == 2].min() > 0.0

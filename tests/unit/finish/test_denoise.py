@@ -167,6 +167,8 @@ def test_the_guard_agrees_with_plain_loops(lit):
         expected = guess[r, c] + np.sign(mean) * np.maximum(np.abs(mean) - most, 0.0)
         far = page_guard.TEXEL_SIGMAS * one * scale
         expected = np.clip(expected, noisy[r, c] - far, noisy[r, c] + far)
+        around = noisy[rows, columns]
+        expected = np.clip(expected, around.min(axis=0), around.max(axis=0))
         own_error = page_guard.OWN_ERROR if len(rows) == 25 else page_guard.OWN_ERROR_BORDER
         noise, bias = (one * scale) ** 2, (own_error * expected) ** 2
         expected = (noise * expected + bias * noisy[r, c]) / (noise + bias)
