@@ -14,6 +14,7 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     """
     # Not through the register, which would import every check.
     from baker.lint.inside_out import inside_out
+    from baker.lint.invisible import invisible
     from baker.lint.light_sources import light_range
     from baker.lint.subject import Subject
 
@@ -21,6 +22,10 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     found = [
         SceneWarning("inside-out", f"{found.message}; it will be black", found.place.object)
         for found in inside_out(subject)
+    ]
+    found += [
+        SceneWarning("invisible", f"{f.message}; raise the alpha or leave the object out", f.place.object)
+        for f in invisible(subject)
     ]
     if subject.wants_light:
         found += [SceneWarning("light-range", f.message, f.place.object) for f in light_range(subject)]

@@ -273,6 +273,10 @@ CASES: dict[str, Case] = {
         scene(floor(), materials=({"pbrMetallicRoughness": {"baseColorFactor": [0.96, 0.5, 0.5, 1]}},)),
         scene(floor(), materials=({"pbrMetallicRoughness": {"baseColorFactor": [0.94, 0.5, 0.5, 1]}},)),
     ),
+    "invisible": Case(
+        scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 1.5},)),
+        scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 0.5},)),
+    ),
     "emissive-black": Case(glowing(0), glowing(1)),
     "sun-below": Case(scene(floor(), lights=(sun(UP),)), scene(floor(), lights=(sun(DOWN),))),
     "all-black": Case(
