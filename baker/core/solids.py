@@ -7,7 +7,7 @@ The rule does not ask whether materials are double-sided where the shape tells e
   sides and has anything inside, if it has small holes and anything inside, or if most of the scene is inside
   (sky spheres).
 - One whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls), else
-  a room. If it is double-sided, has nothing inside and does not glow, it is a solid wound the wrong way.
+  a room. If it has nothing inside and does not glow, it is a solid wound the wrong way.
 
 A solid has no light inside and lets none in, so what a wrong guess can hide is dark in any case.
 """
@@ -157,16 +157,18 @@ class _Judge:
         return room
 
     def _outward_room(self, part: int, large: bool) -> bool:
-        if self._holds_place(part) or self._holds(part, self.glows):
+        # A lamp may stick in the ceiling of a room, whose back would shine. Black backs make no room.
+        mostly = bool(self.two_sided[part])
+        if self._holds_place(part) or self._holds(part, self.glows, mostly=mostly):
             return True
         if (self.glows_behind[part] or not self.parts.exact[part]) and self._holds(part, None):
             return True
         return large and self._holds_most(part)
 
     def _inward_room(self, part: int) -> bool:
-        if not self.two_sided[part] or self.glows[part] or len(self.parts.area) == 1:
+        if self.glows[part] or len(self.parts.area) == 1:
             return True
-        return self._holds_place(part) or self._holds(part, None)
+        return self._holds_place(part) or self._holds(part, None, mostly=True)
 
     def _largest(self) -> set[int]:
         """Return the few closed parts whose boxes may hold most of the scene."""
@@ -203,23 +205,28 @@ class _Judge:
         found: NDArray[np.bool_] = inside.all(axis=1) & (shells != part)
         return found
 
-    def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+    def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None, share: bool) -> NDArray[np.int64]:
+        """Return parts whose boxes lie within that of a part, or share space with it."""
         low, high = self.parts.low, self.parts.high
-        inside = ((low >= low[part] - self.slack) & (high <= high[part] + self.slack)).all(axis=1)
+        if share:
+            inside = ((low < high[part]) & (high > low[part])).all(axis=1)
+        else:
+            inside = ((low >= low[part] - self.slack) & (high <= high[part] + self.slack)).all(axis=1)
         inside[part] = False
         for hollow, shell in self.around.items():
             inside[hollow] &= shell != part
         return np.flatnonzero(inside if wanted is None else inside & wanted)
 
-    def _holds(self, part: int, wanted: NDArray[np.bool_] | None) -> bool:
-        """Tell whether another part (one of the wanted ones) is inside."""
-        return any(self._is_inside(int(other), part) for other in self._held_boxes(part, wanted))
+    def _holds(self, part: int, wanted: NDArray[np.bool_] | None, *, mostly: bool = False) -> bool:
+        """Tell whether another part (one of the wanted ones) is inside, at least mostly."""
+        held = self._held_boxes(part, wanted, mostly)
+        return any(self._is_inside(int(other), part, mostly=mostly) for other in held)
 
     def _holds_most(self, part: int) -> bool:
         """Tell whether most of the other parts' area is inside."""
         area = self.parts.area
         others = float(area.sum() - area[part])
-        held = self._held_boxes(part, None)
+        held = self._held_boxes(part, None, False)
         if area[held].sum() <= _MOST_OF_SCENE * others:
             return False
         # The largest are asked, and speak for the rest.
@@ -227,15 +234,17 @@ class _Judge:
         found = sum(float(area[other]) for other in held if self._is_inside(int(other), part))
         return found > _MOST_OF_SCENE * float(area[held].sum())
 
-    def _is_inside(self, part: int, shell: int) -> bool:
-        """Tell whether a part lies inside another one, possibly touching it."""
+    def _is_inside(self, part: int, shell: int, *, mostly: bool = False) -> bool:
+        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does."""
         rows = self.order[self.start[part] : self.start[part + 1]]
+        if mostly and self.glows[part]:
+            rows = rows[self.surfaces.glows[rows]]
         chosen = rows[np.linspace(0, len(rows) - 1, min(_WITNESSES, len(rows))).round().astype(int)]
         points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
         surface, found = self._surface(shell), 0
         for point in points:
             number = winding_number(surface, point)
-            if number < _OUTSIDE:
+            if not mostly and number < _OUTSIDE:
                 return False
             found += number > _INSIDE
-        return 2 * found >= len(points)
+        return 2 * found > len(points) if mostly else 2 * found >= len(points)
