@@ -59,6 +59,12 @@ def quad(**attributes: Any) -> tuple:
     return QUAD, QUAD_TRIANGLE, {"NORMAL": QUAD_NORMAL, **attributes}
 
 
+def stacked(height: float) -> bytes:
+    """Return a unit cube that stands in a floor, and a smaller one at a height above the floor."""
+    small = 0.5 * CUBE + np.float32([0.25, height, 0.25])
+    return scene((CUBE, CUBE_TRIANGLE), (FLOOR, [[0, 1, 2], [0, 2, 3]]), (small, CUBE_TRIANGLE))
+
+
 def with_uv(uv: Any, position: Any = QUAD, triangle: Any = QUAD_TRIANGLE) -> bytes:
     """Return a scene of one mesh with a TEXCOORD_1."""
     normal = np.float32(np.tile([0, 0, 1], (len(position), 1)))
@@ -206,6 +212,7 @@ CASES: dict[str, Case] = {
     "duplicate-vertices": Case(
         scene((QUAD[[0, 1, 2, 0, 2, 3]], [[0, 1, 2], [3, 4, 5]])), scene((QUAD, QUAD_TRIANGLE))
     ),
+    "enclosed-faces": Case(bad=stacked(1.0), good=stacked(1.01)),
     "self-intersection": Case(
         scene((np.concatenate([CUBE, CUBE * 0.5 + 0.75]), TWO_CUBES)),
         scene((np.concatenate([CUBE, CUBE * 0.5 + 1.0]), TWO_CUBES)),

@@ -58,7 +58,7 @@ def plain(tmp_path_factory):
     found = counts(tmp_path_factory.mktemp("plain"), [whole()])
     expected = {
         "zero-area", "duplicate-faces", "needle-faces", "open-edges", "flipped-neighbours", "inside-out",
-        "self-intersection",
+        "self-intersection", "enclosed-faces",
     }  # fmt: skip
     assert set(found) == expected
     return found
