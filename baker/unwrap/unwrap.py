@@ -19,6 +19,7 @@ from baker.unwrap.keep import choose_kept, close_charts, kept_charts, lightmap_u
 from baker.unwrap.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.unwrap.pages import fill_pages
 from baker.unwrap.pool import STAGE
+from baker.unwrap.shown import density_shares
 
 # Relative difference of the axes' scales up to which an instance counts as evenly scaled.
 _EVEN_SCALE = 1e-4
@@ -116,20 +117,23 @@ def _lay_out(
     """Cut what has no usable uv, and pack everything."""
     # An instance without triangles has nothing to pack.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
+    # A density that was asked for is kept.
+    equal = settings.density is not None
+    shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
     placements: list[CutInstance | RigidInstance] = []
     cuts: list[_Cut] = []
     index: dict[tuple[int, bytes], int] = {}
-    for k in filled:
+    for k, share in zip(filled, shares.tolist(), strict=True):
         instance = scene.instances[k]
         if usable[k]:
-            placements.append(_rigid(scene.meshes[instance.mesh], instance))
+            placements.append(_rigid(scene.meshes[instance.mesh], instance, share))
             continue
         factor, stretch = _world_stretch(instance.world_from_object)
         key = (instance.mesh, stretch.tobytes())
         if key not in index:
             index[key] = len(cuts)
             cuts.append(_Cut(instance.mesh, stretch))
-        placements.append(CutInstance(index[key], factor))
+        placements.append(CutInstance(index[key], factor * share))
     inputs = [
         (scene.meshes[c.mesh].position.astype(np.float64) @ c.stretch, scene.meshes[c.mesh].triangle)
         for c in cuts
@@ -154,7 +158,7 @@ def _lay_out(
             uv = place_uv(
                 outlines, int(slot), placements[slot], charts, page.packing, position, settings.resolution
             )
-            layout[filled[slot]] = (number, uv, float(density))
+            layout[filled[slot]] = (number, uv, float(density * shares[slot]))
     slots = {k: slot for slot, k in enumerate(filled)}
     layouts: list[InstanceLayout] = []
     n_charts = 0
@@ -228,15 +232,15 @@ def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArr
     return 1.0, np.round(0.5 * (root + root.T), digits) + 0.0
 
 
-def _rigid(mesh: Mesh, instance: Instance) -> RigidInstance:
-    """Return an instance that keeps the shape of its TEXCOORD_1."""
+def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
+    """Return an instance that keeps the shape of its TEXCOORD_1, at a share of the density."""
     uv = lightmap_uv(mesh)
     assert uv is not None
     wide = uv.astype(np.float64)
     used = wide[mesh.triangle].reshape(-1, 2)
     # Vertices no triangle uses may hold anything: they go to the corner.
     wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
-    factor = 1.0 / max(_per_metre(mesh, instance, uv), 1e-30)
+    factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
     return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from unwrap_truth import check_contract, least_gap, owner_maps, stretch
 
 from baker.core.atlas import Atlas
 from baker.core.errors import InputError
+from baker.core.scene import Material
 from baker.core.settings import make_settings
 from baker.unwrap import unwrap_scene
 
@@ -192,3 +194,36 @@ def test_an_instance_without_triangles_is_passed_over():
     empty = make_mesh(np.zeros((0, 3)), np.zeros((0, 3), int))
     atlas = unwrap(make_scene([empty, box_mesh()], [(0, place()), (1, place())]), resolution=64)
     assert [len(layout.triangle) for layout in atlas.layouts] == [0, 12]
+
+
+BLACK = (0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("material", "gives_way"),
+    [
+        (Material(base_colour=BLACK, emission=(9.0, 9.0, 9.0)), True),
+        (Material(base_colour=(1.0, 1.0, 1.0, 0.0), alpha_mode="BLEND"), True),
+        (Material(base_colour=BLACK), False),
+        (Material(base_colour=(1.0, 1.0, 1.0, 0.0)), False),
+        (Material(emission=(9.0, 9.0, 9.0)), False),
+    ],
+    ids=["black lamp", "invisible", "black", "opaque whatever its alpha", "lamp that reflects"],
+)
+def test_what_shows_no_light_leaves_the_page_to_the_rest(material, gives_way):
+    # A dome 100 times as wide as the box that it surrounds.
+    scene = make_scene([box_mesh(), box_mesh((100.0, 100.0, 100.0))], [(0, place()), (1, place())])
+    dome = replace(scene.meshes[1], material=scene.meshes[1].material + 1)
+    scene = replace(scene, meshes=(scene.meshes[0], dome), materials=(Material(), material))
+    atlas = unwrap(scene, resolution=256)
+    density = [layout.texels_per_metre for layout in atlas.layouts]
+    alone = unwrap(make_scene([box_mesh()], [(0, place())]), resolution=256).layouts[0].texels_per_metre
+    if gives_way:
+        assert density[0] > 0.9 * alone
+        # Stretch is told by the world's size, and the dome keeps at least a texel a face.
+        assert 0.0 < density[1] < 0.01 * density[0]
+    else:
+        assert density[0] == density[1] < 0.02 * alone
+    # A density that was asked for is kept.
+    dense = unwrap(scene, resolution=256, density=0.5)
+    assert [layout.texels_per_metre for layout in dense.layouts] == [0.5, 0.5]

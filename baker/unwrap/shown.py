@@ -1,0 +1,43 @@
+"""Which objects show none of the light that falls on them, and so need hardly a texel.
+
+A sky dome or a lamp with a black base colour shows its emission alone, and a hull of alpha 0 nothing at all.
+A dome around a level has thousands of times its area: with equal density it takes the whole page.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import Instance, Material, Scene
+
+# Share of the surface that such objects count for together, at most.
+_MOST = 0.05
+
+
+def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float64]:
+    """Return (N,) by what the density of each instance is multiplied where one page is filled: mostly 1."""
+    share = np.ones(len(instances))
+    blank = np.array([_shows_nothing(m) for m in scene.materials], bool)
+    hidden = np.array([bool(blank[scene.meshes[i.mesh].material].all()) for i in instances], bool)
+    if not hidden.any() or hidden.all():
+        return share
+    area = np.array([_area(scene, instance) for instance in instances])
+    most = _MOST / (1.0 - _MOST) * float(area[~hidden].sum())
+    share[hidden] = min(1.0, float(np.sqrt(most / max(float(area[hidden].sum()), 1e-300))))
+    return share
+
+
+def _shows_nothing(material: Material) -> bool:
+    """Tell whether a lightmap cannot be seen on a material: a black lamp, or nothing that is there."""
+    black = max(material.base_colour[:3]) <= 0.0 and max(material.emission) > 0.0
+    return black or (material.alpha_mode != "OPAQUE" and material.base_colour[3] <= 0.0)
+
+
+def _area(scene: Scene, instance: Instance) -> float:
+    """Return the area of an instance in the world, square metres."""
+    mesh = scene.meshes[instance.mesh]
+    position = mesh.position.astype(np.float64) @ instance.world_from_object[:3, :3].T
+    corner = position[mesh.triangle]
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return 0.5 * float(np.linalg.norm(cross, axis=1).sum())
