@@ -269,7 +269,7 @@ def light_directly(
         world.surface,
         world.mask,
         world.table,
-        scene.lights,
+        scene.local_lights,
         world.emitters,
         world.shading,
         world.rays.tracer,

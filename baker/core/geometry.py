@@ -5,7 +5,7 @@ Every instance is expanded: a triangle here is one that a ray can hit and that o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ class Geometry:
 
     Attributes
     ----------
-    position : (V, 3) float32, metres, world
+    position : (V, 3) float32, metres, world, relative to `origin`
     normal : (V, 3) float32, unit shading normals, world
     uv : (V, 2) float32, lightmap uv of the page, 0 to 1
     vertex_instance : (V,) int32
@@ -32,6 +32,7 @@ class Geometry:
     area : (T,) float32, m2
     page, instance, chart, material : (T,) int32
     double_sided : (T,) bool
+    origin : (3,) float64, metres, world: `Scene.origin`
     """
 
     position: NDArray[np.float32]
@@ -46,6 +47,7 @@ class Geometry:
     chart: NDArray[np.int32]
     material: NDArray[np.int32]
     double_sided: NDArray[np.bool_]
+    origin: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def diagonal(self) -> float:
@@ -55,7 +57,7 @@ class Geometry:
         return float(np.linalg.norm(self.position.max(axis=0) - self.position.min(axis=0)))
 
 
-def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
+def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | None = None) -> Geometry:
     """Place every instance in the world, with the lightmap uv of its layout.
 
     Parameters
@@ -63,11 +65,14 @@ def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
     scene : Scene
     atlas : Atlas
         One layout for each instance, in order.
+    origin : (3,) float64, optional
+        What positions are relative to, `scene.origin` by default.
 
     Returns
     -------
     Geometry
     """
+    origin = scene.origin if origin is None else origin
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}
     double_sided = np.array([m.double_sided for m in scene.materials], bool)
     start = 0
@@ -75,7 +80,9 @@ def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
         mesh = scene.meshes[instance.mesh]
         matrix = instance.world_from_object
         # Each mesh vertex once: vertices split at charts stay bitwise equal and rays find no gap.
-        position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+        # Far from 0 float32 has large steps: it begins when the origin has been subtracted.
+        shift = matrix[:3, 3] - origin
+        position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + shift).astype(np.float32)
         normal = mesh.normal.astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
         triangle = layout.triangle
@@ -96,7 +103,13 @@ def world_geometry(scene: Scene, atlas: Atlas) -> Geometry:
         name: np.concatenate(parts) if parts else _COLUMNS[name] for name, parts in columns.items()
     }
     face_normal, area = face_normals(data["position"], data["triangle"])
-    return Geometry(**data, face_normal=face_normal, area=area, double_sided=double_sided[data["material"]])
+    return Geometry(
+        **data,
+        face_normal=face_normal,
+        area=area,
+        double_sided=double_sided[data["material"]],
+        origin=origin,
+    )
 
 
 def face_normals(

@@ -7,7 +7,9 @@ Importers build it, nothing changes it. Meshes are shared by instances; world sp
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.limits import BRIGHTEST
+from baker.core.origin import scene_origin
 from baker.core.raw import RawScene
 
 # Metres; the square of a shorter range would leave float32.
@@ -240,6 +243,23 @@ class Scene:
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
     raw: RawScene | None = None
+
+    @cached_property
+    def origin(self) -> NDArray[np.float64]:
+        """Return what world positions of a bake are relative to, (3,) float64, metres; see `core.origin`."""
+        return scene_origin(self.meshes, self.instances)
+
+    @cached_property
+    def local_lights(self) -> tuple[PunctualLight, ...]:
+        """Return the lights with positions relative to `origin`."""
+        if not self.origin.any():
+            return self.lights
+        return tuple(replace(light, position=self.to_local(light.position)) for light in self.lights)
+
+    def to_local(self, position: Sequence[float]) -> tuple[float, float, float]:
+        """Return a world position (3,) relative to `origin`."""
+        x, y, z = (float(v) for v in np.asarray(position, np.float64) - self.origin)
+        return x, y, z
 
     @property
     def n_triangles(self) -> int:

@@ -134,7 +134,9 @@ def compare(
     for bake in (first, second):
         _check_pages(bake, names)
     pairs = pair_objects(first.scene, second.scene)
-    surfaces = [world_geometry(bake.scene, bake.atlas) for bake in (first, second)]
+    # Both relative to the same origin.
+    origin = first.scene.origin
+    surfaces = [world_geometry(bake.scene, bake.atlas, origin) for bake in (first, second)]
     sides = make_sides(surfaces[0], surfaces[1], first.scene, second.scene, pairs)
     report(progress, "compare", 0.0)
     owners = _owners(first, sides)
@@ -151,7 +153,7 @@ def compare(
         channels[name] = ChannelDifference(value, reference, np.zeros_like(value), found)
     owner = sides.a.instance[points.triangle]
     size = first.atlas.resolution
-    where = points.at(sides.a, "position")
+    where = points.at(sides.a, "position") + origin
     worst = worst_texels(first.scene.instances, size, pixel, owner, where, channels)
     worst = [entry for entry in worst if entry["error"] > 0]
     _add_places(worst, first, second, sides, pixel, other)

@@ -33,7 +33,7 @@ class Levels:
 
     Attributes
     ----------
-    position : (n, 3) float64, metres, world
+    position : (n, 3) float64, metres, relative to `Scene.origin`
     irradiance : (n,) float64, lx, brightest of RGB
     triangle : (n,) int64, the triangle of `World` each point lies on
     """
@@ -50,7 +50,7 @@ def estimate_levels(subject: Subject) -> Levels:
     position, normal, triangle = _spread(subject, POINTS, random)
     total = np.zeros((len(position), 3))
     origin = position + _OFFSET * subject.diagonal * normal
-    for light in subject.scene.lights:
+    for light in subject.scene.local_lights:
         if max(light.intensity) > 0:
             total += _punctual(subject, light, origin, normal)
     total += _emissive(subject, origin, normal, random)
@@ -181,7 +181,7 @@ def clips_half(subject: Subject) -> Iterator[Found]:
     if len(over):
         worst = over[levels.irradiance[over].argmax()]
         share = 100.0 * len(over) / len(levels.irradiance)
-        x, y, z = (float(v) for v in levels.position[worst])
+        x, y, z = (float(v) for v in levels.position[worst] + subject.scene.origin)
         most = levels.irradiance[worst]
         text = f"about {share:.2g}% of the surface gets more than 65504 lx, up to {most:.3g}"
         at = subject.raw.instances[subject.world.instance[levels.triangle[worst]]]
@@ -240,6 +240,6 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
             met = met or bool((hit >= 0).any())
         if not met:
             instance = subject.raw.instances[k]
-            x, y, z = (float(v) for v in world.position[world.triangle[own[0]]].mean(axis=0))
+            x, y, z = world.place_of(own[0])
             place = Place(instance.name, instance.node)
             yield Found("its emitting faces face away from everything", place, len(own), position=(x, y, z))

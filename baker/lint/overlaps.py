@@ -134,7 +134,7 @@ def coplanar_overlap(subject: Subject) -> Iterator[Found]:
         faces = world.face[chosen]
         shown = a if len(own) else b
         facts = subject.meshes[shown.mesh]
-        x, y, z = (float(v) for v in world.position[world.triangle[chosen[0]]].mean(axis=0))
+        x, y, z = world.place_of(chosen[0])
         some = "1 face lies" if len(chosen) == 1 else f"{len(chosen)} faces lie"
         hidden = b if len(own) else a
         yield Found(

@@ -21,7 +21,8 @@ class World:
 
     Attributes
     ----------
-    position : (V, 3) float32, metres, world
+    position : (V, 3) float32, metres, world, relative to `origin`
+    origin : (3,) float64, metres: `Scene.origin`
     triangle : (T, 3) int64
         Wound as the front is seen: nodes that mirror turn the winding over.
     instance : (T,) int64, index into the raw scene's instances
@@ -32,13 +33,14 @@ class World:
 
     def __init__(self, subject: Subject, threads: int) -> None:
         self.threads = threads
+        self.origin = subject.scene.origin
         position, triangle, instance, face, material = [], [], [], [], []
         start = 0
         for k, place in enumerate(subject.raw.instances):
             facts = subject.meshes[place.mesh]
             matrix = place.world_from_object
             with np.errstate(over="ignore", invalid="ignore"):
-                world = facts.position.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+                world = facts.position.astype(np.float64) @ matrix[:3, :3].T + (matrix[:3, 3] - self.origin)
             corner = facts.triangle[facts.good]
             if np.linalg.det(matrix[:3, :3]) < 0:
                 corner = corner[:, ::-1]
@@ -62,6 +64,12 @@ class World:
         length = np.sqrt(np.einsum("tx,tx->t", cross, cross))
         self.area: NDArray[np.float64] = 0.5 * length
         self.normal: NDArray[np.float64] = cross / np.maximum(length, 1e-300)[:, None]
+
+    def place_of(self, triangle: int) -> tuple[float, float, float]:
+        """Return the middle of a triangle, metres, world."""
+        middle = self.position[self.triangle[triangle]].mean(axis=0) + self.origin
+        x, y, z = (float(v) for v in middle)
+        return x, y, z
 
     @cached_property
     def rays(self) -> RayScene:

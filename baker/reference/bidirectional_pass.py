@@ -56,10 +56,10 @@ def picture_pass(
 ) -> None:
     """Add one pass of radiance through every pixel; see `radiance_pass`."""
     n, samples, number = width * height, estimate.samples, estimate.rounds
-    eye = np.array(camera.position)
+    eye = reference.local(camera.position)
     lens = np.array(
         [
-            *camera.position,
+            *eye,
             *camera.right,
             *camera.up,
             *camera.forward,

@@ -84,7 +84,7 @@ def build_lamps(
     triangle[:, AREA], triangle[:, TWO_SIDED] = found.row[:, 12], found.row[:, 13]
     triangle[:, RADIANCE : RADIANCE + 3] = found.row[:, 17:20]
     triangle[:, TEXTURED] = found.row[:, 20]
-    lights = [light for light in scene.lights if max(light.intensity) > 0 and light.kind in _KINDS]
+    lights = [light for light in scene.local_lights if max(light.intensity) > 0 and light.kind in _KINDS]
     disc = math.pi * (0.5 * geometry.diagonal) ** 2
     point = np.zeros((len(lights), 16))
     point_power = np.zeros(len(lights))

@@ -56,7 +56,7 @@ def radiance_pass(
         picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
         return
     counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
-    eye = np.array([[camera.position]])
+    eye = reference.local(camera.position)[None, None]
 
     def work(begin: int, end: int) -> None:
         pixel = np.arange(begin, end)

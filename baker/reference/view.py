@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import NamedTuple
@@ -48,6 +49,7 @@ class Reference:
     Attributes
     ----------
     geometry : Geometry
+        All that is traced is relative to its `origin`.
     shading : Shading
     surfaces : Surfaces
     lamps : LampTable
@@ -74,6 +76,10 @@ class Reference:
     ) -> None:
         """Release the ray tree."""
         self.close()
+
+    def local(self, position: Sequence[float]) -> NDArray[np.float64]:
+        """Return a world position (3,) relative to the geometry's origin."""
+        return np.asarray(position, np.float64) - self.geometry.origin
 
     def close(self) -> None:
         """Release the ray tree; nothing can be traced any more."""

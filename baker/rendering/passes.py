@@ -104,7 +104,7 @@ class Run:
         settings, camera = self.settings, self.camera
         pixel = np.arange(begin, end)
         way = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
-        return first_hits(self.reference, np.array(camera.position), way.reshape(-1, 3))
+        return first_hits(self.reference, self.reference.local(camera.position), way.reshape(-1, 3))
 
     def blocks(self, work: Callable[[int, int], None], progress: Progress) -> None:
         """Call `work(begin, end)` for all pixels, on all threads."""

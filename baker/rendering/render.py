@@ -145,9 +145,14 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
         return scene.cameras[0]
     position = reference.geometry.position
     low, high = position.min(axis=0).astype(float), position.max(axis=0).astype(float)
-    middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 1e-6)
+    middle, size = (
+        0.5 * (low + high) + reference.geometry.origin,
+        max(float(np.linalg.norm(high - low)), 1e-6),
+    )
     eye = middle + size * np.array([0.35, 0.3, 1.15])
-    numbers = ",".join(f"{value:.4g}" for value in (*eye, *middle, 45.0))
+    # Enough digits to see the difference of eye and target.
+    digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
+    numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(
         f"the scene holds no perspective camera; name one, for a view of all: --camera {numbers}",
         file=None if scene.path is None else str(scene.path),

@@ -208,7 +208,7 @@ def verify(
             )
             for name in names
         }
-        middle = places.position.mean(axis=1)
+        middle = places.position.mean(axis=1) + geometry.origin
         worst = worst_texels(bake.scene.instances, bake.atlas.resolution, pixel, owner, middle, channels)
         spare = None if settings.time_limit is None else _CROP_TIME * settings.time_limit
         crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)

@@ -71,6 +71,8 @@ def scene_data(bake: StoredBake) -> SceneData:
         "pages": bake.atlas.n_pages,
         "triangles": len(geometry.triangle),
         "box": {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()},
+        # What positions, the box and the camera are relative to: the world's 0 may be far away.
+        "origin": geometry.origin.tolist(),
         "camera": _camera(bake),
         "channels": [_channel(bake, name) for name in bake.maps],
         "status": np.bincount(bake.status.ravel(), minlength=len(TexelStatus)).tolist(),
@@ -167,7 +169,7 @@ def _camera(bake: StoredBake) -> dict[str, Any] | None:
         return None
     camera = bake.scene.cameras[0]
     return {
-        "position": list(camera.position),
+        "position": list(bake.scene.to_local(camera.position)),
         "forward": list(camera.forward),
         "fov": math.degrees(camera.fov),
     }

@@ -105,7 +105,7 @@ export function showPicked(body, { page, row, column, status, surface, values, c
     }
   }
   if (surface) {
-    add("Position", "position", surface.position.map((value) => value.toFixed(4)).join("  "), " m");
+    add("Position", "position", surface.world.map((value) => value.toFixed(4)).join("  "), " m");
     add("Lightmap uv", "uv", surface.uv.map((value) => value.toFixed(6)).join("  "));
     const made = surface.instance.kept ? "the file's own uv" : "unwrapped";
     add("Density", "density", `${short(surface.instance.density)} texels/m, ${made}`);

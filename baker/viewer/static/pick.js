@@ -1,6 +1,6 @@
 // Finds the surface under the mouse and the surface under a texel.
 
-/** Returns the first surface that a ray meets: {triangle, weights, position, uv}, or null. */
+/** Returns the first surface that a ray meets: {triangle, weights, position, world, uv}, or null. */
 export function pickRay(scene, images, { origin, direction }) {
   const hits = [];
   for (const group of scene.groups) {
@@ -42,6 +42,7 @@ export function colourAt(scene, images, { triangle, weights, material }) {
 }
 
 function surface(scene, triangle, weights) {
+  const position = blend(scene, "position", triangle, weights);
   const group = scene.groups.find(({ start, count }) => triangle >= start && triangle < start + count);
   return {
     triangle,
@@ -49,7 +50,9 @@ function surface(scene, triangle, weights) {
     material: scene.materials[group.material],
     page: group.page,
     instance: scene.instances[scene.arrays.instance[triangle]],
-    position: blend(scene, "position", triangle, weights),
+    position,
+    // Positions are relative to an origin among the scene's detail.
+    world: position.map((value, axis) => value + scene.origin[axis]),
     uv: blend(scene, "pageUv", triangle, weights),
   };
 }

@@ -1,0 +1,107 @@
+"""Rooms far from the world's origin are lit as they are at it, in the bake, the judge, pictures and diff."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import SceneBuilder
+
+from baker.core.settings import make_settings
+from baker.difference.compare import compare
+from baker.lint.light_levels import estimate_levels
+from baker.lint.subject import Subject
+from baker.pipeline import bake
+from baker.reference.camera import look_at
+from baker.reference.irradiance import new_estimate
+from baker.reference.radiance import radiance_pass
+from baker.reference.view import build_reference
+from baker.verification.verify import VerifySettings, verify
+
+# Whole numbers in binary, so that single precision can hold what the room's own coordinates are.
+FAR = np.array([131_072.0, 0.0, -65_536.0])
+SETTINGS = make_settings({
+    "resolution": 64, "uv": "keep", "padding": 2, "threads": 2, "samples": 32, "denoise": False,
+    "channels": ["irradiance", "ao"],
+})  # fmt: skip
+
+
+def room(at=None):
+    """Return a lit room with a crate; `at`: where its nodes stand."""
+    builder = SceneBuilder(64)
+    white = builder.material(0.6)
+    builder.box((-1, 0, -1), (1, 2, 1), white, 12, inward=True)
+    builder.box((-0.5, 0.0, -0.5), (-0.25, 0.5, -0.25), white, 6)
+    builder.quad((0.2, 1.9, 0.2), (0.25, 0, 0), (0, 0, 0.25), builder.material(0.0, 20.0), (3, 3))
+    builder.light("point", 0.5, position=(0.5, 1.0, -0.5), range=3.0)
+    scene = builder.build()
+    if at is None:
+        return scene
+    matrix = np.eye(4)
+    matrix[:3, 3] = at
+    light = scene.lights[0]
+    return replace(
+        scene,
+        instances=tuple(replace(i, world_from_object=matrix) for i in scene.instances),
+        lights=(replace(light, position=tuple(np.array(light.position) + at)),),
+    )
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Bake the room at the origin and far from it."""
+    place = tmp_path_factory.mktemp("far")
+    found = {"near": place / "near", "far": place / "far"}
+    found["results"] = [
+        bake(scene, settings=SETTINGS, out=found[name])
+        for name, scene in (("near", room()), ("far", room(FAR)))
+    ]
+    return found
+
+
+def test_the_maps_are_the_same(folders):
+    near, far = folders["results"]
+    for name in ("irradiance", "ao"):
+        one, two = near.lightmaps[name].value, far.lightmaps[name].value
+        assert one.max() > 0
+        # The origin of the far bake is a whole number of metres off: coordinates end in other bits.
+        covered = near.status == 1
+        away = np.abs(one - two)[covered] / one[covered].mean()
+        assert np.median(away) < 1e-4, name
+        assert np.quantile(away, 0.99) < 0.02, name
+
+
+def test_the_judge_finds_the_far_bake_right_and_says_where(folders):
+    found = verify(folders["far"], VerifySettings(texels=200, spp=64))
+    figures = found.channels["irradiance"].figures
+    assert abs(figures["bias"]) < 0.03
+    for entry in found.worst:
+        assert np.abs(np.array(entry["position"]) - FAR - (0, 1, 0)).max() <= 1.001
+
+
+def test_check_sees_the_light_where_it_is():
+    near, far = (estimate_levels(Subject(scene, SETTINGS)) for scene in (room(), room(FAR)))
+    np.testing.assert_allclose(far.irradiance.mean(), near.irradiance.mean(), rtol=1e-3)
+
+
+@pytest.mark.parametrize("estimator", ["mis", "bdpt"])
+def test_pictures_are_taken_from_cameras_in_the_world(estimator):
+    camera = look_at((0.9, 1.0, 0.9), (-0.3, 0.7, -0.3), 70.0)
+    seen = []
+    for at in (np.zeros(3), FAR):
+        moved = replace(camera, position=tuple(np.array(camera.position) + at))
+        with build_reference(room(at if at.any() else None), threads=2) as reference:
+            estimate = new_estimate(16 * 16, 3, 16)
+            radiance_pass(reference, estimate, moved, 16, 16, estimator=estimator)
+        seen.append(estimate.mean)
+    assert seen[0].mean() > 0.01
+    np.testing.assert_allclose(seen[1].mean(), seen[0].mean(), rtol=0.01)
+
+
+def test_diff_finds_the_far_surface(folders):
+    found = compare(folders["far"], folders["far"])
+    assert found.unmatched == 0
+    assert found.channels["irradiance"].figures["max"] == 0
+    moved = compare(folders["near"], folders["far"])
+    assert moved.channels["irradiance"].figures["median"] < 1e-3
