@@ -39,12 +39,15 @@ class Texture:
         uv_image = transform @ (u, v, 1): KHR_texture_transform.
     wrap : (str, str)
         "repeat", "mirror" or "clamp" along u and v.
+    nearest : bool
+        Magnified texels are squares and not interpolated.
     """
 
     image: NDArray[Any]
     texcoord: int = 0
     transform: NDArray[np.float64] = field(default_factory=lambda: np.eye(2, 3))
     wrap: tuple[str, str] = ("repeat", "repeat")
+    nearest: bool = False
 
 
 @dataclass(frozen=True)

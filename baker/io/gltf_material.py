@@ -24,6 +24,8 @@ DEFAULT_MATERIAL = Material(name="default")
 # Sets above this number are a broken file, not a mesh that somebody made.
 MOST_TEXCOORDS = 16
 _WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+# Values of a sampler's magFilter.
+_NEAREST, _LINEAR = 9728, 9729
 _ALPHA = ("OPAQUE", "MASK", "BLEND")
 
 
@@ -149,7 +151,7 @@ def _texture(
         )
     if texcoord >= MOST_TEXCOORDS:
         info.fail(f"set {texcoord} is not read; there may be {MOST_TEXCOORDS}", "texCoord")
-    return Texture(image, texcoord, transform, _wrap(document, texture))
+    return Texture(image, texcoord, transform, *_sampler(document, texture))
 
 
 def texture_transform(
@@ -174,9 +176,10 @@ def texture_transform(
     )
 
 
-def _wrap(document: GltfDocument, texture: JsonObject) -> tuple[str, str]:
+def _sampler(document: GltfDocument, texture: JsonObject) -> tuple[tuple[str, str], bool]:
+    """Return wrap modes along u and v, and whether magnified texels are not interpolated."""
     if "sampler" not in texture:
-        return ("repeat", "repeat")
+        return ("repeat", "repeat"), False
     samplers = document.root.children("samplers")
     sampler = samplers[texture.index("sampler", len(samplers), "samplers")]
     modes = []
@@ -185,7 +188,7 @@ def _wrap(document: GltfDocument, texture: JsonObject) -> tuple[str, str]:
         if code not in _WRAP:
             sampler.fail(f"{code} is not a wrap mode; known are {', '.join(map(str, _WRAP))}", key)
         modes.append(_WRAP[code])
-    return (modes[0], modes[1])
+    return (modes[0], modes[1]), sampler.integer("magFilter", _LINEAR) == _NEAREST
 
 
 def _image(

@@ -22,6 +22,7 @@ from baker.io.glb_pack import Json, Packer
 from baker.io.png import encode_png, srgb_levels
 
 _WRAP = {"repeat": 10497, "mirror": 33648, "clamp": 33071}
+_NEAREST = 9728
 
 
 def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], list[int]]:
@@ -161,6 +162,8 @@ def _texture(packer: Packer, texture: Texture, images: dict[int, int], extension
         document.setdefault("images", []).append({"bufferView": view, "mimeType": "image/png"})
         images[id(texture.image)] = len(document["images"]) - 1
     sampler = {"wrapS": _WRAP[texture.wrap[0]], "wrapT": _WRAP[texture.wrap[1]]}
+    if texture.nearest:
+        sampler["magFilter"] = _NEAREST
     samplers = document.setdefault("samplers", [])
     if sampler not in samplers:
         samplers.append(sampler)

@@ -22,6 +22,7 @@ from baker.kernels.emitters import (
     choose_emitter,
     emitted_radiance,
     emitter_density,
+    on_triangle,
 )  # fmt: skip
 from baker.kernels.hits import front_facing
 from baker.kernels.polygon_light import clear_light
@@ -221,9 +222,9 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                     if shading is not None:
                         # What is not there does not shine; rays that find an emitter know that already.
                         for lane in range(lanes if any_alpha else 0):
-                            there = _f(
-                                presence_at(shading, triangle[chosen[lane]], uv[lane], uv[LANES + lane])
-                            )
+                            m = chosen[lane]
+                            b1, b2 = on_triangle(row, m, uv[lane], uv[LANES + lane])
+                            there = _f(presence_at(shading, triangle[m], b1, b2))
                             weight[lane] *= there
                             weight[LANES + lane] *= there
                     if asked == 0:
@@ -245,7 +246,8 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                         for lane in range(lanes):
                             m = chosen[lane]
                             if on[lane] and row[m, TEXTURED] > _f(0.0):
-                                emitted_radiance(shading, triangle[m], uv[lane], uv[LANES + lane], radiance)
+                                b1, b2 = on_triangle(row, m, uv[lane], uv[LANES + lane])
+                                emitted_radiance(shading, triangle[m], b1, b2, radiance)
                                 for c in range(3):
                                     lamp[(14 + c) * LANES + lane] = radiance[c]
                     for c in range(3):

@@ -21,8 +21,9 @@ from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Columns of an emitter's row: three corners, face normal, area, 1 if two-sided, chance inside its cluster,
-# running sum of these chances, cluster, radiance without texture, 1 if textured.
-CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED = (
+# running sum of these chances, cluster, radiance without texture, 1 if the texture has to be looked up, and
+# which part of a triangle it is: barycentrics b1, b2 of corner 0 and size (negative: turned; 1: all of it).
+CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = (
     0,
     9,
     12,
@@ -32,17 +33,19 @@ CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED 
     16,
     17,
     20,
+    21,
 )
 ROW_LENGTH = 24
 _three = scratch((3,), np.float64)
 
 
 class Emitters(NamedTuple):
-    """M emissive triangles in C clusters.
+    """M emissive triangles, or parts of textured ones, in C clusters.
 
     row (M, 24) float32, see the column names; triangle (M,) int32, numbers in the scene, cluster
     after cluster; first (C + 1,) int32; centre (C, 3), radius (C,), power (C,), axis (C, 3) float32;
-    spread (C,) float32, radians, pi for clusters with two-sided triangles.
+    spread (C,) float32, radians, pi for clusters with two-sided triangles; node (K, 4) int32, see
+    `emitter_at`; root (T,) int32, what each triangle of the scene is, in the same code.
     """
 
     row: NDArray[np.float32]
@@ -53,12 +56,14 @@ class Emitters(NamedTuple):
     power: NDArray[np.float32]
     axis: NDArray[np.float32]
     spread: NDArray[np.float32]
+    node: NDArray[np.int32]
+    root: NDArray[np.int32]
 
 
 class Lamps(NamedTuple):
     """Emitters as a tile of texels samples them: `Emitters` with the chances of its clusters.
 
-    row, triangle, first: see `Emitters`; chance, cumulative (C,) float32.
+    row, triangle, first, node: see `Emitters`; chance, cumulative (C,) float32.
     """
 
     row: NDArray[np.float32]
@@ -66,6 +71,7 @@ class Lamps(NamedTuple):
     first: NDArray[np.int32]
     chance: NDArray[np.float32]
     cumulative: NDArray[np.float32]
+    node: NDArray[np.int32]
 
 
 def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
@@ -74,7 +80,7 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     cumulative = np.zeros_like(chance)
     if len(chance) and len(origin):
         cluster_chances(emitters, origin, chance, cumulative)
-    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative)
+    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node)
 
 
 def needed_shading(emitters: Emitters, shading: Any) -> Any:
@@ -201,6 +207,34 @@ def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore
     for a in range(3):
         point[a] = b0 * row[m, a] + b1 * row[m, 3 + a] + b2 * row[m, 6 + a]
     return m, density, b1, b2
+
+
+@inner
+def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
+    """Return the emitter at barycentrics of a triangle that is cut into parts, -1 where it is black.
+
+    code : what the triangle is: a row of `Emitters`, -1 for none, -2 - k for the four parts in node[k]: those
+        at the three corners, then the turned one in the middle, whose parts are of the same kinds
+    """
+    while code < -1:
+        k = -2 - code
+        b1, b2 = b1 + b1, b2 + b2
+        if b1 >= 1.0:
+            part, b1 = 1, b1 - np.float32(1.0)
+        elif b2 >= 1.0:
+            part, b2 = 2, b2 - np.float32(1.0)
+        elif b1 + b2 <= 1.0:
+            part = 0
+        else:
+            part, b1, b2 = 3, np.float32(1.0) - b1, np.float32(1.0) - b2
+        code = np.int64(node[k, part])
+    return code
+
+
+@inner
+def on_triangle(row, m, b1, b2):  # type: ignore[no-untyped-def]
+    """Return barycentrics of the scene's triangle from those of emitter m, which may be a part of it."""
+    return row[m, INSIDE] + row[m, INSIDE + 2] * b1, row[m, INSIDE + 1] + row[m, INSIDE + 2] * b2
 
 
 @inner

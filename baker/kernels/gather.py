@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from baker.kernels.area_light import emitter_hit
-from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance
+from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance, emitter_at
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.surface import N_POINTS
@@ -65,7 +65,7 @@ def gather(  # type: ignore[no-untyped-def]
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
-    lamp, chance, cumulative = lamps.row, lamps.chance, lamps.cumulative
+    lamp, chance, cumulative, node = lamps.row, lamps.chance, lamps.cumulative, lamps.node
     radiance = _rgba()
     # Sums of one point's samples are short: float32; those of all points are not.
     part, missed = _parts(), _floats()
@@ -113,8 +113,10 @@ def gather(  # type: ignore[no-untyped-def]
                 )  # fmt: skip
                 hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
                 i = group + lane
-                if row[prim, 12] >= _f(0.0) and exact[i] == 0:
-                    m = np.int64(row[prim, 12])
+                m = np.int64(row[prim, 12])
+                if m < -1 and exact[i] == 0:
+                    m = emitter_at(node, m, hit_u, hit_v)
+                if m >= 0 and exact[i] == 0:
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,
                         normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],

@@ -20,8 +20,8 @@ class HitTable(NamedTuple):
     """What is looked up at a hit.
 
     row (T, 16) float32, one cache line a triangle: lightmap uv of corner 0, its two edges (2 each), page,
-    1 if double-sided, face normal (3), area, emitter number or -1, material, two spare; size int, of a
-    page in texels; n_pixels int, of all pages: backs are numbered behind them.
+    1 if double-sided, face normal (3), area, emitter (see `emitters.emitter_at`) or -1, material, two spare;
+    size int, of a page in texels; n_pixels int, of all pages: backs are numbered behind them.
     """
 
     row: NDArray[np.float32]

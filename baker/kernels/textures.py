@@ -1,4 +1,4 @@
-"""Material textures packed for kernels: mip pyramids in one flat array, bilinear lookups.
+"""Material textures packed for kernels: mip pyramids in one flat array, bilinear or nearest lookups.
 
 Colours are averaged in linear light when the pyramid is made.
 Based on: Williams, Pyramidal parametrics, 1983; IEC 61966-2-1 (the sRGB curve).
@@ -24,7 +24,7 @@ class TexturePack(NamedTuple):
     """Linear RGBA of all textures.
 
     pixels (n, 4) float32; level (K, 16, 3) int64 rows of offset, width, height; n_levels (K,) int64;
-    wrap (K, 2) int64.
+    wrap (K, 3) int64: wrap mode along u and v, 1 if lookups take the nearest texel.
     """
 
     pixels: NDArray[np.float32]
@@ -56,20 +56,25 @@ def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
     return halved
 
 
-def pack_textures(images: Sequence[tuple[NDArray[Any], tuple[str, str]]]) -> TexturePack:
+def pack_textures(
+    images: Sequence[tuple[NDArray[Any], tuple[str, str]]], nearest: Sequence[bool] = ()
+) -> TexturePack:
     """Build the pyramids.
 
     Parameters
     ----------
     images : sequence of (image (H, W, 4) uint8 sRGB or float32 linear, (wrap u, wrap v))
+    nearest : sequence of bool, optional
+        Which of them `sample_texture` looks up without interpolation.
     """
     level = np.zeros((max(len(images), 1), MAX_LEVELS, 3), np.int64)
     n_levels = np.zeros(max(len(images), 1), np.int64)
-    wrap = np.zeros((max(len(images), 1), 2), np.int64)
+    wrap = np.zeros((max(len(images), 1), 3), np.int64)
+    wrap[: len(nearest), 2] = nearest
     parts: list[NDArray[np.float32]] = []
     offset = 0
     for k, (image, modes) in enumerate(images):
-        wrap[k] = [_WRAP[m] for m in modes]
+        wrap[k, :2] = [_WRAP[m] for m in modes]
         current = _linear_image(image)
         for n in range(MAX_LEVELS):
             level[k, n] = offset, current.shape[1], current.shape[0]
@@ -129,6 +134,8 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
     y0 = math.floor(y)
     fx = x - x0
     fy = y - y0
+    if pack.wrap[k, 2] != 0:
+        fx, fy = 1.0 if fx >= 0.5 else 0.0, 1.0 if fy >= 0.5 else 0.0
     for c in range(4):
         out[c] = 0.0
     for j in range(2):

@@ -2,11 +2,15 @@
 
     power = pi * area * mean luminance (twice that if two-sided)
 
+Textured triangles are cut into parts (`emissive_texture`), and each part has a row like a triangle. A part
+whose texture is constant, or too fine for the parts that there may be, shines with its exact mean.
+
 Based on: see `kernels.emitters`.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +22,7 @@ from baker.kernels.emitters import (
     CLUSTER,
     CORNER,
     CUMULATIVE,
+    INSIDE,
     NORMAL,
     RADIANCE,
     ROW_LENGTH,
@@ -25,19 +30,40 @@ from baker.kernels.emitters import (
     TEXTURED,
     TWO_SIDED,
     Emitters,
-    emitted_radiance,
 )  # fmt: skip
-from baker.trace.jit import kernel, scratch
+from baker.lights.emissive_texture import LUMINANCE, EmissiveTextures, cut
 
 # At most so many clusters are weighed for every tile of texels.
 MAX_CLUSTERS = 256
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# Points a side of the grid that averages a textured emission over a triangle.
-_GRID = 16
-_rgba = scratch((4,), np.float64)
+# Parts that all textured triangles together are cut into, beside what they were.
+MOST_PARTS = 32768
+# For clusters the parts of one triangle count as so many triangles at most.
+_CROWD = 64.0
+# A part counts as constant below the first variance over squared mean (a thousandth of its radiance). Above
+# the second it shines with its mean, too, if no parts are left to spend: samples of it would be mostly black.
+_CONSTANT, _SPARSE = 1.0e-6, 1.0
+# Parts at most a texel wide and this share of the scene's diagonal shine with their mean: nothing is so near
+# that the difference could be seen, and their noise would have to be sampled away.
+_SMALL = 1.0 / 128.0
 
 
-def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
+@dataclass(frozen=True)
+class _Pieces:
+    """Rows of the table to be: whole triangles, then parts.
+
+    triangle (m,) int64; inside (m, 3) float64, see `emissive_texture.Parts`; radiance (m, 3) float64, what
+    power is made of; textured (m,) bool; node (k, 4), root (T,) int32, see `Emitters`.
+    """
+
+    triangle: NDArray[np.int64]
+    inside: NDArray[np.float64]
+    radiance: NDArray[np.float64]
+    textured: NDArray[np.bool_]
+    node: NDArray[np.int32]
+    root: NDArray[np.int32]
+
+
+def build_emitters(geometry: Geometry, shading: Any, most_parts: int = MOST_PARTS) -> Emitters:
     """Find the triangles that emit and group them.
 
     Parameters
@@ -45,50 +71,139 @@ def build_emitters(geometry: Geometry, shading: Any) -> Emitters:
     geometry : Geometry
     shading : Shading
         Materials as kernels see them.
+    most_parts : int
+        Parts that textured triangles may be cut into, beside what they were.
     """
-    candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
-    material = geometry.material[candidate]
-    luminance = shading.emission[material].astype(np.float64) @ _LUMINANCE
-    textured = np.flatnonzero(shading.emission_texture[material] >= 0)
-    if len(textured):
-        mean = np.zeros(len(textured))
-        _mean_luminance(shading, candidate[textured], _LUMINANCE, mean)
-        luminance[textured] = mean
-    power = np.pi * geometry.area[candidate] * luminance
-    two_sided = geometry.double_sided[candidate]
+    piece = _find_pieces(geometry, shading, most_parts)
+    area = (geometry.area[piece.triangle] * piece.inside[:, 2] ** 2).astype(np.float32)
+    power = np.pi * area * (piece.radiance @ LUMINANCE)
+    two_sided = geometry.double_sided[piece.triangle]
     power = np.where(two_sided, 2.0 * power, power)
-    chosen = np.flatnonzero(power > 0)
-    triangle, power, two_sided = candidate[chosen], power[chosen], two_sided[chosen]
-    order = _spatial_order(geometry, triangle)
-    triangle, power, two_sided = triangle[order], power[order], two_sided[order]
-    n_clusters = min(len(triangle), MAX_CLUSTERS)
-    first = np.linspace(0, len(triangle), n_clusters + 1).round().astype(np.int32)
+    corner = _corners(geometry, piece)
+    order = _spatial_order(corner)
+    chosen = order[power[order] > 0]
+    triangle, power, two_sided, corner = (
+        piece.triangle[chosen],
+        power[chosen],
+        two_sided[chosen],
+        corner[chosen],
+    )
+    first = _cluster_bounds(triangle)
+    n_clusters = len(first) - 1
     cluster = np.repeat(np.arange(n_clusters, dtype=np.int32), np.diff(first))
     cluster_power = np.bincount(cluster, power, n_clusters)
     share = power / cluster_power[cluster]
     cumulative = np.cumsum(share) - np.arange(n_clusters)[cluster]
-    corner = geometry.position[geometry.triangle[triangle]]
     centre, radius, axis, spread = _bounds(corner, geometry.face_normal[triangle], two_sided, first)
     row = np.zeros((len(triangle), ROW_LENGTH), np.float32)
     row[:, CORNER : CORNER + 9] = corner.reshape(-1, 9)
     row[:, NORMAL : NORMAL + 3] = geometry.face_normal[triangle]
-    row[:, AREA] = geometry.area[triangle]
+    row[:, AREA] = area[chosen]
     row[:, TWO_SIDED] = two_sided
     row[:, SHARE] = share
     row[:, CUMULATIVE] = np.maximum(cumulative, 0)
     row[:, CLUSTER] = cluster
-    row[:, RADIANCE : RADIANCE + 3] = shading.emission[geometry.material[triangle]]
-    row[:, TEXTURED] = shading.emission_texture[geometry.material[triangle]] >= 0
+    textured = piece.textured[chosen]
+    factor = shading.emission[shading.material[triangle]] if len(triangle) else np.zeros((0, 3))
+    row[:, RADIANCE : RADIANCE + 3] = np.where(textured[:, None], factor, piece.radiance[chosen])
+    row[:, TEXTURED] = textured
+    row[:, INSIDE : INSIDE + 3] = piece.inside[chosen]
+    number = np.full(len(piece.triangle) + 1, -1, np.int32)
+    number[chosen] = np.arange(len(chosen))
+    # Codes of parts are their rows now; what has no power counts as black.
+    node, root = (
+        np.where(code >= -1, number[np.maximum(code, -1)], code).astype(np.int32)
+        for code in (piece.node, piece.root)
+    )
     return Emitters(
-        row, triangle.astype(np.int32), first, centre, radius, cluster_power.astype(np.float32), axis, spread
+        row,
+        triangle.astype(np.int32),
+        first,
+        centre,
+        radius,
+        cluster_power.astype(np.float32),
+        axis,
+        spread,
+        node,
+        root,
     )
 
 
-def _spatial_order(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Order triangles so that neighbours in space and facing follow each other; ties keep their order."""
-    if not len(triangle):
+def _find_pieces(geometry: Geometry, shading: Any, most_parts: int) -> _Pieces:
+    """List the triangles that emit, textured ones in parts."""
+    candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
+    material = geometry.material[candidate]
+    whole = np.tile([0.0, 0.0, 1.0], (len(candidate), 1))
+    radiance = shading.emission[material].astype(np.float64)
+    textured = shading.emission_texture[material] >= 0
+    root = np.full(len(geometry.triangle), -1, np.int32)
+    root[candidate] = np.arange(len(candidate))
+    if not textured.any():
+        return _Pieces(candidate, whole, radiance, textured, np.zeros((0, 4), np.int32), root)
+    image = candidate[textured]
+    parts = cut(
+        EmissiveTextures(shading, image),
+        geometry.area[image].astype(np.float64),
+        _SMALL * geometry.diagonal / _longest(geometry.position[geometry.triangle[image]]),
+        most_parts,
+    )
+    plain = candidate[~textured]
+    root[plain] = np.arange(len(plain))
+    # Where alpha is looked up, light and alpha belong to the same point: no part shines with its mean.
+    varied = (parts.spread > _CONSTANT) & (parts.spread <= _SPARSE)
+    if len(shading.alpha.slot):
+        varied |= shading.alpha.slot[image][parts.owner] >= 0
+    shift = np.int32(len(plain))
+    node = np.where(parts.node >= 0, parts.node + shift, parts.node).astype(np.int32)
+    root[image] = np.where(parts.root >= 0, parts.root + shift, parts.root)
+    return _Pieces(
+        np.concatenate([plain, image[parts.owner]]),
+        np.concatenate([whole[~textured], parts.inside]),
+        np.concatenate([radiance[~textured], parts.mean]),
+        np.concatenate([np.zeros(len(plain), bool), varied]),
+        node,
+        root,
+    )
+
+
+def _longest(corner: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the length (n,) of the longest edge of triangles (n, 3, 3)."""
+    edge = corner.astype(np.float64) - corner[:, [1, 2, 0]]
+    longest: NDArray[np.float64] = np.linalg.norm(edge, axis=2).max(axis=1)
+    return np.maximum(longest, 1e-300)
+
+
+def _corners(geometry: Geometry, piece: _Pieces) -> NDArray[np.float32]:
+    """Return the corners (m, 3, 3) of triangles and parts, metres."""
+    corner = geometry.position[geometry.triangle[piece.triangle]]
+    part = np.flatnonzero(piece.inside[:, 2] != 1.0)
+    if len(part):
+        whole, inside = corner[part].astype(np.float64), piece.inside[part]
+        edge = whole[:, 1:] - whole[:, :1]
+        at = whole[:, 0] + np.einsum("mk,mka->ma", inside[:, :2], edge)
+        step = inside[:, 2, None] * edge.transpose(1, 0, 2)
+        corner[part] = np.stack([at, at + step[0], at + step[1]], axis=1)
+    return corner
+
+
+def _cluster_bounds(triangle: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Return where clusters (C + 1,) begin among emitters in spatial order, and the end of the last."""
+    n = len(triangle)
+    n_clusters = min(n, MAX_CLUSTERS)
+    _, which, count = np.unique(triangle, return_inverse=True, return_counts=True)
+    if not n or count.max() == 1:
+        return np.linspace(0, n, n_clusters + 1).round().astype(np.int32)
+    # A screen of a thousand parts must not leave other lamps without clusters of their own.
+    weight = np.cumsum(np.minimum(_CROWD / count, 1.0)[which.reshape(-1)])
+    bound = np.searchsorted(weight, np.linspace(0, weight[-1], n_clusters + 1)[1:-1])
+    return np.unique(np.concatenate([[0], bound, [n]])).astype(np.int32)
+
+
+def _spatial_order(corner: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Order triangles so that neighbours in space follow each other; ties keep their order."""
+    if not len(corner):
         return np.zeros(0, np.int64)
-    centre = geometry.position[geometry.triangle[triangle]].mean(axis=1).astype(np.float64)
+    centre = corner.mean(axis=1).astype(np.float64)
     low = centre.min(axis=0)
     cell = ((centre - low) / max(float(np.ptp(centre, axis=0).max()), 1e-12) * 1023.0).astype(np.int64)
     key = np.zeros(len(cell), np.int64)
@@ -119,20 +234,3 @@ def _bounds(
             axis[c] = mean / length
             spread[c] = np.arccos(np.clip((normal[span] @ axis[c]).min(), -1.0, 1.0)) + 1e-3
     return centre, radius, axis, spread
-
-
-@kernel
-def _mean_luminance(shading, chosen, weights, out):  # type: ignore[no-untyped-def]
-    """Average the luminance that textured triangles emit over a grid of points."""
-    radiance = _rgba()
-    for i in range(len(chosen)):
-        t = chosen[i]
-        total = 0.0
-        for a in range(_GRID):
-            for b in range(_GRID):
-                u, v = (a + 0.5) / _GRID, (b + 0.5) / _GRID
-                if u + v > 1.0:
-                    u, v = 1.0 - u, 1.0 - v
-                emitted_radiance(shading, t, u, v, radiance)
-                total += radiance[0] * weights[0] + radiance[1] * weights[1] + radiance[2] * weights[2]
-        out[i] = total / (_GRID * _GRID)

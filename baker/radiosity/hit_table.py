@@ -22,7 +22,6 @@ def build_hit_table(geometry: Geometry, texels: TexelBuffer, emitters: Emitters)
     row[:, 7] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, 8:11] = geometry.face_normal
     row[:, 11] = geometry.area
-    row[:, 12] = -1
-    row[emitters.triangle, 12] = np.arange(len(emitters.triangle))
+    row[:, 12] = emitters.root
     row[:, 13] = geometry.material
     return HitTable(row, texels.resolution, len(texels.lookup))

@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from baker.kernels.emitters import emitter_at
 from baker.kernels.tint import follow_packet, light_kept, trace_shadow_packet
 from baker.reference.bidirectional_lamps import (
     aim_both_ways,
@@ -42,7 +43,7 @@ from baker.reference.bidirectional_weights import (
     towards_lamp,
 )
 from baker.reference.bsdf import N_PARAMETERS, bsdf_sample
-from baker.reference.lamps import SHORT
+from baker.reference.lamps import SHORT, on_whole_triangle
 from baker.reference.lamps import TEXTURED as GLOWS
 from baker.reference.randomness import draw, path_state, stratum
 from baker.reference.vertex import (
@@ -64,7 +65,7 @@ from baker.reference.vertex import (
     paint,
     start_path,
 )
-from baker.reference.view import EMITTER, TEXTURED
+from baker.reference.view import EMITTER, SHINES, TEXTURED
 from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
@@ -235,7 +236,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
         surfaces.least,
         surfaces.lambertian,
     )
-    triangle, point, number = lamps.triangle, lamps.point, lamps.number
+    triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
     cumulative, sky = lamps.cumulative, lamps.sky
     alpha = len(shading.alpha.slot) > 0
     strata, most_bounces, seed, number_of_pass = how[2], how[4], how[5], how[6]
@@ -275,7 +276,8 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                     if lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
                         for c in range(3):
                             value[c] = path[BETA + c, lane]
-                        glow(shading, number[lamp], spot[0], spot[1], value, rgba, True)
+                        u, v = on_whole_triangle(triangle, lamp, spot[0], spot[1])
+                        glow(shading, number[lamp], u, v, value, rgba, True)
                         for c in range(3):
                             path[BETA + c, lane] = value[c]
                     inverse_range[lane] = range_of_lamp(point, lamp, len(triangle))
@@ -327,10 +329,13 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                         path, lane, np.float64(floats[TFAR * width + lane]),
                         MOST_FROM_LAMP if eye[lane] else 1,
                     )  # fmt: skip
-                    if eye[lane] and surface[prim, EMITTER] >= 0.0:
-                        e = np.int64(surface[prim, EMITTER])
-                        meet_emitter(path, lane, triangle, e, seen, value)
-                        if triangle[e, GLOWS] > 0.0:
+                    if eye[lane] and surface[prim, SHINES] > 0.0:
+                        e = emitter_at(
+                            node, np.int64(surface[prim, EMITTER]),
+                            floats[HIT_U * width + lane], floats[HIT_V * width + lane],
+                        )  # fmt: skip
+                        meet_emitter(path, lane, surface, prim, triangle, e, seen, value)
+                        if surface[prim, SHINES] > 1.0:
                             glow(shading, prim, u, v, value, rgba, False)
                         for c in range(3):
                             path[LIGHT + c, lane] += value[c]
@@ -377,7 +382,8 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                             way,
                         )  # fmt: skip
                         if 0 <= lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
-                            glow(shading, number[lamp], way[4], way[5], value, rgba, True)
+                            u, v = on_whole_triangle(triangle, lamp, way[4], way[5])
+                            glow(shading, number[lamp], u, v, value, rgba, True)
                         found = lamp >= 0
                 elif step < count[lane]:
                     more = more or step + 1 < count[lane]

@@ -48,6 +48,8 @@ from baker.reference.lamps import (
 )
 from baker.reference.lamps import NORMAL as LAMP_NORMAL
 from baker.reference.vertex import BETA, DENSITY, GO, NORMAL, PLACE, place_off
+from baker.reference.view import EMISSION, FACE
+from baker.reference.view import TWO_SIDED as SURFACE_TWO_SIDED
 from baker.trace.jit import inner
 
 _INV_4_PI = 0.25 / math.pi
@@ -267,23 +269,31 @@ def emission_density(triangle, e):  # type: ignore[no-untyped-def]
 
 
 @inner
-def meet_emitter(path, lane, triangle, e, seen, value):  # type: ignore[no-untyped-def]
-    """Write to `value` (3,) what emitter e, which the eye's subpath has met, sends along the path, weighed.
+def meet_emitter(path, lane, surface, prim, triangle, e, seen, value):  # type: ignore[no-untyped-def]
+    """Write to `value` (3,) what triangle prim, met by the eye's subpath, sends along the path, weighed.
 
+    Its texture is not looked up yet.
+
+    e : emitter that it is there, -1 if no lamp's subpath starts there
     seen : whether the path comes straight from a camera: nothing else makes such a path
     """
-    cosine = lamp_cosine(triangle, e, path[GO, lane], path[GO + 1, lane], path[GO + 2, lane])
     value[0] = value[1] = value[2] = 0.0
+    cosine = -(
+        path[GO, lane] * surface[prim, FACE]
+        + path[GO + 1, lane] * surface[prim, FACE + 1]
+        + path[GO + 2, lane] * surface[prim, FACE + 2]
+    )
+    cosine = abs(cosine) if surface[prim, SURFACE_TWO_SIDED] > 0.0 else cosine
     if cosine <= 0.0:
         return
     weight = 1.0
-    if not seen:
+    if not seen and e >= 0:
         density = triangle[e, CHANCE] / triangle[e, AREA]
         onward = emission_density(triangle, e) * cosine
         others = path[OPEN, lane] + onward * path[CHAIN + MOST_FROM_LAMP - 1, lane]
         weight = 1.0 / (1.0 + density * path[INVERSE, lane] * others)
     for c in range(3):
-        value[c] = path[BETA + c, lane] * triangle[e, RADIANCE + c] * weight
+        value[c] = path[BETA + c, lane] * surface[prim, EMISSION + c] * weight
 
 
 @inner

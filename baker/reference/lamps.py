@@ -24,8 +24,11 @@ from baker.shading.materials import Shading
 from baker.trace.jit import inner
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# Columns of an emissive triangle: three corners, face normal, area, two-sided, chance, radiance, textured.
-CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED = 0, 9, 12, 13, 14, 15, 18
+# Columns of an emissive triangle or part of one: three corners, face normal, area, two-sided, chance,
+# radiance without texture, textured, which part it is (see `kernels.emitters`).
+CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED, INSIDE = 0, 9, 12, 13, 14, 15, 18, 19
+# Parts that textured triangles may be cut into: more than in bakes, as each point's radiance is looked up.
+MOST_PARTS = 131072
 # Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer
 # cosine, one over the cone's width, chance, 1 / range^2 (0 without a range).
 KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE, INVERSE_RANGE = 0, 1, 4, 7, 10, 11, 12, 13
@@ -45,16 +48,18 @@ SHORT = 0.9999
 class LampTable(NamedTuple):
     """Lamps in the order triangles, lights without area, sky.
 
-    triangle (E, 20), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
-    emitter (T,) int32, row of a scene triangle in `triangle` or -1; cumulative (E + P + 1,) float64, last 1
-    (0 if nothing emits); sky (4,) float64: radiance, chance; every (E + P + 1, 20) float32, all lamps alike,
-    see the column names; glows int: 1 if any has a texture.
+    triangle (E, 24), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
+    emitter (T,) int32, what of `triangle` a scene triangle is, in the code of `kernels.emitters.emitter_at`;
+    node (K, 4) int32, see there; cumulative (E + P + 1,) float64, last 1 (0 if nothing emits); sky (4,)
+    float64: radiance, chance; every (E + P + 1, 20) float32, all lamps alike, see the column names; glows
+    int: 1 if any has a texture.
     """
 
     triangle: NDArray[np.float64]
     point: NDArray[np.float64]
     number: NDArray[np.int32]
     emitter: NDArray[np.int32]
+    node: NDArray[np.int32]
     cumulative: NDArray[np.float64]
     sky: NDArray[np.float64]
     every: NDArray[np.float32]
@@ -70,7 +75,7 @@ def build_lamps(
     ----------
     sky : radiance of the constant sky, cd/m2, linear Rec.709
     """
-    found = build_emitters(geometry, shading)
+    found = build_emitters(geometry, shading, MOST_PARTS)
     n = len(found.triangle)
     # `build_emitters` shares a cluster's power out among its triangles.
     power = (
@@ -78,12 +83,15 @@ def build_lamps(
         if n
         else np.zeros(0)
     )
-    triangle = np.zeros((n, 20))
+    triangle = np.zeros((n, 24))
     triangle[:, CORNER : CORNER + 9] = found.row[:, :9]
     triangle[:, NORMAL : NORMAL + 3] = found.row[:, 9:12]
     triangle[:, AREA], triangle[:, TWO_SIDED] = found.row[:, 12], found.row[:, 13]
-    triangle[:, RADIANCE : RADIANCE + 3] = found.row[:, 17:20]
-    triangle[:, TEXTURED] = found.row[:, 20]
+    # `build_emitters` says where to aim; what shines there is looked up in the material itself.
+    material = geometry.material[found.triangle]
+    triangle[:, RADIANCE : RADIANCE + 3] = shading.emission[material]
+    triangle[:, TEXTURED] = shading.emission_texture[material] >= 0
+    triangle[:, INSIDE : INSIDE + 3] = found.row[:, 21:24]
     lights = [light for light in scene.local_lights if max(light.intensity) > 0 and light.kind in _KINDS]
     disc = math.pi * (0.5 * geometry.diagonal) ** 2
     point = np.zeros((len(lights), 16))
@@ -104,15 +112,13 @@ def build_lamps(
     chance = _chances(every, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(lights) + 1))])
     triangle[:, CHANCE] = chance[:n]
     point[:, POINT_CHANCE] = chance[n:-1]
-    emitter = np.full(len(geometry.triangle), -1, np.int32)
-    emitter[found.triangle] = np.arange(n, dtype=np.int32)
     cumulative = np.cumsum(chance)
     if cumulative[-1] > 0:
         cumulative /= cumulative[-1]
     last = np.array([*sky, chance[-1]])
     glows = int((triangle[:, TEXTURED] > 0).any())
     every = all_alike(triangle, point, last)
-    return LampTable(triangle, point, found.triangle, emitter, cumulative, last, every, glows)
+    return LampTable(triangle, point, found.triangle, found.root, found.node, cumulative, last, every, glows)
 
 
 def all_alike(
@@ -182,6 +188,13 @@ def aim_at_triangle(triangle, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     dz = (1.0 - b1 - b2) * triangle[e, 2] + b1 * triangle[e, 5] + b2 * triangle[e, 8] - z
     density = triangle_density(triangle, e, dx, dy, dz)
     return dx, dy, dz, density, b1, b2
+
+
+@inner
+def on_whole_triangle(triangle, e, b1, b2):  # type: ignore[no-untyped-def]
+    """Return barycentrics of the scene's triangle from those of emitter e, which may be a part of it."""
+    size = triangle[e, INSIDE + 2]
+    return triangle[e, INSIDE] + size * b1, triangle[e, INSIDE + 1] + size * b2
 
 
 @inner

@@ -16,10 +16,9 @@ import math
 
 import numpy as np
 
+from baker.kernels.emitters import emitter_at
 from baker.reference.bsdf import N_PARAMETERS, WIDTH
-from baker.reference.lamps import RADIANCE, pick_lamp, triangle_density
-from baker.reference.lamps import TEXTURED as GLOWS
-from baker.reference.lamps import TWO_SIDED as LAMP_TWO_SIDED
+from baker.reference.lamps import on_whole_triangle, pick_lamp, triangle_density
 from baker.reference.lane_vertex import aim_lanes, arrive_lanes, scatter_lanes, stand_lanes
 from baker.reference.lanes import (
     ALBEDO,
@@ -75,7 +74,7 @@ from baker.reference.vertex import (
     scatter,
     start_path,
 )
-from baker.reference.view import EMITTER, FACE, MATERIAL, TEXTURED, TWO_SIDED
+from baker.reference.view import EMISSION, EMITTER, FACE, MATERIAL, SHINES, TEXTURED, TWO_SIDED
 from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
@@ -90,30 +89,34 @@ _new_lamp, _new_filled = scratch((LANES,), np.int64), scratch((BINS,), np.int64)
 
 
 @inner
-def see_emitter(s, base, lane, surface, triangle, prim, mode, power, value):  # type: ignore[no-untyped-def]
+def see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value):  # type: ignore[no-untyped-def]
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
     Its texture is not looked up yet.
     """
     value[0] = value[1] = value[2] = 0.0
-    e = np.int64(surface[prim, EMITTER])
     dx, dy, dz = (
         s[base + DIR_X * LANES + lane],
         s[base + DIR_Y * LANES + lane],
         s[base + DIR_Z * LANES + lane],
     )
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
-    if facing >= 0.0 and triangle[e, LAMP_TWO_SIDED] == 0.0:
+    if facing >= 0.0 and surface[prim, TWO_SIDED] == 0.0:
         return
     weight = 1.0
     if s[base + DENSITY * LANES + lane] > _f(0.0) and mode > 0:
         if mode == 1:
             return
-        distance = np.float64(s[base + TFAR * LANES + lane])
-        other = triangle_density(triangle, e, dx * distance, dy * distance, dz * distance)
+        distance, other = np.float64(s[base + TFAR * LANES + lane]), 0.0
+        e = emitter_at(
+            node, np.int64(surface[prim, EMITTER]),
+            s[base + HIT_U * LANES + lane], s[base + HIT_V * LANES + lane],
+        )  # fmt: skip
+        if e >= 0:
+            other = triangle_density(triangle, e, dx * distance, dy * distance, dz * distance)
         weight = heuristic(np.float64(s[base + DENSITY * LANES + lane]), other, power)
     for c in range(3):
-        value[c] = s[base + (BETA + c) * LANES + lane] * triangle[e, RADIANCE + c] * weight
+        value[c] = s[base + (BETA + c) * LANES + lane] * np.float64(surface[prim, EMISSION + c]) * weight
 
 
 @inner
@@ -260,7 +263,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
         surfaces.least,
         surfaces.lambertian,
     )
-    triangle, point, number = lamps.triangle, lamps.point, lamps.number
+    triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
     cumulative, sky, every = lamps.cumulative, lamps.sky, lamps.every
     # What has to be looked up: alpha or emission of lamps, colours of surfaces.
     glows = len(shading.alpha.slot) > 0 or lamps.glows != 0
@@ -324,9 +327,9 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                     s[base + ALIVE * LANES + lane] = _f(0.0)
                     continue
                 prim = np.int64(words[base + PRIM_ID * LANES + lane])
-                if surface[prim, EMITTER] >= _f(0.0):
-                    see_emitter(s, base, lane, surface, triangle, prim, mode, power, value)
-                    if triangle[np.int64(surface[prim, EMITTER]), GLOWS] > 0.0:
+                if surface[prim, SHINES] > _f(0.0):
+                    see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value)
+                    if surface[prim, SHINES] > _f(1.0):
                         u = np.float64(s[base + HIT_U * LANES + lane])
                         v = np.float64(s[base + HIT_V * LANES + lane])
                         glow(shading, prim, u, v, value, rgba, False)
@@ -401,6 +404,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                             np.float64(s[base + B1 * LANES + lane]),
                             np.float64(s[base + B2 * LANES + lane]),
                         )
+                        u, v = on_whole_triangle(triangle, e, u, v)
                         glow(shading, number[e], u, v, value, rgba, True)
                         for c in range(3):
                             s[base + (VALUE + c) * LANES + lane] = value[c]

@@ -21,8 +21,19 @@ from baker.trace.embree import RayScene
 from baker.trace.packets import aligned_floats
 
 # Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
-# emitter (or -1), 1 if a texture or a vertex colour changes what the material says.
-CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED = 0, 9, 18, 21, 22, 23, 24
+# what it is as a lamp (`LampTable.emitter`), 1 if a texture or a vertex colour changes what the material
+# says, radiance without texture, and whether it emits: 0 no, 1 yes, 2 with a texture.
+CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES = (
+    0,
+    9,
+    18,
+    21,
+    22,
+    23,
+    24,
+    25,
+    28,
+)
 # Two cache lines.
 ROW_LENGTH = 32
 
@@ -157,6 +168,10 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     row[:, MATERIAL] = material
     row[:, TWO_SIDED] = geometry.double_sided
     row[:, EMITTER] = lamps.emitter
+    row[:, EMISSION : EMISSION + 3] = shading.emission[material]
+    # Not asked of the lamps: light that aiming forgets is found by rays that hit it.
+    emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
+    row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
     painted = shading.base_texture >= 0
     if not lambertian:
         painted = painted | (shading.reflection_texture >= 0)

@@ -16,9 +16,8 @@ from baker.io.bake_folder import SCENE_NAME, StoredBake, read_bake
 from baker.io.fingerprint import scene_sha256
 from baker.io.load import load_scene
 from baker.reference.first_hit import FirstHits
-from baker.reference.lamps import RADIANCE
 from baker.reference.vertex import glow
-from baker.reference.view import Reference
+from baker.reference.view import EMISSION, SHINES, Reference
 from baker.trace.jit import kernel, scratch
 from baker.trace.kernel_cache import keep_kernels
 
@@ -64,24 +63,22 @@ class BakedLight:
         uv = np.einsum("nk,nka->na", weight, self.geometry.uv[self.geometry.triangle[triangle]].astype(float))
         irradiance = bilinear(self.bake.maps["irradiance"], self.geometry.page[triangle], uv)
         light[lit] = hits.albedo[lit] * irradiance / math.pi
-        emitter = reference.lamps.emitter[hits.triangle]
-        glowing = np.flatnonzero(hits.lit & (emitter >= 0))
-        add_emission(
-            glowing, emitter, reference.lamps.triangle, hits.triangle, hits.bary, reference.shading, light
-        )
+        surface = reference.surfaces.row
+        glowing = np.flatnonzero(hits.lit & (surface[hits.triangle, SHINES] > 0))
+        add_emission(glowing, surface, hits.triangle, hits.bary, reference.shading, light)
         return light
 
 
 @kernel
-def add_emission(chosen, emitter, lamp, triangle, bary, shading, light):  # type: ignore[no-untyped-def]
+def add_emission(chosen, surface, triangle, bary, shading, light):  # type: ignore[no-untyped-def]
     """Add what emitters send from hits `chosen` (m,) to `light` (n, 3).
 
-    emitter, triangle : (n,) row of `lamp` (`LampTable.triangle`) and triangle of each hit; bary : (n, 2)
+    surface : `Surfaces.row`; triangle : (n,) triangle of each hit; bary : (n, 2)
     """
     value, rgba = _new_value(), _new_rgba()
     for i in chosen:
         for c in range(3):
-            value[c] = lamp[emitter[i], RADIANCE + c]
+            value[c] = surface[triangle[i], EMISSION + c]
         glow(shading, triangle[i], bary[i, 0], bary[i, 1], value, rgba, False)
         for c in range(3):
             light[i, c] += value[c]

@@ -59,23 +59,27 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
         Also resolve metallic and roughness textures, which bakes do not look at.
     """
     images: list[tuple[NDArray[np.generic], tuple[str, str]]] = []
-    numbers: dict[tuple[int, tuple[str, str], bool], int] = {}
+    nearest: list[bool] = []
+    numbers: dict[tuple[int, tuple[str, str], bool, bool], int] = {}
 
-    def number(texture: Texture | None, linear: bool = False) -> int:
+    def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
         if texture is None:
             return -1
-        key = (id(texture.image), texture.wrap, linear)
+        # What reflects is looked up smoothly whatever the sampler says: nobody would see a difference.
+        sharp = sharp and texture.nearest
+        key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:
             numbers[key] = len(images)
             plain = texture.image.dtype == np.uint8 and linear
             images.append((texture.image / np.float32(255) if plain else texture.image, texture.wrap))
+            nearest.append(sharp)
         return numbers[key]
 
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
-    emission_texture = np.array([number(m.emission_texture) for m in scene.materials], np.int32)
+    emission_texture = np.array([number(m.emission_texture, sharp=True) for m in scene.materials], np.int32)
     glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]
     reflection_texture = np.array([number(texture, linear=True) for texture in glossy], np.int32)
-    pack = pack_textures(images)
+    pack = pack_textures(images, nearest)
     base_uv = corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
         pack=pack,

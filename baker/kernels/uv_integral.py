@@ -1,0 +1,341 @@
+"""Exact means of a texture over triangles in its uv space, at any size: one texel's corner or many repeats.
+
+    integral of f over a triangle = closed integral of F(x, y) dy along its edges,   dF / dx = f     (Green)
+
+Between two texel borders F is a polynomial of degree 3 at most along an edge: Simpson's rule is exact there.
+F comes from running sums of each row of texels. The cost is that of the texels that the *edges* cross.
+
+Based on: Green's theorem; Crow, Summed-area tables for texture mapping, 1984 (the running sums).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
+
+# Running sums are kept for every so many texels of a row; the rest is added up when it is asked for.
+BLOCK = 32
+# Columns of what is integrated: red, green, blue, sum of their weighted squares.
+N_SUMS = 4
+# Triangles with less area than this share of their longest edge's square are integrated along that edge.
+_THIN = 1.0e-9
+# Cells a side of the uv box up to which the variation of a bilinear texture is measured at points.
+_FEW_CELLS = 3.0
+# What cancels to this share of the terms is rounding: the triangle is black.
+_ROUNDING = 1.0e-12
+# The spread of a triangle that is lit where no measured point lies.
+_UNSEEN = 15.0
+_four, _prefix, _texel = scratch((4,), np.float64), scratch((4,), np.float64), scratch((4,), np.float64)
+_row_terms = scratch((2, 3, 4), np.float64)
+_corner_memory, _totals, _sizes = (scratch(shape, np.float64) for shape in ((3, 2), (4,), (4,)))
+
+
+class RowSums(NamedTuple):
+    """Running sums along the rows of one texture's finest level.
+
+    block (H, W // 32 + 1, 4) float64: sums of the texels before each 32nd; weight (3,) float64: factor of
+    each channel in the sum of squares; texture int, number in the pack.
+    """
+
+    block: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    texture: int
+
+
+@kernel
+def fill_row_sums(pixels, offset, weight, block):  # type: ignore[no-untyped-def]
+    """Fill `block` (see `RowSums`) with the sums of w texels a row from `pixels[offset]` on.
+
+    The order of additions is that of `_sum_before`, so black texels change no bit of a sum.
+    """
+    h, n_blocks = block.shape[0], block.shape[1]
+    w = len(pixels) // h
+    sums = _four()
+    for j in range(h):
+        for c in range(4):
+            sums[c] = 0.0
+        for i in range(w):
+            if i % BLOCK == 0:
+                for c in range(4):
+                    block[j, i // BLOCK, c] = sums[c]
+            _add_texel(pixels, offset + j * w + i, weight, sums)
+        if w % BLOCK == 0:
+            for c in range(4):
+                block[j, n_blocks - 1, c] = sums[c]
+
+
+@inner
+def _add_texel(pixels, at, weight, sums):  # type: ignore[no-untyped-def]
+    square = 0.0
+    for c in range(3):
+        value = np.float64(pixels[at, c])
+        sums[c] += value
+        square += weight[c] * value * value
+    sums[3] += square
+
+
+@inner
+def _sum_before(pixels, w, weight, block, j, i, out):  # type: ignore[no-untyped-def]
+    """Write the sums of texels 0 to i (0 <= i <= w) of row j."""
+    b = i // BLOCK
+    for c in range(4):
+        out[c] = block[j, b, c]
+    for k in range(b * BLOCK, i):
+        _add_texel(pixels, j * w + k, weight, out)
+
+
+@inner
+def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
+    if mode == 0:
+        return i % n
+    if mode == 1:
+        j = i % (2 * n)
+        return j if j < n else 2 * n - 1 - j
+    return smaller(larger(i, 0), n - 1)
+
+
+@inner
+def _read(pixels, w, weight, j, i, out):  # type: ignore[no-untyped-def]
+    for c in range(4):
+        out[c] = 0.0
+    _add_texel(pixels, j * w + i, weight, out)
+
+
+@inner
+def _running(pixels, w, weight, block, mode, j, i, out, spare):  # type: ignore[no-untyped-def]
+    """Write the sums of row j from texel 0 to any whole number i, continued by the wrap mode."""
+    if mode == 2:
+        inside = smaller(larger(i, 0), w)
+        _sum_before(pixels, w, weight, block, j, inside, out)
+        if i != inside:
+            _read(pixels, w, weight, j, 0 if i < 0 else w - 1, spare)
+            for c in range(4):
+                out[c] += (i - inside) * spare[c]
+        return
+    period = w if mode == 0 else 2 * w
+    turns = i // period
+    rest = i - turns * period
+    back = rest > w
+    _sum_before(pixels, w, weight, block, j, 2 * w - rest if back else rest, out)
+    if turns != 0 or back:
+        _sum_before(pixels, w, weight, block, j, w, spare)
+        wholes = turns if mode == 0 else 2 * turns
+        for c in range(4):
+            out[c] = wholes * spare[c] + (2.0 * spare[c] - out[c] if back else out[c])
+
+
+@inner
+def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: ignore[no-untyped-def]
+    """Write the filtered texel at lattice coordinates, and the weighted sum of its squares."""
+    i, j = np.int64(math.floor(x)), np.int64(math.floor(y))
+    if nearest:
+        _read(pixels, w, weight, _wrapped(j, h, wrap[1]), _wrapped(i, w, wrap[0]), out)
+        return
+    for c in range(4):
+        out[c] = 0.0
+    for b in range(2):
+        for a in range(2):
+            share = (x - i if a else 1.0 - (x - i)) * (y - j if b else 1.0 - (y - j))
+            _read(pixels, w, weight, _wrapped(j + b, h, wrap[1]), _wrapped(i + a, w, wrap[0]), spare)
+            for c in range(3):
+                out[c] += share * spare[c]
+    out[3] = 0.0
+    for c in range(3):
+        out[3] += weight[c] * out[c] * out[c]
+
+
+@inner
+def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):  # type: ignore[no-untyped-def]
+    """Write what F is made of in cell (i, j), of two rows: sums since column `first`, both texels."""
+    for r in range(1 if nearest else 2):
+        line = _wrapped(j + r, h, wrap[1])
+        _running(pixels, w, weight, block, wrap[0], line, i, a, b)
+        for c in range(4):
+            terms[r, 0, c] = a[c]
+        _running(pixels, w, weight, block, wrap[0], line, first, a, b)
+        for c in range(4):
+            terms[r, 0, c] -= a[c]
+        _read(pixels, w, weight, line, _wrapped(i, w, wrap[0]), a)
+        for c in range(4):
+            terms[r, 1, c] = terms[r, 2, c] = a[c]
+        if not nearest:
+            # The integral of lines between texels: half of the first one and of the last one is missing.
+            _read(pixels, w, weight, line, _wrapped(first, w, wrap[0]), b)
+            for c in range(4):
+                terms[r, 0, c] += 0.5 * (a[c] - b[c])
+            _read(pixels, w, weight, line, _wrapped(i + 1, w, wrap[0]), a)
+            for c in range(4):
+                terms[r, 2, c] = a[c]
+
+
+@inner
+def _primitive(terms, nearest, c, fx, fy):  # type: ignore[no-untyped-def]
+    """Return F of one channel at (fx, fy) inside the loaded cell."""
+    upper = terms[0, 0, c] + terms[0, 1, c] * fx
+    if nearest:
+        return upper
+    upper += 0.5 * (terms[0, 2, c] - terms[0, 1, c]) * fx * fx
+    lower = terms[1, 0, c] + terms[1, 1, c] * fx + 0.5 * (terms[1, 2, c] - terms[1, 1, c]) * fx * fx
+    return (1.0 - fy) * upper + fy * lower
+
+
+@inner
+def _next(at, step, start, low, high):  # type: ignore[no-untyped-def]
+    """Return where on an edge (0 to 1) the lattice line `at` is met; 2 if never or outside of low to high."""
+    if step == 0.0 or (step > 0.0 and at > high) or (step < 0.0 and at < low):
+        return 2.0
+    return (at - start) / step
+
+
+@inner
+def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total, size):  # type: ignore[no-untyped-def]
+    """Add an edge to `total` (4,) and the sizes of its terms to `size` (4,).
+
+    ends : x, y of both ends, and the weights at both ends of the integral of f along the edge; with `along`
+        that one is added, else the integral of F dy
+    """
+    x0, y0, x1, y1, first_weight, last_weight = ends
+    dx, dy = x1 - x0, y1 - y0
+    if not along and dy == 0.0:
+        return
+    terms, a, b = _row_terms(), _prefix(), _texel()
+    # Outside of a clamped texture nothing changes: no line is met there.
+    low_x, high_x = (-1.0, w + 1.0) if wrap[0] == 2 else (-1.0e30, 1.0e30)
+    low_y, high_y = (-1.0, h + 1.0) if wrap[1] == 2 else (-1.0e30, 1.0e30)
+    line_x = math.floor(x0) + 1.0 if dx > 0.0 else math.ceil(x0) - 1.0
+    line_y = math.floor(y0) + 1.0 if dy > 0.0 else math.ceil(y0) - 1.0
+    line_x = larger(line_x, low_x) if dx > 0.0 else smaller(line_x, high_x)
+    line_y = larger(line_y, low_y) if dy > 0.0 else smaller(line_y, high_y)
+    t = 0.0
+    while t < 1.0:
+        at_x, at_y = _next(line_x, dx, x0, low_x, high_x), _next(line_y, dy, y0, low_y, high_y)
+        end = smaller(smaller(at_x, at_y), 1.0)
+        if at_x <= end:
+            line_x += 1.0 if dx > 0.0 else -1.0
+        if at_y <= end:
+            line_y += 1.0 if dy > 0.0 else -1.0
+        if end <= t:
+            continue
+        middle = 0.5 * (t + end)
+        if along:
+            for k in range(3):
+                s = t if k == 0 else (middle if k == 1 else end)
+                # At the ends of a piece a texel's own border decides: look just inside.
+                inside = middle + (s - middle) * (1.0 - 1.0e-9)
+                _value(pixels, w, h, weight, wrap, nearest, x0 + inside * dx, y0 + inside * dy, a, b)
+                share = (4.0 if k == 1 else 1.0) / 6.0 * (end - t)
+                share *= first_weight + (last_weight - first_weight) * s
+                for c in range(4):
+                    total[c] += share * a[c]
+                    size[c] += share * a[c]
+        else:
+            i, j = np.int64(math.floor(x0 + middle * dx)), np.int64(math.floor(y0 + middle * dy))
+            _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b)
+            share = (end - t) * dy / 6.0
+            for c in range(4):
+                part = _primitive(terms, nearest, c, x0 + t * dx - i, y0 + t * dy - j)
+                part += 4.0 * _primitive(terms, nearest, c, x0 + middle * dx - i, y0 + middle * dy - j)
+                part += _primitive(terms, nearest, c, x0 + end * dx - i, y0 + end * dy - j)
+                total[c] += share * part
+                size[c] += abs(share * part)
+        t = end
+
+
+@inner
+def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):  # type: ignore[no-untyped-def]
+    """Return E[f^2] / E[f]^2 - 1 from the centroids of sixteen equal parts of a triangle."""
+    a, b, mean = _prefix(), _texel(), _four()
+    for part in range(16):
+        i, j = 0, part
+        while j >= 2 * (4 - i) - 1:
+            j -= 2 * (4 - i) - 1
+            i += 1
+        third = 1.0 if j % 2 == 0 else 2.0
+        b1, b2 = (i + third / 3.0) / 4.0, (j // 2 + third / 3.0) / 4.0
+        x = corner[0, 0] + b1 * (corner[1, 0] - corner[0, 0]) + b2 * (corner[2, 0] - corner[0, 0])
+        y = corner[0, 1] + b1 * (corner[1, 1] - corner[0, 1]) + b2 * (corner[2, 1] - corner[0, 1])
+        _value(pixels, w, h, weight, wrap, nearest, x, y, a, b)
+        for c in range(4):
+            mean[c] += a[c] / 16.0
+    square = 0.0
+    for c in range(3):
+        square += weight[c] * mean[c] * mean[c]
+    if square <= 0.0:
+        return _UNSEEN if lit else 0.0
+    return larger(mean[3] / square - 1.0, 0.0)
+
+
+@kernel
+def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):  # type: ignore[no-untyped-def]
+    """Average a texture over n triangles.
+
+    Parameters
+    ----------
+    uv : (n, 3, 2) float64
+    pixels : (H * W, 4) float32, linear; wrap : (3,) int64, see `TexturePack.wrap`
+    weight, block : see `RowSums`
+    mean : (n, 3) float64, output, exact up to rounding
+    spread : (n,) float64, output: variance of the texture over the square of its mean, channels weighted; of
+        large triangles with a bilinear texture a bound, of small ones an estimate
+    """
+    nearest = wrap[2] != 0
+    shift = 0.0 if nearest else 0.5
+    corner, total, size = _corner_memory(), _totals(), _sizes()
+    for n in range(len(uv)):
+        for k in range(3):
+            corner[k, 0], corner[k, 1] = uv[n, k, 0] * w - shift, uv[n, k, 1] * h - shift
+        for c in range(4):
+            total[c] = size[c] = 0.0
+        area = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1])
+        area = 0.5 * (area - (corner[1, 1] - corner[0, 1]) * (corner[2, 0] - corner[0, 0]))
+        longest, top = -1.0, 0
+        for k in range(3):
+            after = (k + 1) % 3
+            square = (corner[after, 0] - corner[k, 0]) ** 2 + (corner[after, 1] - corner[k, 1]) ** 2
+            if square > longest:
+                longest, top = square, (k + 2) % 3
+        thin = abs(area) <= _THIN * longest
+        if longest <= 1.0e-18:
+            _value(pixels, w, h, weight, wrap, nearest, corner[0, 0], corner[0, 1], total, size)
+            area = 1.0
+        elif thin:
+            # The triangle lies on a line: its density along the longest edge is a tent over the third corner.
+            p, q = (top + 1) % 3, (top + 2) % 3
+            way_x, way_y = corner[q, 0] - corner[p, 0], corner[q, 1] - corner[p, 1]
+            at = (corner[top, 0] - corner[p, 0]) * way_x + (corner[top, 1] - corner[p, 1]) * way_y
+            at = smaller(larger(at / longest, 0.0), 1.0)
+            x, y = corner[p, 0] + at * way_x, corner[p, 1] + at * way_y
+            ends = (corner[p, 0], corner[p, 1], x, y, 0.0, 2.0 * at)
+            _walk(pixels, w, h, weight, block, wrap, nearest, 0, ends, True, total, size)
+            ends = (x, y, corner[q, 0], corner[q, 1], 2.0 * (1.0 - at), 0.0)
+            _walk(pixels, w, h, weight, block, wrap, nearest, 0, ends, True, total, size)
+            area = 1.0
+        else:
+            low = smaller(smaller(corner[0, 0], corner[1, 0]), corner[2, 0])
+            first = np.int64(math.floor(low))
+            for k in range(3):
+                after = (k + 1) % 3
+                ends = (corner[k, 0], corner[k, 1], corner[after, 0], corner[after, 1], 0.0, 0.0)
+                _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, False, total, size)
+        square, lit = 0.0, False
+        for c in range(3):
+            value = total[c] / area
+            value = value if value > _ROUNDING * size[c] / abs(area) else 0.0
+            mean[n, c] = value
+            square += weight[c] * value * value
+            lit = lit or value > 0.0
+        wide = 0.0
+        for k in range(3):
+            after = (k + 1) % 3
+            wide = larger(wide, abs(corner[after, 0] - corner[k, 0]))
+            wide = larger(wide, abs(corner[after, 1] - corner[k, 1]))
+        spread[n] = 0.0
+        if lit and not nearest and wide <= _FEW_CELLS:
+            spread[n] = _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit)
+        elif square > 0.0:
+            spread[n] = larger(total[3] / area / square - 1.0, 0.0)

@@ -1,0 +1,196 @@
+"""Textured emission: exact means over triangles, and triangles cut until light can be aimed at lit texels.
+
+A triangle is cut at the middles of its edges into four, again and again where its texture varies most, for
+its power. What is left is black, constant, or varies so little that a uniform point of it does.
+
+    noise = sum share (E[L^2] / E[L]^2 - 1)      over the parts of a triangle, share: of its power
+
+Based on: Clarberg, Jarosz, Akenine-Moller and Jensen, Wavelet importance sampling, 2005 (means in a tree;
+here the tree is that of the triangle itself, so that no part has to be clipped).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums, uv_means
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# A triangle whose noise is lower is cut no further.
+ENOUGH = 0.05
+# Parts of a triangle this small are cut no further: float32 barycentrics could not tell them apart.
+_SMALLEST = 2.0**-14
+# Parts are cut together whose gain is within this factor of the largest.
+_TOGETHER = 0.125
+# Texels that an edge may cross; triangles of more repeats than that are averaged over as many as fit.
+_MOST_CROSSED = 1 << 22
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What n textured triangles were cut into.
+
+    Attributes
+    ----------
+    owner : (m,) int64
+        Which of the triangles each part belongs to.
+    inside : (m, 3) float64
+        Barycentrics b1, b2 of the part's corner 0 in its triangle and its size, negative if it is turned: its
+        point (u, v) is (b1 + size u, b2 + size v).
+    mean : (m, 3) float64
+        Mean radiance, cd/m2; black parts are left out.
+    spread : (m,) float64
+        Variance of the radiance inside the part over its mean squared; 0 if it is too small to be seen.
+    node : (k, 4) int32
+        Parts of what was cut, see `kernels.emitters.emitter_at`: a part's number, -1 black, -2 - k node k.
+    root : (n,) int32
+        What each triangle is, in the same code.
+    """
+
+    owner: NDArray[np.int64]
+    inside: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    node: NDArray[np.int32]
+    root: NDArray[np.int32]
+
+
+class EmissiveTextures:
+    """The emission of textured triangles, ready to be averaged over any part of them."""
+
+    def __init__(self, shading: Any, triangle: NDArray[np.int64]) -> None:
+        """Prepare triangles (n,) of the scene, all of materials with an emissive texture."""
+        self.shading = shading
+        material = shading.material[triangle]
+        self.factor = shading.emission[material].astype(np.float64)
+        uv = shading.emission_uv
+        uv = uv[shading.triangle[triangle]] if len(uv) > 1 else np.zeros((len(triangle), 3, 2))
+        self.uv = uv.astype(np.float64)
+        # Materials alike but for their brightness share one set of sums.
+        scaled = self.factor / np.maximum(self.factor.max(axis=1, keepdims=True), 1e-300)
+        key = np.column_stack([shading.emission_texture[material], scaled])
+        kinds, kind = np.unique(key, axis=0, return_inverse=True)
+        self.kind = kind.reshape(-1)
+        self.sums = [row_sums(shading.pack, int(row[0]), row[1:] ** 2) for row in kinds]
+        # Texels that each triangle is wide, the larger of both axes.
+        self.texels = np.zeros(len(triangle))
+        self._bring_near()
+
+    def _bring_near(self) -> None:
+        """Move uv by whole repeats to the first ones, and shrink what has too many of them to count."""
+        for k, sums in enumerate(self.sums):
+            own = np.flatnonzero(self.kind == k)
+            uv, size = self.uv[own], np.array(self.shading.pack.level[sums.texture, 0, 1:])
+            repeats = self.shading.pack.wrap[sums.texture, :2] != 2
+            uv -= np.where(repeats, 2.0 * np.floor(0.5 * uv.min(axis=1)), 0.0)[:, None]
+            texels = np.ptp(uv, axis=1) * size
+            self.texels[own] = texels.max(axis=1)
+            crossed = texels * repeats
+            shrink = np.minimum(_MOST_CROSSED / np.maximum(crossed, 1.0), 1.0)
+            self.uv[own] = uv * shrink[:, None]
+
+    def means(
+        self, owner: NDArray[np.int64], inside: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean radiance (m, 3) and spread (m,) of parts; see `Parts`."""
+        corner = self.uv[owner]
+        edge = corner[:, 1:] - corner[:, :1]
+        first = corner[:, 0] + np.einsum("mk,mka->ma", inside[:, :2], edge)
+        size = inside[:, 2, None]
+        uv = np.stack([first, first + size * edge[:, 0], first + size * edge[:, 1]], axis=1)
+        mean, spread = np.zeros((len(owner), 3)), np.zeros(len(owner))
+        pack = self.shading.pack
+        for k in np.unique(self.kind[owner]):
+            own = np.flatnonzero(self.kind[owner] == k)
+            sums = self.sums[k]
+            offset, w, h = (int(x) for x in pack.level[sums.texture, 0])
+            part, varied = np.zeros((len(own), 3)), np.zeros(len(own))
+            pixels, wrap = pack.pixels[offset : offset + w * h], pack.wrap[sums.texture]
+            uv_means(uv[own], pixels, w, h, wrap, sums.weight, sums.block, part, varied)
+            mean[own], spread[own] = part * self.factor[owner[own]], varied
+        return mean, spread
+
+    def whole(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean radiance (n, 3) and spread (n,) of the triangles."""
+        n = len(self.uv)
+        return self.means(np.arange(n), np.tile([0.0, 0.0, 1.0], (n, 1)))
+
+
+def row_sums(pack: Any, texture: int, weight: NDArray[np.float64]) -> RowSums:
+    """Return the running sums of a texture of the pack."""
+    offset, w, h = (int(x) for x in pack.level[texture, 0])
+    block = np.zeros((h, w // BLOCK + 1, N_SUMS))
+    fill_row_sums(pack.pixels[offset : offset + w * h], 0, weight, block)
+    return RowSums(block, weight, texture)
+
+
+def cut(
+    textures: EmissiveTextures, area: NDArray[np.float64], finest: NDArray[np.float64], most: int
+) -> Parts:
+    """Cut triangles until aiming at their parts is little noisier than if each were constant.
+
+    Parameters
+    ----------
+    area : (n,) float64, m2
+    finest : (n,) float64
+        Size from which on parts that are at most a texel wide count as constant.
+    most : int
+        Parts that cutting may add.
+    """
+    n = len(area)
+    owner = np.arange(n)
+    inside = np.tile([0.0, 0.0, 1.0], (n, 1))
+    finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
+    mean, spread = _means_of_parts(textures, owner, inside, finest)
+    whole = area * (mean @ LUMINANCE)
+    # Half of the parts go where the power is, half to all alike: a dim room has lamps of its own.
+    lit = max(int((whole > 0).sum()), 1)
+    weight = 0.5 * whole / max(float(whole.sum()), 1e-300) + 0.5 / lit
+    child = np.full(n, -1, np.int64)
+    while True:
+        share = area[owner] * inside[:, 2] ** 2 * (mean @ LUMINANCE) / np.maximum(whole[owner], 1e-300)
+        noise = np.where(child < 0, share * spread, 0.0)
+        gain = noise * weight[owner] * (np.abs(inside[:, 2]) > _SMALLEST)
+        gain[np.bincount(owner, noise, n)[owner] <= ENOUGH] = 0.0
+        room = (most - (len(owner) - n) * 3 // 4) // 3
+        chosen = np.flatnonzero(gain > _TOGETHER * gain.max(initial=0.0))
+        chosen = np.sort(chosen[np.argsort(-gain[chosen], kind="stable")[: max(room, 0)]])
+        if not len(chosen):
+            break
+        child[chosen] = len(owner) + 4 * np.arange(len(chosen))
+        quarter = _quarters(inside[chosen]).reshape(-1, 3)
+        fresh = np.repeat(owner[chosen], 4)
+        quarter_mean, quarter_spread = _means_of_parts(textures, fresh, quarter, finest)
+        owner, inside = np.concatenate([owner, fresh]), np.concatenate([inside, quarter])
+        mean, spread = np.concatenate([mean, quarter_mean]), np.concatenate([spread, quarter_spread])
+        child = np.concatenate([child, np.full(len(fresh), -1)])
+    is_cut = child >= 0
+    kept = np.flatnonzero(~is_cut & (mean.max(axis=1) > 0))
+    code = np.full(len(owner), -1, np.int32)
+    code[kept] = np.arange(len(kept))
+    code[is_cut] = -2 - np.arange(is_cut.sum())
+    node = code[child[is_cut, None] + np.arange(4)]
+    return Parts(owner[kept], inside[kept], mean[kept], spread[kept], node, code[:n])
+
+
+def _means_of_parts(
+    textures: EmissiveTextures,
+    owner: NDArray[np.int64],
+    inside: NDArray[np.float64],
+    finest: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    mean, spread = textures.means(owner, inside)
+    return mean, np.where(np.abs(inside[:, 2]) <= finest[owner], 0.0, spread)
+
+
+def _quarters(inside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the parts (m, 4, 3) at the three corners, and the turned one in the middle."""
+    half = 0.5 * inside[:, 2]
+    step = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
+    out: NDArray[np.float64] = half[:, None, None] * step
+    out[..., :2] += inside[:, None, :2]
+    return out
