@@ -5,6 +5,7 @@ A MASK hit counts where alpha reaches the cutoff. For a BLEND hit it depends on 
 - Shadow rays (ID 1 to 16, the ray's number): the transmittance T = (1 - a) lerp(1, c, a) is multiplied into
   `packets.Tint.colour`, and the hit does not count. Their ends are fixed, so every crossing on the way is
   asked for, in whatever order.
+- Rays that pass BLEND surfaces unaware (ID `packets.UNAWARE`): the hit counts where alpha is 1.
 - Other rays (ID 0): the hit counts with probability alpha. The number that decides is a hash of the bits of
   the ray and the triangle: the same ray always gets the same answer, however it is packed and on whatever
   thread, and surfaces along a ray decide independently. Rays of one texel differ in direction, so each has
@@ -18,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
-from baker.kernels.alpha import CUTOFF, SURFACE, AlphaTable, presence
+from baker.kernels.alpha import SURFACE, AlphaTable, presence
 from baker.kernels.edge_hits import crossed_before, on_edge
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import MAX_LEVELS, TexturePack
@@ -55,10 +56,7 @@ def filter_of(alpha: AlphaTable, tint: TintTable | None, pack: TexturePack) -> S
         *(tint.slot, tint.row),
     )
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
-    blend = bool((alpha.row[:, CUTOFF] < 0).any())
-    return SeeThrough(
-        alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data), blend=blend
-    )
+    return SeeThrough(alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data))
 
 
 @inner
@@ -129,13 +127,13 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
                 valid[lane] = 0
             continue
         valid[lane] = 0
+        if number >= LANES:
+            continue
         if on_edge(b1, b2) and crossed_before(
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        rgb[0] = rgb[1] = rgb[2] = 1.0
-        if len(tint_slot) > 0 and tint_slot[prim] >= 0:
-            tint_at(tint_row, np.int64(tint_slot[prim]), pack, b1, b2, rgba, rgb)
+        tint_at(tint_row, np.int64(tint_slot[prim]), pack, b1, b2, rgba, rgb)
         most = np.float32(0.0)
         for c in range(3):
             kept = context[TINT_COLOUR + c * LANES + number] * np.float32((1.0 - share) * rgb[c])

@@ -18,7 +18,7 @@ from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance, emitter
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.surface import N_POINTS
-from baker.kernels.tint import follow, light_kept
+from baker.kernels.tint import any_stopped, follow_gather, gather_turns, light_kept, trace_gather
 from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
@@ -77,6 +77,7 @@ def gather(  # type: ignore[no-untyped-def]
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
+    turns, opened = gather_turns(caster.tint), _f(1.0)
     for group in range(0, len(origin), LANES):
         lanes = smaller(LANES, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
@@ -85,22 +86,34 @@ def gather(  # type: ignore[no-untyped-def]
             squares[lane] = 0.0
         for j in range(7 * LANES):
             total[j] = 0.0
-        for s in range(n_samples):
+        stopped = True
+        for step in range(n_samples * turns):
+            s, turn = step // turns, step % turns
             k = s * N_POINTS // n_samples
-            if s == 0 or k != (s - 1) * N_POINTS // n_samples:
+            if turn == 0 and (s == 0 or k != (s - 1) * N_POINTS // n_samples):
                 load_frames(rays, frame, origin, normal, group, lanes, k)
                 for j in range(7 * LANES):
                     part[j] = _f(0.0)
                 for lane in range(LANES):
                     missed[lane] = _f(0.0)
-            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
-            trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-            follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
+            if turn == 0 or stopped:
+                aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
+                trace_gather(
+                    caster.tint, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
+                )
+            if turn == 0:
+                # AO goes by where rays stop by chance.
+                opened = _f(1.0)
+                stopped = any_stopped(caster.tint, words)
+                if not stopped:
+                    continue
+            follow_gather(caster.tint, turn, caster.occluded, width, on, rays, words, spare_on, spare)
             for lane in range(LANES):
                 none = words[GEOM_ID * LANES + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)
                 free = none or rays[TFAR * LANES + lane] > distance
-                part[OPEN * LANES + lane] += _f(1.0) if free else _f(0.0)
+                part[OPEN * LANES + lane] += opened if free else _f(0.0)
+            opened = _f(0.0)
             _add_coloured_sky(caster.tint, words, sky, missed, part)
             # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
@@ -140,7 +153,7 @@ def gather(  # type: ignore[no-untyped-def]
                         part[lane] += exitance[p, 0] * inverse_pi * light_kept(tint, 0, lane)
                         part[LANES + lane] += exitance[p, 1] * inverse_pi * light_kept(tint, 1, lane)
                         part[2 * LANES + lane] += exitance[p, 2] * inverse_pi * light_kept(tint, 2, lane)
-            if (s + 1) * N_POINTS // n_samples != k:
+            if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(LANES):
                     for c in range(3):
                         part[(DIRECT + c) * LANES + lane] += missed[lane] * sky[c]

@@ -22,13 +22,16 @@ from baker.kernels.alpha import ALPHA, TEXTURE, UV
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, larger, smaller
 from baker.trace.packets import (
+    BLEND_GEOMETRY,
     DIR_Z,
     GEOM_ID,
     ID,
     LANES,
     NO_HIT,
+    PASSES,
     PRIM_ID,
     TFAR,
+    UNAWARE,
     call_embree,
     call_embree_with,
     copy_four,
@@ -43,17 +46,19 @@ ROW_LENGTH = 21
 
 
 class TintTable(NamedTuple):
-    """The K triangles that colour light.
+    """The K triangles that let a share of light through.
 
-    slot (T,) int32, row of each triangle of the scene or -1; row (K, 21) float32, see the column names.
+    slot (T,) int32, row of each triangle of the scene or -1; row (K, 21) float32, see the column names;
+    coloured, whether any is not white.
     """
 
     slot: NDArray[np.int32]
     row: NDArray[np.float32]
+    coloured: bool = False
 
 
 def no_tint() -> TintTable:
-    """Return the table of a scene in which nothing colours light."""
+    """Return the table of a scene in which nothing is BLEND."""
     return TintTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
@@ -105,7 +110,10 @@ def clear_colours(tint):  # type: ignore[no-untyped-def]
 
 @inner
 def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
-    """Write lerp(1, c, a) of row k at barycentrics to `out` (3,); pack: TexturePack; rgba (4,): memory."""
+    """Write lerp(1, c, a) of row k at barycentrics to `out` (3,), and return a.
+
+    pack : TexturePack; rgba : (4,) float64, memory
+    """
     rgba[0] = rgba[1] = rgba[2] = rgba[3] = 1.0
     if row[k, TEXTURE] >= _f(0.0):
         u = np.float64(row[k, UV]) + b1 * row[k, UV + 2] + b2 * row[k, UV + 4]
@@ -117,6 +125,7 @@ def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
         colour = np.float64(row[k, COLOUR + c])
         colour += b1 * row[k, COLOUR + 3 + c] + b2 * row[k, COLOUR + 6 + c]
         out[c] = 1.0 - alpha * (1.0 - smaller(larger(colour * rgba[c], 0.0), 1.0))
+    return alpha
 
 
 @inner
@@ -131,7 +140,7 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
     if tint is None:
         return
     clear_colours(tint)
-    if tint.scene == 0:
+    if tint.coloured == 0:
         return
     stop = tint.stop
     for lane in range(LANES):
@@ -139,6 +148,12 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
         if hits is not None and hits[GEOM_ID * LANES + lane] != NO_HIT:
             # Where the ray ends no light passed.
             stop[lane] = hits[PRIM_ID * LANES + lane]
+    _ask_lanes(tint, function, width, on, rays, spare_on, spare, 0)
+
+
+@inner
+def _ask_lanes(tint, function, width, on, rays, spare_on, spare, number):  # type: ignore[no-untyped-def]
+    """Do what `_ask` does for sixteen rays; number : 0 or PASSES, see `packets`."""
     for first in range(0, LANES, width):
         some = False
         for lane in range(width):
@@ -150,7 +165,7 @@ def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ign
             for row in range(DIR_Z + 1):
                 copy_four(spare, row * width + to, rays, row * LANES + first + to)
             copy_four(spare, TFAR * width + to, rays, TFAR * LANES + first + to)
-        _ask(tint, function, width, spare_on, spare, first)
+        _ask(tint, function, width, spare_on, spare, number + first)
 
 
 @inner
@@ -163,7 +178,7 @@ def follow_packet(tint, function, width, on, packet, hits):  # type: ignore[no-u
     if tint is None:
         return
     clear_colours(tint)
-    if tint.scene == 0:
+    if tint.coloured == 0:
         return
     stop, words = tint.stop, packet.view(np.uint32)
     for lane in range(width):
@@ -175,13 +190,70 @@ def follow_packet(tint, function, width, on, packet, hits):  # type: ignore[no-u
 
 @inner
 def _ask(tint, function, width, on, packet, first):  # type: ignore[no-untyped-def]
-    """Have the filter function multiply the colours of rays `first` and on: no hit counts, each is asked."""
+    """Trace a packet in the tree of BLEND triangles: the filter multiplies colours of rays `first` and on."""
     words = packet.view(np.uint32)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(first + lane + 1)
     call_embree_with(function, on, tint.scene, packet, tint.arguments)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(0)
+
+
+@inner
+def gather_turns(tint):  # type: ignore[no-untyped-def]
+    """Return in how many turns each gather ray brings its light, see `trace_gather`."""
+    return 1 if tint is None else 2
+
+
+@inner
+def trace_gather(tint, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Trace sixteen gather rays to their first hit.
+
+    Where there are BLEND surfaces, in turn 0 rays stop at them by chance, with probability alpha: that finds
+    the light that these surfaces send. In turn 1 rays pass them all (but where alpha is 1), and find what is
+    behind with certainty.
+    """
+    if tint is None:
+        trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
+        return
+    number = UNAWARE if turn == 1 else np.uint32(0)
+    for lane in range(LANES):
+        words[ID * LANES + lane] = number
+    trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
+    for lane in range(LANES):
+        words[ID * LANES + lane] = np.uint32(0)
+
+
+@inner
+def any_stopped(tint, words):  # type: ignore[no-untyped-def]
+    """Tell whether any of sixteen rays stopped at a BLEND surface; True without such surfaces."""
+    if tint is None:
+        return True
+    found = False
+    for lane in range(LANES):
+        found = found or words[GEOM_ID * LANES + lane] == BLEND_GEOMETRY
+    return found
+
+
+@inner
+def follow_gather(tint, turn, function, width, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Find what the light that gather rays bring in a turn is multiplied by, see `light_kept`.
+
+    In turn 0 rays that stopped at a BLEND surface bring its light in the colours of those passed before it.
+    In turn 1 the others bring theirs, multiplied by the transmittance of all BLEND surfaces on the way.
+    """
+    if tint is None:
+        return
+    if turn == 0:
+        follow(tint, function, width, on, rays, words, spare_on, spare)
+    else:
+        clear_colours(tint)
+        _ask_lanes(tint, function, width, on, rays, spare_on, spare, PASSES)
+    colour = tint.colour
+    for lane in range(LANES):
+        if (words[GEOM_ID * LANES + lane] == BLEND_GEOMETRY) != (turn == 0):
+            for c in range(3):
+                colour[c * LANES + lane] = _f(0.0)
 
 
 @inner

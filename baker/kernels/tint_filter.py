@@ -1,6 +1,7 @@
-"""The function that Embree tells hits of coloured surfaces: it multiplies colours, and lets no hit count.
+"""The function that Embree tells hits of BLEND surfaces: it multiplies colours, and lets no hit count.
 
-It finds the ray's number (1 to 16) in the ray, and what to write behind the query's context (`packets.Tint`).
+It finds the ray's number in the ray (`packets.PASSES`), and what to write behind the query's context
+(`packets.Tint`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
 """
@@ -23,6 +24,7 @@ from baker.trace.packets import (
     ID,
     LANES,
     NG_X,
+    PASSES,
     PRIM_ID,
     TFAR,
     TINT_COLOUR,
@@ -35,10 +37,11 @@ _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
 def filter_of(tint: TintTable, pack: TexturePack) -> SeeThrough:
-    """Return what the ray tree has to know of the triangles that colour light."""
+    """Return what the ray tree has to know of the triangles that let a share of light through."""
     arrays = (tint.slot, tint.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
-    return SeeThrough(tint.slot >= 0, _multiply_colour.address or 0, data.ctypes.data, (arrays, data))
+    address = _multiply_colour.address or 0
+    return SeeThrough(tint.slot >= 0, address, data.ctypes.data, (arrays, data), tint.coloured)
 
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
@@ -70,7 +73,9 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
         valid[lane] = 0
         prim = hit_words[_PRIM * n + lane]
         number = np.int64(ray_words[ID * n + lane]) - 1
-        if prim == context_words[TINT_STOP + number]:
+        whole = number >= PASSES
+        number -= PASSES if whole else 0
+        if not whole and prim == context_words[TINT_STOP + number]:
             continue
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
@@ -78,6 +83,7 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        tint_at(row, k, pack, b1, b2, rgba, rgb)
+        alpha = tint_at(row, k, pack, b1, b2, rgba, rgb)
+        share = 1.0 - alpha if whole else 1.0
         for c in range(3):
-            context[TINT_COLOUR + c * LANES + number] *= np.float32(rgb[c])
+            context[TINT_COLOUR + c * LANES + number] *= np.float32(share * rgb[c])

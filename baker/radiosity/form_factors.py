@@ -136,7 +136,7 @@ def build_form_factors(
     value = (count / np.float32(n_rays)).astype(np.float32)
     sky, lost = (np.asarray(count / n_rays, np.float32) for count in tally.T)
     merged = _merged(first, column, value, patches.area)
-    if not tracer.tint or not ordered:
+    if not tracer.coloured or not ordered:
         return _balanced(merged, patches.area, sky, lost, n * n_rays)
     passed, sky_passed = (np.concatenate([row[k] for row in ordered]) for k in (4, 5))
     # The mean over the rays of both estimates; balancing changes how much light arrives, not its colour.
@@ -196,7 +196,7 @@ def cast_rows(
         points = some_points(surface, mask, start, wanted.reshape(-1), kept)
         origin, normal = (p.reshape(end - begin, n_rays, 3) for p in points)
         target = np.full((end - begin, n_rays), -1, np.int32)
-        colour = np.zeros((end - begin if tracer.tint else 0, n_rays, 3), np.float32)
+        colour = np.zeros((end - begin if tracer.coloured else 0, n_rays, 3), np.float32)
         cast_form_factors(
             origin, normal, table, hit_patch, new_caster(tracer), begin, net, shared, target, tally, colour
         )

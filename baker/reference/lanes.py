@@ -89,7 +89,8 @@ def new_path_memory(rays: RayScene) -> PathMemory:
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, LANES)[:, MASK] = NO_HIT
     bins.view(np.uint32).reshape(BINS, BIN_ROWS, LANES)[:, MASK] = NO_HIT
     intersect, occluded = rays.functions(LANES)
-    tint = None if rays.tracer.tint is None else new_tint(rays.tracer.tint)
+    tinted, coloured = rays.tracer.tint, rays.tracer.coloured
+    tint = None if tinted is None else new_tint(tinted, coloured)
     return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins, tint)
 
 

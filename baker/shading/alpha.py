@@ -73,7 +73,7 @@ def see_through(shading: Any, tint: TintTable | None = None) -> SeeThrough | Non
     shading : Shading
         Materials as kernels see them.
     tint : TintTable, optional
-        Those that colour it; None if none do.
+        Those that let a share of it through; None if none do.
     """
     if not len(shading.alpha.row):
         return None

@@ -1,4 +1,4 @@
-"""Which triangles colour the light that they let through."""
+"""Which triangles let a share of light through, and which of them colour it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.trace.embree import SeeThrough
 
 
 def build_tint(shading: Any) -> TintTable | None:
-    """Find the BLEND triangles that are not white everywhere; None if there are none.
+    """Find the BLEND triangles, but for those without alpha anywhere; None if there are none.
 
     Parameters
     ----------
@@ -34,7 +34,8 @@ def build_tint(shading: Any) -> TintTable | None:
     most = corner_alpha.max(axis=1) * np.array([most for _, most in limits], np.float32)[material]
     white = (colour.min(axis=1) * darkest >= 1.0).all(axis=1)
     # What has no alpha anywhere is not there, whatever its colour.
-    chosen = np.flatnonzero((alpha.row[:, CUTOFF] < 0) & ~white & (most > 0))
+    there = (alpha.row[:, CUTOFF] < 0) & (most > 0)
+    chosen = np.flatnonzero(there)
     if not len(chosen):
         return None
     slot = np.full(len(alpha.slot), -1, np.int32)
@@ -45,11 +46,11 @@ def build_tint(shading: Any) -> TintTable | None:
     row[:, COLOUR : COLOUR + 3] = corner[:, 0]
     row[:, COLOUR + 3 : COLOUR + 6] = corner[:, 1] - corner[:, 0]
     row[:, COLOUR + 6 : COLOUR + 9] = corner[:, 2] - corner[:, 0]
-    return TintTable(slot, row)
+    return TintTable(slot, row, bool((there & ~white).any()))
 
 
 def tint(shading: Any, table: TintTable | None) -> SeeThrough | None:
-    """Return what the ray tree has to know of triangles that colour light, None without any.
+    """Return what the ray tree has to know of triangles that let a share of light through, None without any.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ _SIGNATURES = {
     "rtcGetDeviceError": ("i", "p"), "rtcNewScene": ("p", "p"), "rtcReleaseScene": ("", "p"),
     "rtcSetSceneFlags": ("", "pi"), "rtcSetSceneBuildQuality": ("", "pi"), "rtcCommitScene": ("", "p"),
     "rtcNewGeometry": ("p", "pi"), "rtcReleaseGeometry": ("", "p"), "rtcCommitGeometry": ("", "p"),
-    "rtcSetSharedGeometryBuffer": ("", "piuipzzz"), "rtcAttachGeometry": ("u", "pp"),
+    "rtcSetSharedGeometryBuffer": ("", "piuipzzz"), "rtcAttachGeometryByID": ("", "ppu"),
     "rtcSetGeometryUserData": ("", "pp"), "rtcSetGeometryIntersectFilterFunction": ("", "pp"),
     "rtcSetGeometryOccludedFilterFunction": ("", "pp"),
 }  # fmt: skip
@@ -109,7 +109,9 @@ class Tracer(NamedTuple):
     width : int
         N, the widest packet this CPU traces natively.
     tint : int or None
-        None without BLEND triangles; else RTCScene of those that colour what they let through, 0 if none do.
+        RTCScene of the triangles that let a share of light through (BLEND), None without any.
+    coloured : bool
+        Whether any of these colours what it lets through.
     few : bool
         Whether the scene has so few triangles (`FEW`) that rays of neighbouring texels meet the same ones.
     """
@@ -120,6 +122,7 @@ class Tracer(NamedTuple):
     width: int
     tint: int | None = None
     few: bool = False
+    coloured: bool = False
 
     def grey(self) -> Tracer:
         """Return the same for rays that ask only whether and where they end."""
@@ -138,15 +141,15 @@ class SeeThrough(NamedTuple):
         Address that the function finds as `geometryUserPtr`.
     owner : object
         Keeps function and data alive.
-    blend : bool
-        Whether some let a share of the light through: shadow rays then need `packets.Tint`.
+    coloured : bool
+        Whether any of those that let a share of light through colours it.
     """
 
     chosen: NDArray[np.bool_]
     function: int
     data: int
     owner: Any
-    blend: bool = False
+    coloured: bool = False
 
 
 class RayScene:
@@ -164,7 +167,7 @@ class RayScene:
     see_through : SeeThrough, optional
         A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
     tint : SeeThrough, optional
-        Some of these triangles, which also form a tree of their own: `tracer.tint`.
+        Some of these triangles, whose hits have geometry 2. They also form a tree of their own: `tint`.
 
     Raises
     ------
@@ -194,8 +197,10 @@ class RayScene:
         self._triangles = [whole]
         if see_through is not None:
             self._position[n] = np.nan
-            chosen = see_through.chosen[:, None]
-            self._triangles = [np.where(left_out, np.uint32(n), whole) for left_out in (chosen, ~chosen)]
+            chosen = see_through.chosen
+            share = np.zeros_like(chosen) if tint is None else tint.chosen
+            kept = [~chosen, chosen & ~share, *([] if tint is None else [share])]
+            self._triangles = [np.where(own[:, None], whole, np.uint32(n)) for own in kept]
         config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
         self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
         if not self._device:
@@ -205,28 +210,29 @@ class RayScene:
         self._scenes: list[int] = []
         if int(library.rtcGetDeviceProperty(self._device, _PROPERTY_VERSION)) // 10000 != 4:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
-        parts = zip(self._triangles, (None, see_through), strict=False) if len(triangle) else ()
-        scene = self._add_scene(list(parts), robust)
-        tinted = 0 if see_through is not None and see_through.blend else None
+        filters = (None, see_through, see_through)
+        parts = zip(range(3), self._triangles, filters, strict=False) if len(triangle) else ()
+        # A geometry in which no triangle is left needs no place in the tree; the others keep their numbers.
+        scene = self._add_scene([part for part in parts if part[0] != 1 or kept[1].any()], robust)
+        tinted = None
         if tint is not None:
-            self._triangles.append(np.where(tint.chosen[:, None], whole, np.uint32(n)))
-            tinted = self._add_scene([(self._triangles[-1], tint)], robust)
+            tinted = self._add_scene([(0, self._triangles[-1], tint)], robust)
         self._check("building the ray tree")
-        self.tracer = self._tracer(scene, tinted)
+        self.tracer = self._tracer(scene, tinted, tint is not None and tint.coloured)
 
-    def _add_scene(self, parts: list[tuple[NDArray[np.uint32], SeeThrough | None]], robust: bool) -> int:
+    def _add_scene(self, parts: list[tuple[int, NDArray[np.uint32], SeeThrough | None]], robust: bool) -> int:
         library = self._library
         scene = int(library.rtcNewScene(self._device))
         self._scenes.append(scene)
         library.rtcSetSceneFlags(scene, _SCENE_ROBUST if robust else 0)
         library.rtcSetSceneBuildQuality(scene, _QUALITY_MEDIUM)
-        for indices, see in parts:
-            self._add_triangles(scene, indices, see)
+        for number, indices, see in parts:
+            self._add_triangles(scene, number, indices, see)
         library.rtcCommitScene(scene)
         return scene
 
     def _add_triangles(
-        self, scene: int, triangle: NDArray[np.uint32], see_through: SeeThrough | None
+        self, scene: int, number: int, triangle: NDArray[np.uint32], see_through: SeeThrough | None
     ) -> None:
         library = self._library
         geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
@@ -248,7 +254,7 @@ class RayScene:
             library.rtcSetGeometryIntersectFilterFunction(geometry, see_through.function)
             library.rtcSetGeometryOccludedFilterFunction(geometry, see_through.function)
         library.rtcCommitGeometry(geometry)
-        library.rtcAttachGeometry(scene, geometry)
+        library.rtcAttachGeometryByID(scene, geometry, number)
         library.rtcReleaseGeometry(geometry)
 
     def _check(self, what: str) -> None:
@@ -258,7 +264,7 @@ class RayScene:
         if code:
             raise ResourceError(f"Embree failed while {what}: {_ERRORS.get(code, code)}")
 
-    def _tracer(self, scene: int, tint: int | None) -> Tracer:
+    def _tracer(self, scene: int, tint: int | None, coloured: bool) -> Tracer:
         library = self._library
         width = 4
         for candidate, name in ((16, _PROPERTY_RAY16), (8, _PROPERTY_RAY8)):
@@ -266,7 +272,7 @@ class RayScene:
                 width = candidate
                 break
         few = len(self._triangles[0]) <= FEW
-        return Tracer(scene, *self.functions(width), width, tint, few)
+        return Tracer(scene, *self.functions(width), width, tint, few, coloured)
 
     def functions(self, width: int) -> tuple[int, int]:
         """Return the addresses of rtcIntersectN and rtcOccludedN for packets of 4, 8 or 16 rays."""

@@ -32,6 +32,13 @@ MAX_WIDTH = 16
 # Rays that the kernels of a bake handle together.
 LANES = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
+# Geometry of BLEND triangles.
+BLEND_GEOMETRY = np.uint32(2)
+# What the ID of a ray says about BLEND surfaces. In the tree of all triangles: 0, it stops at them by chance;
+# n from 1 to 16, it passes, and the transmittance is multiplied into the n-th of `Tint.colour`; UNAWARE, it
+# passes but where alpha is 1. In the tree of BLEND triangles: n, lerp(1, c, a) is multiplied, PASSES + n,
+# the transmittance.
+PASSES, UNAWARE = LANES, np.uint32(2 * LANES + 1)
 # Words of what filter functions of BLEND triangles find: RTCRayQueryContext, `Tint.stop`, `Tint.colour`,
 # `Tint.edge_hits`, and so many hits on edges for each ray: distance and surface of each (`edge_hits`).
 EDGE_HITS = 32
@@ -106,6 +113,7 @@ class Tint(NamedTuple):
     """Memory for the transmittance of BLEND surfaces along rays; each thread has its own.
 
     scene : int, see `Tracer.tint`
+    coloured : int, 0 if no triangle of that tree colours light
     arguments : (5,) int64, RTCOccludedArguments; they hand the arrays below to filter functions
     stop : (16,) uint32, triangle at which each of sixteen rays ends: it lets nothing through
     colour : (3 * 16,) float32, what RGB is multiplied by
@@ -113,6 +121,7 @@ class Tint(NamedTuple):
     """
 
     scene: int
+    coloured: int
     arguments: NDArray[np.int64]
     stop: NDArray[np.uint32]
     colour: NDArray[np.float32]
@@ -155,12 +164,12 @@ def new_caster(tracer: Tracer) -> Caster:
         *(valid, floats, floats.view(np.uint32)),
         *(lane_valid, lane_floats, lane_floats.view(np.uint32)),
         arguments_of(coherent=tracer.few),
-        None if tracer.tint is None else new_tint(tracer.tint),
+        None if tracer.tint is None else new_tint(tracer.tint, tracer.coloured),
     )
 
 
-def new_tint(scene: int) -> Tint:
-    """Return the memory that one thread needs for transmittance, for `Tracer.tint`."""
+def new_tint(scene: int, coloured: bool) -> Tint:
+    """Return the memory that one thread needs for transmittance; see `Tracer.tint` and `coloured`."""
     # RTCRayQueryContext (without instances), and what the filter functions find behind it.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
@@ -169,7 +178,7 @@ def new_tint(scene: int) -> Tint:
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[TINT_STOP:TINT_COLOUR], words[TINT_EDGES:TINT_EDGE_HITS]
-    return Tint(scene, arguments, stop, memory[TINT_COLOUR:TINT_EDGES], edges)
+    return Tint(scene, int(coloured), arguments, stop, memory[TINT_COLOUR:TINT_EDGES], edges)
 
 
 def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:

@@ -69,7 +69,7 @@ def cast(rays, n=500, far=100.0, any_hit=False):
     return origin[chosen, :2], end[chosen], kept[chosen]
 
 
-def test_only_coloured_blend_surfaces_are_chosen():
+def test_blend_surfaces_are_chosen_and_told_from_white_ones():
     red = np.ones((2, 2, 4)) * [1, 0, 0, 0.5]
     white = np.ones((2, 2, 4)) * [1, 1, 1, 0.5]
     quads = [
@@ -85,12 +85,16 @@ def test_only_coloured_blend_surfaces_are_chosen():
         pane(colour=(1, 1, 1), vertex=np.ones((4, 4)) * [0.5, 1, 1, 1]),
     ]
     table = build_tint(shaded(quads)[1])
-    assert (table.slot >= 0).tolist() == [k >= 7 for k in range(10) for _ in range(2)]
-    assert build_tint(shaded(quads[:7])[1]) is None
-    # White panes have no tree of their own; without any BLEND triangle kernels do without transmittance.
-    assert tree(quads[:7]).tracer.tint == 0
-    assert tree(quads[:4]).tracer.tint == 0
-    assert tree(quads[:3]).tracer.tint is None
+    assert (table.slot >= 0).tolist() == [k in (4, 5, 7, 8, 9) for k in range(10) for _ in range(2)]
+    for k in (7, 8, 9):
+        assert build_tint(shaded(quads[k : k + 1])[1]).coloured
+        assert tree(quads[k : k + 1]).tracer.coloured
+    # White panes colour nothing; without any BLEND triangle kernels do without transmittance.
+    white = tree(quads[:7])
+    assert white.tracer.tint is not None
+    assert not white.tracer.coloured
+    assert build_tint(shaded(quads[:4])[1]) is None
+    assert tree(quads[:4]).tracer.tint is None
     assert new_caster(tree(quads[:3]).tracer).tint is None
 
 
