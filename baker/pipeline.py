@@ -44,8 +44,9 @@ from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.patches import build_patches
 from baker.radiosity.points import KeptPoints, keep_points
-from baker.radiosity.solve import energy_audit, solve_radiosity, solve_warnings
+from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.texels import build_texels
+from baker.radiosity.trapped import light_warnings
 from baker.shading.inside import hide_backs
 from baker.shading.materials import Shading, resolve_materials
 from baker.shading.ray_tree import build_ray_tree
@@ -394,7 +395,7 @@ def _reflected(
             row_error=matrix.row_error,
             reciprocity_error=matrix.reciprocity_error,
         )
-        record.warnings.extend(solve_warnings(solution))
+        record.warnings.extend(light_warnings(solution, matrix, albedo, patches.area, settings.bounces))
         indirect = (solution.irradiance + from_sky).astype(np.float32)
     return texels.albedo * (complete + indirect[patches.patch])
 

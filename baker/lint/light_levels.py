@@ -24,7 +24,7 @@ FACING_RAYS = 64
 HALF_MAX = 65504.0
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Rays start this share of the scene's diagonal off the surface.
-_OFFSET = 1e-5
+OFFSET = 1e-5
 
 
 @dataclass(frozen=True)
@@ -47,23 +47,23 @@ def estimate_levels(subject: Subject) -> Levels:
     """Estimate direct light at points spread over all front sides by area."""
     world = subject.world
     random = np.random.default_rng(subject.settings.seed)
-    position, normal, triangle = _spread(subject, POINTS, random)
+    position, normal, triangle = spread_points(subject, POINTS, random)
     total = np.zeros((len(position), 3))
-    origin = position + _OFFSET * subject.diagonal * normal
+    origin = position + OFFSET * subject.diagonal * normal
     for light in subject.scene.local_lights:
         if max(light.intensity) > 0:
             total += _punctual(subject, light, origin, normal)
     total += _emissive(subject, origin, normal, random)
     sky = np.array(subject.settings.sky_radiance)
     if sky.any():
-        way = _cosine(normal, SKY_RAYS, random)
+        way = cosine_ways(normal, SKY_RAYS, random)
         far = np.full(len(way), 1e30)
         hit, _ = world.first_hits(np.repeat(origin, SKY_RAYS, axis=0), way, np.zeros(len(way)), far)
         total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
     return Levels(position, total.max(axis=1), triangle)
 
 
-def _spread(
+def spread_points(
     subject: Subject, n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return n points, stratified by area, with the normal of their face and its number."""
@@ -142,7 +142,7 @@ def emission(subject: Subject) -> NDArray[np.float64]:
     return out
 
 
-def _cosine(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
+def cosine_ways(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
     """Return n cosine-weighted directions around each normal, (N n, 3) float64."""
     way = random.normal(size=(len(normal) * n, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
@@ -183,7 +183,7 @@ def clips_half(subject: Subject) -> Iterator[Found]:
         share = 100.0 * len(over) / len(levels.irradiance)
         x, y, z = (float(v) for v in levels.position[worst] + subject.scene.origin)
         most = levels.irradiance[worst]
-        text = f"about {share:.2g}% of the surface gets more than 65504 lx, up to {most:.3g}"
+        text = f"about {share:.3g}% of the surface gets more than 65504 lx, up to {most:.3g}"
         at = subject.raw.instances[subject.world.instance[levels.triangle[worst]]]
         yield Found(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
 
@@ -234,8 +234,8 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
         met = False
         for side in sides:
             normal = side * world.normal[chosen]
-            origin = _inside(subject, chosen, random) + _OFFSET * subject.diagonal * normal
-            way = _cosine(normal, 1, random)
+            origin = _inside(subject, chosen, random) + OFFSET * subject.diagonal * normal
+            way = cosine_ways(normal, 1, random)
             hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
             met = met or bool((hit >= 0).any())
         if not met:

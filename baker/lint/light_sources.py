@@ -16,6 +16,8 @@ from baker.lint.subject import Subject
 
 # Albedo above which light hardly ever dies away.
 MOST_REFLECTED = 0.95
+# Albedo from which closed rooms are worth a look.
+NEARLY_WHITE = 0.98
 # More than these is likelier a wrong unit than such a light.
 ABSURD = {"point": 1e6, "spot": 1e7, "directional": 2e5}
 ABSURD_EMISSION = 1e8
@@ -172,18 +174,37 @@ def albedo(subject: Subject) -> Iterator[Found]:
     """Materials that reflect over 95 % of the light.
 
     Nothing in nature does. Light hardly dies away between such surfaces: closed rooms of them get brighter
-    without end. A glTF material without a base colour is white: albedo 1.
+    without end. A glTF material without a base colour is white: albedo 1. Where albedo is above 0.98, paths
+    of 20 reflections tell by how much all bounces together multiply the light; a bake tells that number, too,
+    if it is above 20.
     """
+    gain = None
+    reflected = albedos(subject)
     for k in subject.used_materials:
-        material = subject.scene.materials[k]
-        value = max(material.base_colour[:3]) * _painted(subject, k)
-        if material.base_colour_texture is not None and value > MOST_REFLECTED:
-            mean = image_mean(material.base_colour_texture.image)
-            value = float(max(a * b for a, b in zip(material.base_colour[:3], mean, strict=True)))
+        material, value = subject.scene.materials[k], float(reflected[k])
         if value > MOST_REFLECTED:
             mesh = next(m for m, f in enumerate(subject.meshes) if (f.material[f.good] == k).any())
             what = f"material '{material.name}'" if material.name else "the default material"
-            yield Found(f"{what} has an albedo of {value:.3g}", subject.place(mesh), more={"material": k})
+            text = f"{what} has an albedo of {value:.3g}"
+            if value > NEARLY_WHITE:
+                from baker.lint.trapped import MOST_GAIN, trapped_gain
+
+                gain = trapped_gain(subject, reflected) if gain is None else gain
+                if gain > MOST_GAIN:
+                    text += f": all bounces together multiply light by about {gain:.3g}"
+            yield Found(text, subject.place(mesh), more={"material": k})
+
+
+def albedos(subject: Subject) -> NDArray[np.float64]:
+    """Return the mean albedo of each material that is used, the largest of its colours, (M,) float64."""
+    out = np.zeros(len(subject.scene.materials))
+    for k in subject.used_materials:
+        material = subject.scene.materials[k]
+        out[k] = max(material.base_colour[:3]) * _painted(subject, k)
+        if material.base_colour_texture is not None and out[k] > MOST_REFLECTED:
+            mean = image_mean(material.base_colour_texture.image)
+            out[k] = max(a * b for a, b in zip(material.base_colour[:3], mean, strict=True))
+    return out
 
 
 def _painted(subject: Subject, material: int) -> float:

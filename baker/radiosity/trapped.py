@@ -1,0 +1,72 @@
+"""Light that never ends: nearly white surfaces that see nearly nothing but each other.
+
+What is left of light after n reflections is s_n = (rho F) s_{n-1}, s_0 = 1; in a closed room of albedo rho it
+is rho^n, and all bounces together are 1 / (1 - rho) times the direct light.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import SceneWarning
+from baker.radiosity.form_factors import FormFactorMatrix
+from baker.radiosity.solve import MAX_ALBEDO, Solution, apply, solve_warnings
+
+# Albedo from which it is worth looking.
+NEARLY_WHITE = 0.98
+REFLECTIONS = 20
+# Light that is multiplied by less than this is ordinary: a closed room of albedo 0.95.
+MOST_GAIN = 20.0
+
+
+def light_warnings(
+    solution: Solution,
+    matrix: FormFactorMatrix,
+    albedo: NDArray[np.float64],
+    area: NDArray[np.float64],
+    bounces: int | None,
+) -> list[SceneWarning]:
+    """Return what is to be said of bounced light: the solve ended early, or light hardly ends at all."""
+    return [*solve_warnings(solution), *trapped_light(matrix, albedo, area, bounces)]
+
+
+def trapped_light(
+    matrix: FormFactorMatrix,
+    albedo: NDArray[np.float64],
+    area: NDArray[np.float64],
+    bounces: int | None,
+) -> list[SceneWarning]:
+    """Return a warning if light between some patches is multiplied by more than `MOST_GAIN`.
+
+    Parameters
+    ----------
+    matrix : FormFactorMatrix
+    albedo : (P, 3) float64
+    area : (P,) float64, m2
+    bounces : int or None
+        As the solve has it; few bounces end the light before it can grow.
+    """
+    white = albedo.max(axis=1) > NEARLY_WHITE
+    if not white.any() or (bounces is not None and bounces < MOST_GAIN):
+        return []
+    albedo = np.minimum(albedo, MAX_ALBEDO)
+    left = np.ones_like(albedo)
+    for _ in range(REFLECTIONS):
+        left = albedo * apply(matrix, left)
+    left = left.max(axis=1)
+    trapped = white & (left > (1.0 - 1.0 / MOST_GAIN) ** REFLECTIONS)
+    if not trapped.any():
+        return []
+    share = 100.0 * float(area[trapped].sum() / area.sum())
+    each = float(np.average(left[trapped], weights=area[trapped])) ** (1.0 / REFLECTIONS)
+    # Rays measure the sums of rows: a closed room's may be a little above 1.
+    most = 1.0 / (1.0 - min(each, MAX_ALBEDO))
+    message = (
+        f"surfaces that reflect over {100 * NEARLY_WHITE:g} % see little but each other "
+        f"({share:.3g} % of the surface): all bounces together multiply light there by about {most:.3g}"
+    )
+    if most > 0.5 / (1.0 - MAX_ALBEDO):
+        message += f", and without the bake's limit of albedo {MAX_ALBEDO} it would grow without bound"
+    message += "; lower their base colour to 0.9 or less (`baker check` names the materials)"
+    return [SceneWarning("albedo", message)]
