@@ -32,7 +32,8 @@ def trapped_gain(subject: Subject, albedo: NDArray[np.float64]) -> float:
         return 1.0
     random = np.random.default_rng(subject.settings.seed)
     position, normal, triangle = spread_points(subject, POINTS, random)
-    position, normal, triangle = (np.repeat(value, PATHS, axis=0) for value in (position, normal, triangle))
+    position, normal = np.repeat(position, PATHS, axis=0), np.repeat(normal, PATHS, axis=0)
+    triangle = np.repeat(triangle, PATHS)
     left = np.ones(len(position))
     reflected = np.minimum(albedo, MAX_ALBEDO)
     for _ in range(REFLECTIONS):
