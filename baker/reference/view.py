@@ -15,6 +15,7 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.parallel import thread_count
 from baker.core.scene import Scene
 from baker.reference.lamps import LampTable, build_lamps
+from baker.shading.inside import hide_backs
 from baker.shading.materials import Shading, resolve_materials
 from baker.shading.ray_tree import build_ray_tree
 from baker.trace.embree import RayScene
@@ -68,6 +69,8 @@ class Reference:
     sphere : (4,) float64
         Centre and radius, metres, of a sphere around everything.
     threads : int
+    tells : (T,) uint8
+        What each triangle says about who sees it first, see `kernels.probe`; nothing if not asked for.
     """
 
     geometry: Geometry
@@ -77,6 +80,7 @@ class Reference:
     rays: RayScene
     sphere: NDArray[np.float64]
     threads: int
+    tells: NDArray[np.uint8]
 
     def __enter__(self) -> Reference:
         """Return itself."""
@@ -103,6 +107,7 @@ def build_reference(
     sky: tuple[float, float, float] = (0.0, 0.0, 0.0),
     lambertian: bool = False,
     threads: int | None = None,
+    buried: bool = False,
 ) -> Reference:
     """Prepare a scene for path tracing.
 
@@ -114,6 +119,8 @@ def build_reference(
     lambertian : bool
         Every surface reflects as Lambert with its base colour, as bakes see it.
     threads : int, optional
+    buried : bool
+        Work out what is solid, so that `reference.buried` can be asked.
 
     Raises
     ------
@@ -126,7 +133,11 @@ def build_reference(
     rays = build_ray_tree(geometry, shading, threads=count)
     lamps = build_lamps(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lamps, lambertian)
-    return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count)
+    tells = np.zeros(len(geometry.triangle), np.uint8)
+    if buried:
+        # Only for the question what is buried: paths see backs as materials have them.
+        tells = hide_backs(scene, geometry, shading)[1]
+    return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count, tells)
 
 
 def _no_atlas(scene: Scene) -> Atlas:

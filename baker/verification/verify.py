@@ -188,7 +188,9 @@ def verify(
     weight = stands_for * places.surface
     baked = bake.manifest.get("settings", {})
     bounces = baked.get("bounces")
-    with build_reference(bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads) as reference:
+    with build_reference(
+        bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads, buried=True
+    ) as reference:
         places = free_places(reference, places, settings.seed)
         report(progress, "start", 0.0, "kernels")
         first_rays(reference, places, names)
