@@ -6,10 +6,7 @@ scene -> atlas -> texels -> buried points -> direct light -> patches -> form fac
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,76 +19,30 @@ from baker.core.atlas import Atlas
 from baker.core.errors import ResourceError, SettingsError
 from baker.core.export import check_exports
 from baker.core.farm import Farm, LocalFarm
-from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import TileRunner, thread_count
-from baker.core.progress import Progress, report, silent
+from baker.core.progress import Progress, silent
 from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.io.load import load_scene
-from baker.kernels.emitters import Emitters
-from baker.kernels.hits import HitTable
-from baker.kernels.surface import Surface
-from baker.lights.emissive import build_emitters
+from baker.kernels.sides import SeenLight
 from baker.lint.in_bake import bake_warnings
-from baker.radiosity.buried import find_buried
 from baker.radiosity.crevices import gap_depth
 from baker.radiosity.direct import DirectLight, direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
-from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.patches import build_patches
-from baker.radiosity.points import KeptPoints, keep_points
 from baker.radiosity.solve import energy_audit, solve_radiosity
-from baker.radiosity.texels import build_texels
 from baker.radiosity.trapped import light_warnings
-from baker.shading.inside import hide_backs
-from baker.shading.materials import Shading, resolve_materials
-from baker.shading.ray_tree import build_ray_tree
-from baker.trace.embree import RayScene
 from baker.unwrap.unwrap import unwrap_scene
+from baker.world import Record, World, prepare
 
 # Rays from each patch for its form factors, by hemisphere samples per texel.
 MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 # A texel counts as not converged if its standard error before denoising exceeds this share of its value.
 UNCONVERGED = 0.25
-
-
-@dataclass
-class Record:
-    """Collects what a bake tells about itself while it runs."""
-
-    progress: Progress
-    timings: dict[str, float] = field(default_factory=dict)
-    rays: dict[str, int] = field(default_factory=dict)
-    solve: dict[str, Any] = field(default_factory=dict)
-    warnings: list[SceneWarning] = field(default_factory=list)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time a stage; several visits add up."""
-        report(self.progress, name, 0.0)
-        start = time.perf_counter()
-        yield
-        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
-
-
-@dataclass(frozen=True)
-class World:
-    """Everything that rays of a bake need, ready to be traced."""
-
-    geometry: Geometry
-    shading: Shading
-    texels: TexelBuffer
-    surface: Surface
-    rays: RayScene
-    emitters: Emitters
-    table: HitTable
-    tells: NDArray[np.uint8]
-    mask: NDArray[np.uint16]
-    kept: KeptPoints | None
 
 
 def bake(
@@ -178,38 +129,6 @@ def _channels(settings: BakeSettings) -> dict[str, Channel]:
     return found
 
 
-def prepare(
-    scene: Scene,
-    atlas: Atlas,
-    settings: BakeSettings,
-    record: Record,
-    mask: NDArray[np.uint16] | None = None,
-) -> World:
-    """Build texels, ray tree and tables, and find the buried points unless `mask` says them already."""
-    threads = thread_count(settings.threads)
-    with record.stage("texels"):
-        geometry = world_geometry(scene, atlas)
-        shading = resolve_materials(scene, geometry)
-        geometry, tells = hide_backs(scene, geometry, shading)
-        texels, surface = build_texels(
-            geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
-        )
-    with record.stage("ray tree"):
-        rays = build_ray_tree(geometry, shading, threads=threads)
-        emitters = build_emitters(geometry, shading)
-        table = build_hit_table(geometry, texels, emitters)
-    if mask is None:
-        with record.stage("buried texels"):
-            mask, cast = find_buried(
-                texels, surface, table, tells, rays.tracer,
-                seed=settings.seed, threads=threads, progress=record.progress,
-            )  # fmt: skip
-            record.rays["buried texels"] = cast
-    return World(
-        geometry, shading, texels, surface, rays, emitters, table, tells, mask, keep_points(texels.n)
-    )
-
-
 def trace_transport(
     scene: Scene,
     world: World,
@@ -230,7 +149,7 @@ def trace_transport(
         if share is not None and ao_samples == n_samples:
             return replace(transport, open=share.open, ao_samples=ao_samples)
         with record.stage("ambient occlusion"):
-            run = farm.runner("ambient occlusion", {"mask": world.mask})
+            run = farm.runner("ambient occlusion", {"inside": world.inside})
             opened = open_sky(world, settings, record.progress, run)
             record.rays["ambient occlusion"] = world.texels.n_front * ao_samples
         transport = replace(transport, open=opened, ao_samples=ao_samples)
@@ -245,7 +164,7 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
             SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use --sky")
         )
     with record.stage("direct light"):
-        run = farm.runner("direct light", {"mask": world.mask})
+        run = farm.runner("direct light", {"inside": world.inside})
         direct = light_directly(scene, world, settings, record.progress, run)
         record.rays["direct light"] = direct.rays
     exitance = np.zeros((texels.n, 4), np.float32)
@@ -254,8 +173,10 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
     # It has done its part.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
-        run = farm.runner("final gather", {"mask": world.mask, "exitance": exitance, "exact": direct.exact})
-        seen = texels.hit_image(exitance)
+        run = farm.runner(
+            "final gather", {"inside": world.inside, "exitance": exitance, "exact": direct.exact}
+        )
+        seen = world.sides.seen_light(exitance)
         del exitance
         gathered = gather_light(world, (seen, direct.exact), settings, record.progress, run)
         record.rays["final gather"] = gathered.rays
@@ -286,7 +207,7 @@ def light_directly(
 
 def gather_light(
     world: World,
-    found: tuple[NDArray[np.float32], NDArray[np.uint8]],
+    found: tuple[SeenLight, NDArray[np.uint8]],
     settings: BakeSettings,
     progress: Progress,
     run: TileRunner,
@@ -361,10 +282,10 @@ def _reflected(
             progress=record.progress,
             kept=world.kept,
         )
-        patches = build_patches(texels, depth)
+        patches = build_patches(texels, depth, link=world.sides.link)
         matrix = build_form_factors(
             patches,
-            texels.hit_image(patches.patch, fill=-1),
+            world.sides.seen_patches(patches.patch),
             world.surface,
             world.mask,
             world.table,
@@ -374,7 +295,7 @@ def _reflected(
             threads=thread_count(settings.threads),
             progress=record.progress,
             kept=world.kept,
-            run=farm.runner("form factors", {"mask": world.mask, "depth": depth}),
+            run=farm.runner("form factors", {"inside": world.inside, "depth": depth}),
         )
         record.rays["form factors"] = matrix.rays + cast
     with record.stage("solve"):
@@ -416,6 +337,7 @@ def _finish(
     """
     n_front = texels.n_front
     chart = texels.page_image(texels.chart[:n_front], fill=-1)
+    region = texels.page_image(texels.region, fill=-1)
     valid = texels.page_image(good, fill=False)
     centroid = texels.page_image(texels.centroid)
     status = np.where(chart >= 0, np.uint8(TexelStatus.COVERED), np.uint8(TexelStatus.EMPTY))
@@ -437,7 +359,7 @@ def _finish(
                     )
                     for part in layers
                 ]
-                plan = PagePlan(chart[page], valid[page], centroid[page])
+                plan = PagePlan(region[page], valid[page], centroid[page])
                 value[page], grown = finish_page(
                     plan,
                     images,

@@ -120,6 +120,7 @@ def cast_rays(kind: str = "") -> None:
     from baker.kernels.gather import N_COLUMNS, gather
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+    from baker.kernels.sides import nothing_seen
     from baker.lights.emissive import build_emitters
     from baker.shading.materials import resolve_materials
     from baker.shading.ray_tree import build_ray_tree
@@ -152,7 +153,7 @@ def cast_rays(kind: str = "") -> None:
     widest_view(emitters, origin)
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
     light_samples(origin, normal, lamps, needed, caster, 0, net, shared, weigh, exact, sums, squares)
-    dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
+    dark, black = nothing_seen(), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
     gather(origin, normal, table, dark, lamps, needed, caster, 0, net, shared, black, two, exact, out)
     rays.close()

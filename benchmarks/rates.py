@@ -17,8 +17,9 @@ from baker.core.parallel import thread_count
 from baker.core.progress import silent
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.load import load_scene
-from baker.pipeline import Record, World, prepare, trace_transport
+from baker.pipeline import trace_transport
 from baker.unwrap.unwrap import unwrap_scene
+from baker.world import Record, World, prepare
 
 # Stage of the bake -> kind of bare rays it is put beside.
 BESIDE = {

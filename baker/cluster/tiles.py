@@ -55,7 +55,7 @@ class TileWorker:
         with self._lock:
             # Once for all tiles; other threads of this worker wait for it.
             if self._world is None:
-                self._world = self._build(arrays["mask"])
+                self._world = self._build(arrays["inside"])
             if stage not in self._made:
                 self._made = {stage: PREPARE[stage](self._world, arrays)}
             world, made = self._world, self._made[stage]
@@ -67,10 +67,10 @@ class TileWorker:
         STAGES[stage](self.scene, world, made, self.settings, run)
         return found
 
-    def _build(self, mask: NDArray[np.uint16]) -> Any:
-        from baker.pipeline import Record, prepare
+    def _build(self, inside: NDArray[np.uint16]) -> Any:
+        from baker.world import Record, prepare
 
-        world = prepare(self.scene, self.atlas, self.settings, Record(silent), mask)
+        world = prepare(self.scene, self.atlas, self.settings, Record(silent), inside)
         # Points kept for later stages would be those of other tiles.
         return replace(world, kept=None)
 
@@ -82,12 +82,12 @@ def _no_more(world: Any, arrays: Mapping[str, NDArray[Any]]) -> None:
 def _make_patches(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     from baker.radiosity.patches import build_patches
 
-    patches = build_patches(world.texels, arrays["depth"])
-    return patches, world.texels.hit_image(patches.patch, fill=-1)
+    patches = build_patches(world.texels, arrays["depth"], link=world.sides.link)
+    return patches, world.sides.seen_patches(patches.patch)
 
 
 def _make_image(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
-    return world.texels.hit_image(arrays["exitance"]), arrays["exact"]
+    return world.sides.seen_light(np.array(arrays["exitance"])), arrays["exact"]
 
 
 def _direct(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:
@@ -100,11 +100,11 @@ def _form_factors(scene: Scene, world: Any, made: Any, settings: BakeSettings, r
     from baker.pipeline import patch_rays
     from baker.radiosity.form_factors import cast_rows
 
-    patches, hit_patch = made
+    patches, seen = made
     quiet: Progress = silent
     cast_rows(
         patches,
-        hit_patch,
+        seen,
         world.surface,
         world.mask,
         world.table,

@@ -1,7 +1,8 @@
 """The texels that lie on surfaces, and what the ray stages need to know of each.
 
 Entries 0 to n_front are the texels of the pages. Behind them come the back sides of texels on
-double-sided surfaces: they take part in light transport but are not stored in any map.
+double-sided surfaces, then further sides of texels that another surface passes through (`radiosity.sides`):
+they take part in light transport but are not stored in any map.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ class TexelBuffer:
         Entry of each pixel, of a covered neighbour for pixels just beside a chart (a hit on the border
         may be rounded there), else -1.
     back_entry : (n_front,) int32, the back's entry of a front texel or -1
+    region : (n_front,) int32
+        Number of the part of its chart in which neighbouring texels see each other along the surface
+        (`radiosity.sides`); the chart itself where no other surface cuts it.
     """
 
     resolution: int
@@ -54,6 +58,7 @@ class TexelBuffer:
     albedo: NDArray[np.float32]
     lookup: NDArray[np.int32]
     back_entry: NDArray[np.int32]
+    region: NDArray[np.int32]
 
     @property
     def n(self) -> int:
@@ -87,6 +92,14 @@ class TexelBuffer:
         image[pixel] = value
         shape = (self.resolution, self.resolution, *value.shape[1:])
         return image.reshape(shape if page is not None else (n_pages, *shape))
+
+    def with_copies(self, entry: NDArray[np.int32]) -> TexelBuffer:
+        """Return the buffer with copies of entries (m,) behind all others; no pixel leads to them."""
+        names = ("pixel", "back", "chart", "instance", "area", "position", "normal", "albedo")
+        longer: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(self, name)[entry]]) for name in names
+        }
+        return replace(self, **longer)
 
     def without_surface(self) -> TexelBuffer:
         """Return the buffer without what only the ray stages need: triangles, positions, normals, albedo."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.kernels.sides import find_side, new_hits, note_hit
 from baker.kernels.tint import follow, light_kept
 from baker.trace.jit import inner, kernel, larger, smaller
 from baker.trace.packets import (
@@ -28,18 +29,18 @@ from baker.trace.packets import (
     trace_lanes,
 )  # fmt: skip
 
-# Targets of rays that hit no patch.
-LOST, SKY = -1, -2
+# Targets of rays that hit no patch; SPLIT - s: the split texel in row s of the table of sides.
+LOST, SKY, SPLIT = -1, -2, -3
 
 
 @kernel
 def cast_form_factors(  # type: ignore[no-untyped-def]
-    origin, normal, table, patch, caster, begin, net, shared, target, tally, colour
+    origin, normal, table, seen, caster, begin, net, shared, target, tally, colour
 ):
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
-    patch : (sides * P * H * W,) int32, patch at each pixel (`hits.hit_pixel`), -1: none
+    seen : `sides.SeenPatch`, patches that hits lie on
     net : (R, 2) uint32
     target : (m, R) int32 output, patch hit, LOST or SKY
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
@@ -50,6 +51,10 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
+    patch, of_side = seen.image, seen.value
+    side_point, side_normal, side_height = seen.sides.point, seen.sides.normal, seen.sides.height
+    side_member, side_length = seen.sides.member, seen.sides.side
+    hits = new_hits()
     seeds, frame = new_seeds(), new_frame()
     for group in range(0, len(origin), LANES):
         lanes = smaller(LANES, len(origin) - group)
@@ -62,6 +67,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
             _note_colour(caster.tint, colour, group, lanes, r)
+            n_split = 0
             for lane in range(lanes):
                 p = group + lane
                 target[p, r] = LOST
@@ -78,8 +84,27 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
                 pixel = hit_pixel(row, size, n_pixels, prim, u, v, front)
                 if pixel >= 0:
                     target[p, r] = patch[pixel]
-                if target[p, r] < 0:
+                if target[p, r] <= SPLIT:
+                    note_hit(hits, lane, rays, row, prim, front)
+                    n_split += 1
+                elif target[p, r] < 0:
                     tally[begin + p, 1] += 1
+            if n_split > 0:
+                for lane in range(lanes):
+                    p = group + lane
+                    at = SPLIT - np.int64(target[p, r])
+                    if at >= 0:
+                        found = find_side(
+                            side_point, side_normal, side_height, side_member, side_length,
+                            at, hits, lane, caster,
+                        )  # fmt: skip
+                        target[p, r] = LOST
+                        if found >= 0:
+                            target[p, r] = of_side[found]
+                        else:
+                            tally[begin + p, 1] += 1
+                for lane in range(LANES):
+                    on[lane] = -1 if lane < lanes else 0
 
 
 @inner

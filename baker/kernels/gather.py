@@ -17,6 +17,7 @@ from baker.kernels.area_light import emitter_hit
 from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance, emitter_at
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.kernels.sides import find_side, new_hits, note_hit
 from baker.kernels.surface import N_POINTS
 from baker.kernels.tint import any_stopped, follow_gather, gather_turns, light_kept, trace_gather
 from baker.trace.jit import inner, kernel, scratch, smaller
@@ -46,13 +47,12 @@ _numbers, _counts, _rgba = scratch((LANES,), np.int64), scratch((LANES,), np.int
 
 @kernel
 def gather(  # type: ignore[no-untyped-def]
-    origin, normal, table, exitance, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
+    origin, normal, table, seen, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
 ):
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    exitance : (sides * P * H * W, 4) float32, lx, light that the texel at each pixel reflects (RGB,
-        spare); no rows if nothing does
+    seen : `sides.SeenLight`, light that texels reflect
     shading : from `emitters.needed_shading`
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
@@ -71,6 +71,10 @@ def gather(  # type: ignore[no-untyped-def]
     part, missed = _parts(), _floats()
     total, squares = _totals(), _doubles()
     pixel = _numbers()
+    exitance, of_side = seen.image, seen.value
+    side_point, side_normal, side_height = seen.sides.point, seen.sides.normal, seen.sides.height
+    side_member, side_length = seen.sides.member, seen.sides.side
+    hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
     # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
@@ -146,13 +150,37 @@ def gather(  # type: ignore[no-untyped-def]
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             if lit:
+                n_split = 0
                 for lane in range(lanes):
                     p = pixel[lane]
                     if p >= 0:
+                        if exitance[p, 3] > _f(0.0):
+                            prim = np.int64(words[PRIM_ID * LANES + lane])
+                            dx, dy, dz = (
+                                rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane],
+                                rays[DIR_Z * LANES + lane],
+                            )  # fmt: skip
+                            note_hit(hits, lane, rays, row, prim, front_facing(row, prim, dx, dy, dz))
+                            split[n_split] = lane
+                            n_split += 1
+                            continue
                         tint = caster.tint
                         part[lane] += exitance[p, 0] * inverse_pi * light_kept(tint, 0, lane)
                         part[LANES + lane] += exitance[p, 1] * inverse_pi * light_kept(tint, 1, lane)
                         part[2 * LANES + lane] += exitance[p, 2] * inverse_pi * light_kept(tint, 2, lane)
+                for j in range(n_split):
+                    lane = int(split[j])
+                    at = np.int64(exitance[pixel[lane], 3]) - 1
+                    found = find_side(
+                        side_point, side_normal, side_height, side_member, side_length, at, hits, lane, caster
+                    )
+                    if found >= 0:
+                        for c in range(3):
+                            kept = light_kept(caster.tint, c, lane)
+                            part[c * LANES + lane] += of_side[found, c] * inverse_pi * kept
+                if n_split > 0:
+                    for lane in range(LANES):
+                        on[lane] = -1 if lane < lanes else 0
             if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(LANES):
                     for c in range(3):

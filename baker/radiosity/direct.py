@@ -21,6 +21,7 @@ from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shadow import add_visible
+from baker.kernels.sides import nothing_seen
 from baker.kernels.surface import N_POINTS, Surface
 from baker.lights.family import LIGHT_FAMILIES
 from baker.radiosity.points import KeptPoints, tile_points
@@ -95,7 +96,7 @@ def direct_light(
     weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
 
-    dark, black = np.zeros((0, 4), np.float32), np.zeros(3, np.float32)
+    dark, black = nothing_seen(), np.zeros(3, np.float32)
     limits = np.array([0.0, n_light], np.float64)
     few_shared = shared_bits_mask(N_HEMISPHERE)
 

@@ -14,6 +14,7 @@ from baker.kernels.emitters import Emitters, lamps_for, needed_shading
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.sides import SeenLight
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE, batch_variance
 from baker.radiosity.points import KeptPoints, tile_points
@@ -48,7 +49,7 @@ def final_gather(
     surface: Surface,
     mask: NDArray[np.uint16],
     table: HitTable,
-    exitance: NDArray[np.float32],
+    seen: SeenLight,
     exact: NDArray[np.uint8],
     emitters: Emitters,
     shading: Any,
@@ -68,9 +69,8 @@ def final_gather(
 
     Parameters
     ----------
-    exitance : (sides * P * H * W, 4) float32, lx
-        Light that the texel at each pixel reflects (`TexelBuffer.hit_image`; RGB and one spare);
-        emission is found by MIS with `n_light` shadow rays.
+    seen : SeenLight
+        Light that texels reflect (`Sides.seen_light`); emission is found by MIS with `n_light` shadow rays.
     exact : (n,) uint8
         1 for entries whose direct light from emitters is complete already.
     sky : radiance, cd/m2
@@ -94,7 +94,7 @@ def final_gather(
             origin,
             normal,
             table,
-            exitance,
+            seen,
             lamps,
             shading,
             caster,

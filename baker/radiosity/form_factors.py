@@ -25,6 +25,7 @@ from baker.kernels.form_factor import (
 )
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.sides import SeenPatch
 from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.patches import PatchSet
 from baker.radiosity.points import KeptPoints, some_points
@@ -86,7 +87,7 @@ class FormFactorMatrix:
 
 def build_form_factors(
     patches: PatchSet,
-    hit_patch: NDArray[np.int32],
+    seen: SeenPatch,
     surface: Surface,
     mask: NDArray[np.uint16],
     table: HitTable,
@@ -103,8 +104,8 @@ def build_form_factors(
 
     Parameters
     ----------
-    hit_patch : (sides * P * H * W,) int32
-        Patch at each pixel, `TexelBuffer.hit_image` of `patches.patch` with -1 where nothing is.
+    seen : SeenPatch
+        Patches that hits lie on, `Sides.seen_patches` of `patches.patch`.
     kept : KeptPoints, optional
         Points of an earlier stage.
     run : TileRunner
@@ -113,7 +114,7 @@ def build_form_factors(
     n = patches.n
     rows = cast_rows(
         patches,
-        hit_patch,
+        seen,
         surface,
         mask,
         table,
@@ -151,7 +152,7 @@ def build_form_factors(
 
 def cast_rows(
     patches: PatchSet,
-    hit_patch: NDArray[np.int32],
+    seen: SeenPatch,
     surface: Surface,
     mask: NDArray[np.uint16],
     table: HitTable,
@@ -198,7 +199,7 @@ def cast_rows(
         target = np.full((end - begin, n_rays), -1, np.int32)
         colour = np.zeros((end - begin if tracer.coloured else 0, n_rays, 3), np.float32)
         cast_form_factors(
-            origin, normal, table, hit_patch, new_caster(tracer), begin, net, shared, target, tally, colour
+            origin, normal, table, seen, new_caster(tracer), begin, net, shared, target, tally, colour
         )
         passed = sum_colours(target, colour) if len(colour) else ()
         column, count, length = count_targets(target)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.texels import TexelBuffer
+from baker.kernels.sides import join_linked
 
 # The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
 MAX_PATCHES = 32768
@@ -60,7 +61,11 @@ class PatchSet:
 
 
 def build_patches(
-    texels: TexelBuffer, depth: NDArray[np.uint8] | None = None, *, max_patches: int = MAX_PATCHES
+    texels: TexelBuffer,
+    depth: NDArray[np.uint8] | None = None,
+    *,
+    max_patches: int = MAX_PATCHES,
+    link: NDArray[np.int32] | None = None,
 ) -> PatchSet:
     """Group texels into blocks: the smallest power of two that keeps to `max_patches`.
 
@@ -72,13 +77,16 @@ def build_patches(
     depth : (n,) uint8, optional
         0 to 2; entries of different depth share no patch (`crevices`). Those of depth 2 form smaller blocks
         that keep to `max_patches` for themselves.
+    link : (m, 2) int32, optional
+        Neighbouring entries that see each other (`sides.Sides.link`): in the charts that these lie in,
+        entries of a block that are not linked within it form patches of their own.
     """
     depth = np.zeros(len(texels.pixel), np.uint8) if depth is None else depth
     block = _smallest_block(texels, depth, np.arange(len(depth)), max_patches)
     narrow = np.flatnonzero(depth >= _NARROW)
     side = np.full(len(depth), block, np.int64)
     side[narrow] = min(_smallest_block(texels, depth, narrow, max_patches), block)
-    number, n_patches = _blocks(texels, depth, side)
+    number, n_patches = _blocks(texels, depth, side, link)
     order = np.argsort(number, kind="stable").astype(np.int32)
     first = np.zeros(n_patches + 1, np.int64)
     np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
@@ -122,10 +130,24 @@ def _keys(texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]
 
 
 def _blocks(
-    texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]
+    texels: TexelBuffer,
+    depth: NDArray[np.uint8],
+    side: NDArray[np.int64],
+    link: NDArray[np.int32] | None,
 ) -> tuple[NDArray[np.int32], int]:
-    """Number the blocks in Morton order of their first texel."""
+    """Number the blocks, or their linked parts, in Morton order of their first texel."""
     _, first, inverse = np.unique(_keys(texels, depth, side), return_index=True, return_inverse=True)
+    block = inverse.reshape(-1)
+    if link is not None and len(link):
+        within = link[block[link[:, 0]] == block[link[:, 1]]]
+        root = np.arange(len(block), dtype=np.int32)
+        join_linked(within, root)
+        linked = np.zeros(int(texels.chart.max()) + 1, bool)
+        linked[texels.chart[link[:, 0]]] = True
+        # Blocks of charts without a cut stay whole.
+        root = np.where(linked[texels.chart], root, first[block].astype(np.int32))
+        _, first, inverse = np.unique(root, return_index=True, return_inverse=True)
+        block = inverse.reshape(-1)
     rank = np.zeros(len(first), np.int32)
     rank[np.argsort(first, kind="stable")] = np.arange(len(first), dtype=np.int32)
-    return rank[inverse.reshape(-1)], len(first)
+    return rank[block], len(first)

@@ -95,6 +95,7 @@ def build_texels(
         albedo=_with_backs(albedo, front, back),
         lookup=_lookup(pixel, size, atlas.n_pages),
         back_entry=back_entry,
+        region=chart,
     )
     return texels, surface
 

@@ -1,0 +1,420 @@
+"""Texels that lie on both sides of a surface passing through them: which of their points see each other.
+
+A floor that runs on under a wall has texels with points on both sides of that wall. Two points of a texel lie
+on the same side if the segment between them is free at a small height above the surface:
+
+    height = min(HIGH s, half the headroom of either point)        s: side of the texel, metres
+
+A step lower than that separates nothing; a gap lower than that connects nothing. The same test chooses the
+side of a ray's hit: the side of the nearest point that is visible from just before the hit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.surface import N_POINTS, inverse_uv
+from baker.trace.jit import inner, kernel, scratch, smaller
+from baker.trace.packets import (
+    DIR_X,
+    DIR_Y,
+    DIR_Z,
+    GEOM_ID,
+    LANES,
+    ORG_X,
+    ORG_Y,
+    ORG_Z,
+    TFAR,
+    trace_lanes,
+)  # fmt: skip
+
+_f = np.float32
+# Heights of segments above the surface, in sides of a texel.
+HIGH, LOW = 0.25, 0.02
+# Half length of the diagonals that look for a crossing surface: a little beyond the texel, so that a surface
+# exactly between two texels is met from both.
+_REACH = 0.55
+# A segment before a hit starts this far back along the ray, in sides of a texel.
+_BACK = 0.25
+# Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, face normal.
+HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
+HIT_ROWS = 10
+# Memory of the kernels.
+new_hits = scratch((HIT_ROWS * LANES,), np.float32)
+_frame, _saved = scratch((12 * LANES,), np.float32), scratch((3 * LANES,), np.float32)
+
+
+class SideTable(NamedTuple):
+    """The S texel entries that are split into sides, and their points.
+
+    point, normal (S, 16, 3) float32: ray origins and shading normals; height (S, 16) float32, metres;
+    member (S, 16) int32: row of the values of the point's side, -1 for points inside geometry;
+    side (S,) float32, metres, of the texel.
+    """
+
+    point: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    height: NDArray[np.float32]
+    member: NDArray[np.int32]
+    side: NDArray[np.float32]
+
+
+def no_sides() -> SideTable:
+    """Return the table of a scene without split texels."""
+    return SideTable(
+        np.zeros((0, N_POINTS, 3), _f),
+        np.zeros((0, N_POINTS, 3), _f),
+        np.zeros((0, N_POINTS), _f),
+        np.zeros((0, N_POINTS), np.int32),
+        np.zeros(0, _f),
+    )
+
+
+class SeenLight(NamedTuple):
+    """What rays of the final gather find.
+
+    image (sides * P * H * W, 4) float32, lx: light that the texel at each pixel reflects (RGB), and the
+    number of its row in `sides` plus 1, or 0; no rows if nothing reflects; value (K, 4) float32: the same
+    light of each side of the split texels; sides : SideTable
+    """
+
+    image: NDArray[np.float32]
+    value: NDArray[np.float32]
+    sides: SideTable
+
+
+def nothing_seen() -> SeenLight:
+    """Return the light that rays find where nothing reflects any."""
+    return SeenLight(np.zeros((0, 4), _f), np.zeros((0, 4), _f), no_sides())
+
+
+class SeenPatch(NamedTuple):
+    """What form-factor rays find.
+
+    image (sides * P * H * W,) int32: patch at each pixel, -1: none, `form_factor.SPLIT` - s: the texel in
+    row s of `sides`; value (K,) int32: patch of each side of the split texels; sides : SideTable
+    """
+
+    image: NDArray[np.int32]
+    value: NDArray[np.int32]
+    sides: SideTable
+
+
+@inner
+def _segment(rays, lane, x, y, z, tx, ty, tz):  # type: ignore[no-untyped-def]
+    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; returns -1 if it has a length, else 0."""
+    dx, dy, dz = tx - x, ty - y, tz - z
+    rays[ORG_X * LANES + lane] = x
+    rays[ORG_Y * LANES + lane] = y
+    rays[ORG_Z * LANES + lane] = z
+    rays[DIR_X * LANES + lane] = dx
+    rays[DIR_Y * LANES + lane] = dy
+    rays[DIR_Z * LANES + lane] = dz
+    rays[TFAR * LANES + lane] = _f(1.0)
+    return np.int32(-1) if dx * dx + dy * dy + dz * dz > _f(0.0) else np.int32(0)
+
+
+@kernel
+def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[no-untyped-def]
+    """Find texels that some surface may pass through: a diagonal just above their square is blocked.
+
+    Entries begin to end are examined.
+    crossed : (n,) uint8 output, 1 where one of two diagonals is blocked at one of two heights
+    side : (n,) float32 output, metres, root mean square of the two sides of the whole texel
+    Returns the number of rays cast.
+    """
+    position, uv, triangle, face = surface.position, surface.uv, surface.triangle, surface.face_normal
+    pixels, fronts, back = surface.pixel, surface.front, surface.back
+    starts, entry, entry_area, size = surface.first, surface.entry, surface.entry_area, surface.size
+    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
+    on, rays = caster.lane_valid, caster.lane_floats
+    spare_on, spare = caster.valid, caster.floats
+    # By lane: centre, the two half diagonals, the normal times the texel's side.
+    frame = _frame()
+    cast = 0
+    for group in range(begin, end, LANES):
+        lanes = smaller(LANES, end - group)
+        for lane in range(lanes):
+            i = group + lane
+            front = fronts[i]
+            most = _f(-1.0)
+            t = entry[starts[front]]
+            for e in range(starts[front], starts[front + 1]):
+                if entry_area[e] > most:
+                    most, t = entry_area[e], entry[e]
+            a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
+            rest = pixels[i] % (size * size)
+            x, y = rest % size + 0.5, rest // size + 0.5
+            b1, b2 = a * x + b * y + c, d * x + g * y + h
+            i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
+            across = 0.0
+            for axis in range(3):
+                p0 = float(position[i0, axis])
+                e1, e2 = position[i1, axis] - p0, position[i2, axis] - p0
+                right, down = a * e1 + d * e2, b * e1 + g * e2
+                frame[axis * LANES + lane] = p0 + b1 * e1 + b2 * e2
+                frame[(3 + axis) * LANES + lane] = _REACH * (right + down)
+                frame[(6 + axis) * LANES + lane] = _REACH * (right - down)
+                across += right * right + down * down
+            side[i] = math.sqrt(0.5 * across)
+            sign = -side[i] if back[i] else side[i]
+            for axis in range(3):
+                frame[(9 + axis) * LANES + lane] = sign * face[t, axis]
+            crossed[group + lane] = 0
+        for turn in range(4):
+            height = _f(HIGH if turn < 2 else LOW)
+            row = 3 + 3 * (turn % 2)
+            for lane in range(LANES):
+                on[lane] = 0
+            for lane in range(lanes):
+                x = frame[lane] + height * frame[9 * LANES + lane]
+                y = frame[LANES + lane] + height * frame[10 * LANES + lane]
+                z = frame[2 * LANES + lane] + height * frame[11 * LANES + lane]
+                ex, ey, ez = (
+                    frame[row * LANES + lane],
+                    frame[(row + 1) * LANES + lane],
+                    frame[(row + 2) * LANES + lane],
+                )
+                if crossed[group + lane] == 0:
+                    on[lane] = _segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
+                    cast += 1
+            trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
+            for lane in range(lanes):
+                if on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0):
+                    crossed[group + lane] = 1
+    return cast
+
+
+@inner
+def _between(rays, lane, origin, normal, height, m, i, k):  # type: ignore[no-untyped-def]
+    """Write the segment between points i of item m and k of the same arrays into a lane."""
+    h = smaller(height[m, i], height[m, k])
+    return _segment(
+        rays, lane,
+        origin[m, i, 0] + h * normal[m, i, 0], origin[m, i, 1] + h * normal[m, i, 1],
+        origin[m, i, 2] + h * normal[m, i, 2],
+        origin[m, k, 0] + h * normal[m, k, 0], origin[m, k, 1] + h * normal[m, k, 1],
+        origin[m, k, 2] + h * normal[m, k, 2],
+    )  # fmt: skip
+
+
+@kernel
+def point_heights(origin, normal, side, caster, height):  # type: ignore[no-untyped-def]
+    """Write the height at which segments from points run (m, w) float32: see the module.
+
+    origin, normal : (m, w, 3) float32, w at most 16; side : (m,) float32, metres
+    """
+    scene, intersect, width, query = caster.scene, caster.intersect, caster.width, caster.query
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    for m in range(len(origin)):
+        high = _f(HIGH) * side[m]
+        for k in range(LANES):
+            on[k] = -1 if k < origin.shape[1] else 0
+        for k in range(origin.shape[1]):
+            for axis in range(3):
+                rays[(ORG_X + axis) * LANES + k] = origin[m, k, axis]
+                rays[(DIR_X + axis) * LANES + k] = normal[m, k, axis]
+            rays[TFAR * LANES + k] = _f(2.0) * high
+            words[GEOM_ID * LANES + k] = np.uint32(0xFFFFFFFF)
+        trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
+        for k in range(origin.shape[1]):
+            height[m, k] = smaller(high, _f(0.5) * rays[TFAR * LANES + k])
+
+
+@kernel
+def group_points(origin, normal, height, mask, caster, label):  # type: ignore[no-untyped-def]
+    """Group the points of texels by mutual visibility.
+
+    origin, normal : (m, 16, 3) float32; height : (m, 16) float32, from `point_heights`
+    mask : (m,) uint16, bit k is set where point k is outside geometry
+    label : (m, 16) int8 output, group of each point from 0, -1 for points inside geometry
+    Returns the number of rays cast.
+    """
+    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
+    on, rays = caster.lane_valid, caster.lane_floats
+    spare_on, spare = caster.valid, caster.floats
+    cast = 0
+    for m in range(len(origin)):
+        bits = np.int64(mask[m])
+        for k in range(N_POINTS):
+            label[m, k] = -1
+        groups = 0
+        for seed in range(N_POINTS):
+            if (bits >> seed) & 1 == 0 or label[m, seed] >= 0:
+                continue
+            own = np.int8(groups)
+            groups += 1
+            label[m, seed] = own
+            asked = 0
+            for k in range(N_POINTS):
+                on[k] = 0
+                if (bits >> k) & 1 and label[m, k] != own:
+                    on[k] = _between(rays, k, origin, normal, height, m, seed, k)
+                    asked += 1
+                    if on[k] == 0:
+                        label[m, k] = own
+            if asked == 0:
+                continue
+            cast += asked
+            trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
+            for k in range(N_POINTS):
+                if on[k] == 0 or rays[TFAR * LANES + k] < _f(0.0):
+                    continue
+                other = label[m, k]
+                if other == own:
+                    continue
+                if other < 0:
+                    label[m, k] = own
+                    continue
+                # The seed sees a point of an earlier group: both are one.
+                for j in range(N_POINTS):
+                    label[m, j] = own if label[m, j] == other else label[m, j]
+    return cast
+
+
+@kernel
+def connected_pairs(  # type: ignore[no-untyped-def]
+    origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, connected
+):
+    """Find pairs of entries of which some point k of one sees point k of the other.
+
+    origin_*, normal_* : (m, w, 3) float32, w at most 16; height_* : (m, w) float32
+    connected : (m,) uint8 output
+    """
+    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
+    on, rays = caster.lane_valid, caster.lane_floats
+    spare_on, spare = caster.valid, caster.floats
+    for m in range(len(origin_a)):
+        for k in range(LANES):
+            on[k] = 0
+        for k in range(origin_a.shape[1]):
+            h = smaller(height_a[m, k], height_b[m, k])
+            on[k] = _segment(
+                rays, k,
+                origin_a[m, k, 0] + h * normal_a[m, k, 0], origin_a[m, k, 1] + h * normal_a[m, k, 1],
+                origin_a[m, k, 2] + h * normal_a[m, k, 2],
+                origin_b[m, k, 0] + h * normal_b[m, k, 0], origin_b[m, k, 1] + h * normal_b[m, k, 1],
+                origin_b[m, k, 2] + h * normal_b[m, k, 2],
+            )  # fmt: skip
+        trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
+        connected[m] = 0
+        for k in range(origin_a.shape[1]):
+            if on[k] == 0 or rays[TFAR * LANES + k] >= _f(0.0):
+                connected[m] = 1
+
+
+@inner
+def note_hit(hits, lane, rays, face, prim, front):  # type: ignore[no-untyped-def]
+    """Copy what `find_side` needs of a lane's hit to `hits` (10 * 16,); face: rows of the hit table."""
+    sign = _f(1.0) if front else _f(-1.0)
+    for a in range(3):
+        hits[(HIT_ORIGIN + a) * LANES + lane] = rays[(ORG_X + a) * LANES + lane]
+        hits[(HIT_DIRECTION + a) * LANES + lane] = rays[(DIR_X + a) * LANES + lane]
+        hits[(HIT_NORMAL + a) * LANES + lane] = sign * face[prim, 8 + a]
+    hits[HIT_DISTANCE * LANES + lane] = rays[TFAR * LANES + lane]
+
+
+@inner
+def find_side(point, normal, height, member, side, s, hits, lane, caster):  # type: ignore[no-untyped-def]
+    """Return the row of values of the side that a hit on split texel s lies on, or -1 if no point sees it.
+
+    point, normal, height, member, side : arrays of a `SideTable`
+    hits : (10 * 16,) float32, from `note_hit`; lane : int, which of them
+    The caster's sixteen rays are overwritten, but for their origins.
+    """
+    on, rays = caster.lane_valid, caster.lane_floats
+    saved = _saved()
+    for j in range(3 * LANES):
+        saved[j] = rays[ORG_X * LANES + j]
+    distance = hits[HIT_DISTANCE * LANES + lane]
+    x = hits[lane] + distance * hits[3 * LANES + lane]
+    y = hits[LANES + lane] + distance * hits[4 * LANES + lane]
+    z = hits[2 * LANES + lane] + distance * hits[5 * LANES + lane]
+    found = np.int32(-1)
+    for turn in range(2):
+        # First from the ray, before it hits, which is on the right side whatever rounding did to the hit.
+        step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
+        vx, vy, vz = -hits[3 * LANES + lane], -hits[4 * LANES + lane], -hits[5 * LANES + lane]
+        if turn == 1:
+            step = _f(LOW) * side[s]
+            vx, vy, vz = hits[7 * LANES + lane], hits[8 * LANES + lane], hits[9 * LANES + lane]
+        for k in range(N_POINTS):
+            on[k] = 0
+            if member[s, k] >= 0:
+                h = height[s, k]
+                on[k] = _segment(
+                    rays, k, x + step * vx, y + step * vy, z + step * vz,
+                    point[s, k, 0] + h * normal[s, k, 0], point[s, k, 1] + h * normal[s, k, 1],
+                    point[s, k, 2] + h * normal[s, k, 2],
+                )  # fmt: skip
+        trace_lanes(
+            caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+        )
+        least = _f(np.inf)
+        for k in range(N_POINTS):
+            if on[k] != 0 and rays[TFAR * LANES + k] >= _f(0.0):
+                dx, dy, dz = point[s, k, 0] - x, point[s, k, 1] - y, point[s, k, 2] - z
+                square = dx * dx + dy * dy + dz * dz
+                if square < least:
+                    least, found = square, member[s, k]
+        if found >= 0:
+            break
+    for j in range(3 * LANES):
+        rays[ORG_X * LANES + j] = saved[j]
+    return found
+
+
+@kernel
+def join_linked(link, root):  # type: ignore[no-untyped-def]
+    """Write the smallest node that each node is linked to, directly or over others: union-find.
+
+    link : (m, 2) int32; root : (n,) int32, each node's own number on entry
+    """
+    for m in range(len(link)):
+        a, b = link[m, 0], link[m, 1]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        if a < b:
+            root[b] = a
+        else:
+            root[a] = b
+    for i in range(len(root)):
+        # Roots are smaller than what they stand for: the one above is final already.
+        root[i] = root[root[i]]
+
+
+@kernel
+def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
+    """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
+
+    chart, region : (H, W) int32, -1: empty, no region yet; queue : (H * W,) int64, memory
+    """
+    height, width = chart.shape
+    end = 0
+    for r in range(height):
+        for c in range(width):
+            if region[r, c] >= 0:
+                queue[end] = r * width + c
+                end += 1
+    first = 0
+    while first < end:
+        r, c = queue[first] // width, queue[first] % width
+        first += 1
+        for turn in range(4):
+            rr = r + (turn - 1 if turn % 2 == 0 else 0)
+            cc = c + (turn - 2 if turn % 2 == 1 else 0)
+            if rr < 0 or rr >= height or cc < 0 or cc >= width:
+                continue
+            if region[rr, cc] < 0 and chart[rr, cc] >= 0 and chart[rr, cc] == chart[r, c]:
+                region[rr, cc] = region[r, c]
+                queue[end] = rr * width + cc
+                end += 1

@@ -1,0 +1,477 @@
+"""Cuts texels that lie on both sides of a surface passing through them, and groups texels into regions.
+
+A floor that runs on under a wall, a ceiling over walls, a beam through a wall: a texel there has points on
+both sides of the other surface. Left as one, it would average the light of both sides and carry it from one
+to the other. Its points are grouped by mutual visibility (`kernels.sides`); each group becomes an entry of
+its own: the entry of the page keeps the side with the largest free area; the others stand behind fronts and
+backs, take part in light transport, and are stored in no map.
+
+Neighbouring texels are linked if some of their points see each other. The connected parts of a chart are its
+regions: values are not mixed across their borders (denoising, borders, dilation). No patch spans texels of a
+block that are not linked within it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.core.texels import TexelBuffer
+from baker.kernels.form_factor import SPLIT
+from baker.kernels.hits import HitTable
+from baker.kernels.probe import back_face_hits
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.sides import (
+    SeenLight,
+    SeenPatch,
+    SideTable,
+    connected_pairs,
+    crossed_texels,
+    flood_regions,
+    group_points,
+    join_linked,
+    no_sides,
+    point_heights,
+)
+from baker.kernels.surface import N_POINTS, Surface, place_points
+from baker.radiosity.points import points_of
+from baker.trace.embree import Tracer
+from baker.trace.packets import new_caster
+
+STAGE = "texel sides"
+_TILE = 4096
+_SUSPECTS, _PAIRS = 1024, 2048
+# Pairs of neighbours are examined with the first four points of each, then with all.
+_SOME = np.arange(0, N_POINTS, 4, dtype=np.uint8)[None]
+# A side is the outside of one-sided geometry if more than this share of its rays meet backs; then each of its
+# points counts as much less.
+_MANY_BACKS, _OUTSIDE = 0.25, 0.25
+_EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
+_BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Texel entries after the cut; see the module.
+
+    Attributes
+    ----------
+    texels : TexelBuffer
+        With `region`.
+    surface : Surface
+    mask : (n,) uint16
+        Points of each entry: outside geometry and on its own side.
+    owner : (S,) int32
+        Entries of fronts and backs that were split, rising.
+    member : (K,) int32
+        Entries of all sides of these, in the order that `SideTable.member` counts.
+    table : SideTable
+    link : (m, 2) int32
+        Neighbouring entries that see each other, in all charts that are cut anywhere.
+    rays : int
+        Rays cast.
+    """
+
+    texels: TexelBuffer
+    surface: Surface
+    mask: NDArray[np.uint16]
+    owner: NDArray[np.int32]
+    member: NDArray[np.int32]
+    table: SideTable
+    link: NDArray[np.int32]
+    rays: int
+
+    def seen_light(self, exitance: NDArray[np.float32]) -> SeenLight:
+        """Return what gather rays find, for light (n, 4) float32, lx, that entries reflect; sets column 3."""
+        exitance[:, 3] = 0
+        exitance[self.owner, 3] = np.arange(1, len(self.owner) + 1)
+        return SeenLight(self.texels.hit_image(exitance), exitance[self.member], self.table)
+
+    def seen_patches(self, patch: NDArray[np.int32]) -> SeenPatch:
+        """Return what form-factor rays find, for the patch of each entry (n,) int32."""
+        marked = np.array(patch)
+        marked[self.owner] = SPLIT - np.arange(len(self.owner), dtype=np.int32)
+        return SeenPatch(self.texels.hit_image(marked, fill=-1), patch[self.member], self.table)
+
+
+class _Entries(NamedTuple):
+    """All entries after the cut; side (n,) float32, metres, of the whole texel."""
+
+    texels: TexelBuffer
+    surface: Surface
+    mask: NDArray[np.uint16]
+    side: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """Entries whose points form several groups.
+
+    Attributes
+    ----------
+    owner : (S,) int32, the entries, rising
+    label : (S, 16) int8, group of each point, from 0; -1 inside geometry
+    point, normal : (S, 16, 3) float32; height : (S, 16) float32, see `SideTable`
+    n : int, entries before the cut
+    """
+
+    owner: NDArray[np.int32]
+    label: NDArray[np.int8]
+    point: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    height: NDArray[np.float32]
+    n: int
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Return the number of groups of each entry (S,)."""
+        count: NDArray[np.int64] = self.label.max(axis=1, initial=0).astype(np.int64) + 1
+        return count
+
+    def entry(self, row: NDArray[np.int64], group: NDArray[np.int64] | np.int64) -> NDArray[np.int64]:
+        """Return the entry of a group of the entry in a row: the first group keeps it."""
+        before = np.concatenate([[0], np.cumsum(self.count - 1)])[:-1]
+        entry = np.where(group == 0, self.owner[row], self.n + before[row] + group - 1)
+        return np.asarray(entry, np.int64)
+
+
+def split_texels(
+    texels: TexelBuffer,
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    table: HitTable,
+    tracer: Tracer,
+    *,
+    seed: int,
+    threads: int,
+    progress: Progress,
+) -> Sides:
+    """Cut the texels that some surface passes through.
+
+    Parameters
+    ----------
+    texels : TexelBuffer
+        Fronts and backs.
+    surface : Surface
+        The same entries.
+    mask : (n,) uint16
+        Bit k is set where point k is outside geometry.
+    table : HitTable
+    tracer : Tracer
+    seed, threads : int
+    progress : Progress
+
+    Returns
+    -------
+    Sides
+    """
+    tracer = tracer.grey()
+    n = texels.n
+    crossed, side = np.zeros(n, np.uint8), np.zeros(n, np.float32)
+    cast = np.zeros(-(-n // _TILE), np.int64)
+
+    def look(begin: int, end: int) -> None:
+        cast[begin // _TILE] = crossed_texels(surface, begin, end, new_caster(tracer), crossed, side)
+
+    run_tiles(n, _TILE, look, threads=threads, stage=STAGE, progress=progress, rays_per_item=4)
+    suspect = np.flatnonzero(crossed)
+    groups, rays = _group(surface, mask, suspect[mask[suspect] != 0], side, tracer, threads, progress)
+    rays += int(cast.sum())
+    entries = _cut(texels, surface, mask, side, groups)
+    pair = _of_sides(neighbours(texels, suspect), groups)
+    connected, more = _see(entries, pair, tracer, threads, progress)
+    rays += more
+    if connected.all() and not len(groups.owner):
+        return Sides(*entries[:3], groups.owner, groups.owner, no_sides(), pair[:0], rays)
+    cut = np.unique(entries.texels.chart[np.concatenate([pair[~connected].reshape(-1), groups.owner])])
+    quiet = np.isin(texels.chart, cut) & (crossed == 0)
+    seen = pair[connected & np.isin(entries.texels.chart[pair[:, 0]], cut)]
+    link = np.concatenate([seen, neighbours(texels, np.flatnonzero(quiet), crossed == 0)])
+    backs, more = _back_share(entries, groups, table, tracer, seed)
+    return _keep_largest(entries, groups, link, cut, backs, rays + more)
+
+
+def _group(
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    chosen: NDArray[np.int64],
+    side: NDArray[np.float32],
+    tracer: Tracer,
+    threads: int,
+    progress: Progress,
+) -> tuple[_Groups, int]:
+    """Group the points of the chosen entries; return those with several groups, and the rays cast."""
+    n = len(mask)
+    parts: dict[int, tuple[_Groups, int]] = {}
+
+    def work(begin: int, end: int) -> None:
+        own = chosen[begin:end]
+        point, normal = points_of(surface, mask, own)
+        height, label = np.zeros(point.shape[:2], np.float32), np.zeros(point.shape[:2], np.int8)
+        caster = new_caster(tracer)
+        # Backs are measured like their fronts.
+        point_heights(point, normal, side[own], caster, height)
+        cast = group_points(point, normal, height, mask[own], caster, label)
+        several = label.max(axis=1, initial=0) > 0
+        found = _Groups(
+            own[several].astype(np.int32), label[several], point[several], normal[several], height[several], n
+        )
+        parts[begin] = found, cast + N_POINTS * len(own)
+
+    run_tiles(len(chosen), _SUSPECTS, work, threads=threads, stage=STAGE, progress=progress)
+    ordered = [parts[begin] for begin in sorted(parts)]
+    table = no_sides()
+    none = _Groups(
+        np.zeros(0, np.int32), table.member.astype(np.int8), table.point, table.normal, table.height, n
+    )
+    found = [none, *(part for part, _ in ordered)]
+    return _Groups(
+        np.concatenate([part.owner for part in found]),
+        np.concatenate([part.label for part in found]),
+        np.concatenate([part.point for part in found]),
+        np.concatenate([part.normal for part in found]),
+        np.concatenate([part.height for part in found]),
+        n,
+    ), sum(rays for _, rays in ordered)
+
+
+def _cut(
+    texels: TexelBuffer,
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    side: NDArray[np.float32],
+    groups: _Groups,
+) -> _Entries:
+    """Give each group of points an entry: the first one that of its texel, the others new ones behind all."""
+    extra = np.repeat(groups.owner, groups.count - 1)
+    row, label = np.nonzero(groups.label >= 0)
+    entry = groups.entry(row, groups.label[row, label].astype(np.int64))
+    bits = np.bincount(entry, _BITS[label], texels.n + len(extra)).astype(np.uint16)
+    mask = np.concatenate([mask, np.zeros(len(extra), np.uint16)])
+    mask[entry] = bits[entry]
+    texels = texels.with_copies(extra)
+    front = np.concatenate([surface.front, surface.front[extra]])
+    surface = surface._replace(pixel=texels.pixel, back=texels.back, front=front)
+    return _Entries(texels, surface, mask, np.concatenate([side, side[extra]]))
+
+
+def neighbours(
+    texels: TexelBuffer, chosen: NDArray[np.int64], allowed: NDArray[np.bool_] | None = None
+) -> NDArray[np.int32]:
+    """Return pairs of neighbouring entries of one chart and side, of which one at least is chosen.
+
+    Parameters
+    ----------
+    texels : TexelBuffer
+        Fronts and backs.
+    chosen : (m,) int64
+    allowed : (n,) bool, optional
+        Entries that the chosen ones may be paired with; default all.
+
+    Returns
+    -------
+    pair : (p, 2) int32
+        Each pair once, the smaller entry first.
+    """
+    size = texels.resolution
+    pixel, back = texels.pixel[chosen], texels.back[chosen]
+    found = [np.zeros((0, 2), np.int64)]
+    for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+        row, column = pixel // size % size + down, pixel % size + right
+        inside = (row >= 0) & (row < size) & (column >= 0) & (column < size)
+        beside = np.where(inside, pixel + down * size + right, 0)
+        other = texels.lookup[beside].astype(np.int64)
+        inside &= (other >= 0) & (texels.pixel[other] == beside)
+        other = np.where(back, texels.back_entry[other], other)
+        inside &= (other >= 0) & (texels.chart[other] == texels.chart[chosen])
+        if allowed is not None:
+            inside &= allowed[other]
+        found.append(np.stack([chosen, other], axis=1)[inside])
+    pair = np.concatenate(found)
+    pair.sort(axis=1)
+    key = np.unique(pair[:, 0] * texels.n + pair[:, 1])
+    return np.stack(np.divmod(key, max(texels.n, 1)), axis=1).astype(np.int32)
+
+
+def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
+    """Return pairs of entries after the cut: each side of one texel with each side of the other."""
+    if not len(groups.owner):
+        return pair
+    row = np.searchsorted(groups.owner, pair)
+    row = np.minimum(row, len(groups.owner) - 1)
+    split = groups.owner[row] == pair
+    count = np.where(split, groups.count[row], 1)
+    found = []
+    for a in range(int(count[:, 0].max(initial=1))):
+        for b in range(int(count[:, 1].max(initial=1))):
+            use = (count[:, 0] > a) & (count[:, 1] > b)
+            ends = [
+                np.where(split[use, k], groups.entry(row[use, k], np.int64(g)), pair[use, k])
+                for k, g in enumerate((a, b))
+            ]
+            found.append(np.stack(ends, axis=1))
+    return np.concatenate(found).astype(np.int32)
+
+
+def _see(
+    entries: _Entries, pair: NDArray[np.int32], tracer: Tracer, threads: int, progress: Progress
+) -> tuple[NDArray[np.bool_], int]:
+    """Return (m,) bool: which pairs of entries have points that see each other, and the rays cast."""
+    connected = np.zeros(len(pair), np.uint8)
+
+    def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
+        def work(begin: int, end: int) -> None:
+            own, caster = chosen[begin:end], new_caster(tracer)
+            ends = []
+            for k in range(2):
+                entry = pair[own, k].astype(np.int64)
+                point, normal = points_of(entries.surface, entries.mask, entry, wanted)
+                height = np.zeros(point.shape[:2], np.float32)
+                point_heights(point, normal, entries.side[entry], caster, height)
+                ends += [point, normal, height]
+            found = np.zeros(len(own), np.uint8)
+            connected_pairs(*ends, caster, found)
+            connected[own] = found
+
+        run_tiles(len(chosen), _PAIRS, work, threads=threads, stage=STAGE, progress=progress)
+
+    examine(np.arange(len(pair)), _SOME)
+    left = np.flatnonzero(connected == 0)
+    examine(left, _EVERY)
+    return connected != 0, 3 * (_SOME.size * len(pair) + _EVERY.size * len(left))
+
+
+def _keep_largest(
+    entries: _Entries,
+    groups: _Groups,
+    link: NDArray[np.int32],
+    cut: NDArray[np.int32],
+    backs: NDArray[np.float64],
+    rays: int,
+) -> Sides:
+    """Give the page's entry of each split texel its largest side, and number the regions.
+
+    link : (m, 2) int32, neighbouring entries that see each other, in the charts `cut`
+    backs : (S, groups) float64, see `_back_share`
+    """
+    root = np.arange(len(entries.mask), dtype=np.int32)
+    join_linked(link, root)
+    member, table, order = _order_sides(entries, groups, root, backs)
+    # The entry in place k is the one that had number order[k] before.
+    texels, surface, mask, _ = entries
+    rank = np.zeros_like(order)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    link, root = rank[link], root[order]
+    mask = mask[order]
+    texels = _measure(texels, surface, mask, member)
+    n_front = texels.n_front
+    region = np.array(texels.region)
+    own = np.isin(region, cut)
+    region[own] = int(region.max(initial=0)) + 1 + np.unique(root[:n_front][own], return_inverse=True)[1]
+    _lend_regions(texels, region, mask[:n_front] != 0)
+    return Sides(replace(texels, region=region), surface, mask, groups.owner, member, table, link, rays)
+
+
+def _back_share(
+    entries: _Entries, groups: _Groups, table: HitTable, tracer: Tracer, seed: int
+) -> tuple[NDArray[np.float64], int]:
+    """Return the share (S, groups) of rays of each side that meet backs of one-sided surfaces; rays cast."""
+    share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
+    net = sobol_reversed(N_POINTS, seed, 9)
+    cast = 0
+    for group in range(share.shape[1]):
+        row = np.flatnonzero(groups.count > group)
+        chosen = groups.entry(row, np.int64(group))
+        for begin in range(0, len(chosen), _SUSPECTS):
+            own = chosen[begin : begin + _SUSPECTS]
+            points = points_of(entries.surface, entries.mask, own)
+            hits = np.zeros((len(own), N_POINTS), np.uint8)
+            cast += back_face_hits(
+                *points, table, new_caster(tracer), 0, net, shared_bits_mask(N_POINTS), 1, 0, hits
+            )
+            share[row[begin : begin + _SUSPECTS], group] = hits.mean(axis=1)
+    return share, cast
+
+
+def _order_sides(
+    entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
+    """Choose the side that a split texel's first entry gets: the one with most points.
+
+    Points of a side that looks at backs of one-sided surfaces count less: it is the outside of a room whose
+    walls have no outside, or the underside of a floor that has none. A side whose region holds no texel that
+    is whole loses: the strip of a wall below the floor that is narrower than a texel.
+
+    Returns
+    -------
+    member : (K,) int32, entries of all sides in their new order
+    table : SideTable
+    order : (n,) int32, old number of the entry in each place
+    """
+    order = np.arange(len(root), dtype=np.int32)
+    if not len(groups.owner):
+        return groups.owner, no_sides(), order
+    row, k = np.nonzero(groups.label >= 0)
+    group = groups.label[row, k].astype(np.int64)
+    entry = groups.entry(row, group)
+    score = np.zeros(backs.shape)
+    np.add.at(score, (row, group), 1.0)
+    score[backs > _MANY_BACKS] *= _OUTSIDE
+    whole = entries.mask != 0
+    whole[entry] = False
+    settled = np.zeros(len(root), bool)
+    settled[root[whole]] = True
+    score[row, group] += (N_POINTS + 1) * settled[root[entry]]
+    best = groups.entry(np.arange(len(groups.owner)), score.argmax(axis=1))
+    order[groups.owner], order[best] = best, groups.owner
+    number = np.unique(entry).astype(np.int32)
+    # Swapping two entries of one texel is its own inverse.
+    member = np.full(groups.label.shape, -1, np.int32)
+    member[row, k] = np.searchsorted(number, order[entry])
+    table = SideTable(groups.point, groups.normal, groups.height, member, entries.side[groups.owner])
+    return number, table, order
+
+
+def _measure(
+    texels: TexelBuffer, surface: Surface, mask: NDArray[np.uint16], member: NDArray[np.int32]
+) -> TexelBuffer:
+    """Return the texels with area, position, normal and centroid of each side of those that are split."""
+    area, position, normal = (np.array(v) for v in (texels.area, texels.position, texels.normal))
+    centroid = np.array(texels.centroid)
+    shape = (len(member), N_POINTS)
+    point, shading = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
+    triangle, bary = np.zeros(shape, np.int32), np.zeros((*shape, 2), np.float32)
+    every = np.full(len(mask), 0xFFFF, np.uint16)
+    place_points(surface, every, member.astype(np.int64), _EVERY, point, shading, triangle, bary)
+    share = (mask[member, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(np.float64)
+    area[member] *= share.mean(axis=1).astype(np.float32)
+    share /= share.sum(axis=1, keepdims=True)
+    position[member] = (share[..., None] * point).sum(axis=1)
+    mean = (share[..., None] * shading).sum(axis=1)
+    normal[member] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
+    uv = surface.uv[surface.triangle[triangle]].astype(np.float64)
+    weight = np.stack([1.0 - bary.sum(axis=2), bary[..., 0], bary[..., 1]], axis=2)
+    place = (weight[..., None] * uv).sum(axis=2) * texels.resolution
+    row, column = np.divmod(texels.pixel[member] % texels.resolution**2, texels.resolution)
+    offset = (share[..., None] * place).sum(axis=1) - np.stack([column, row], axis=1) - 0.5
+    front = member < texels.n_front
+    centroid[member[front]] = offset[front]
+    return replace(texels, area=area, position=position, normal=normal, centroid=centroid)
+
+
+def _lend_regions(texels: TexelBuffer, region: NDArray[np.int32], valid: NDArray[np.bool_]) -> None:
+    """Give texels inside geometry, whose values are filled in later, the region nearest in their chart."""
+    pixels = texels.resolution**2
+    page_of = texels.pixel[: texels.n_front] // pixels
+    for page in np.unique(page_of[~valid]):
+        own = page_of == page
+        chart = texels.page_image(texels.chart[: texels.n_front], fill=-1, page=int(page))
+        image = texels.page_image(np.where(valid, region, -1), fill=-1, page=int(page))
+        flood_regions(chart, image, np.zeros(pixels, np.int64))
+        grown = image.reshape(-1)[texels.pixel[: texels.n_front][own] - page * pixels]
+        region[own] = np.where(grown >= 0, grown, region[own])
