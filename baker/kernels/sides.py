@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.surface import N_POINTS, inverse_uv
+from baker.kernels.clip import clip_to_square, new_polygon, new_triangle
+from baker.kernels.surface import N_POINTS, inverse_uv, place
 from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
@@ -40,16 +41,21 @@ HIGH, LOW = 0.25, 0.02
 _REACH = 0.55
 # A segment before a hit starts this far back along the ray, in sides of a texel.
 _BACK = 0.25
+# Corners of a texel's surface are examined at this share of their distance from its middle.
+_CORNER = 0.98
 # Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, face normal.
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
 # Memory of the kernels.
 new_hits = scratch((HIT_ROWS * LANES,), np.float32)
+_points, _heights = scratch((1, LANES, 3), np.float32), scratch((1, LANES), np.float32)
 _frame, _saved = scratch((12 * LANES,), np.float32), scratch((3 * LANES,), np.float32)
 
 
 class SideTable(NamedTuple):
     """The S texel entries that are split into sides, and their points.
+
+    Or whose surface has a corner that none of its points sees: a ray that hits there finds nothing.
 
     point, normal (S, 16, 3) float32: ray origins and shading normals; height (S, 16) float32, metres;
     member (S, 16) int32: row of the values of the point's side, -1 for points inside geometry;
@@ -274,6 +280,121 @@ def group_points(origin, normal, height, mask, caster, label):  # type: ignore[n
                 # The seed sees a point of an earlier group: both are one.
                 for j in range(N_POINTS):
                     label[m, j] = own if label[m, j] == other else label[m, j]
+        # Close the gaps that merged groups left in the numbers.
+        left = 0
+        for number in range(groups):
+            found = 0
+            for k in range(N_POINTS):
+                if label[m, k] == number:
+                    label[m, k] = left
+                    found = 1
+            left += found
+    return cast
+
+
+@kernel
+def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, hidden):  # type: ignore[no-untyped-def]
+    """Find texels with a corner of their surface that none of their points sees.
+
+    A surface that passes close to a corner leaves no point behind itself, but rays may hit what lies there.
+
+    chosen : (m,) int64, texel entries; origin, normal : (m, 16, 3) float32; height : (m, 16) float32
+    mask : (m,) uint16, see `group_points`; side : (m,) float32, metres; hidden : (m,) uint8 output
+    Returns the number of rays cast.
+    """
+    position, shading, face = surface.position, surface.normal, surface.face_normal
+    uv, triangle, least = surface.uv, surface.triangle, surface.least
+    pixels, fronts, back = surface.pixel, surface.front, surface.back
+    starts, entry, size = surface.first, surface.entry, surface.size
+    corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
+    point, facing, headroom = _points(), _points(), _heights()
+    cast = 0
+    for m in range(len(chosen)):
+        hidden[m] = 0
+        i = chosen[m]
+        rest = pixels[i] % (size * size)
+        x0, y0 = rest % size, rest // size
+        front = fronts[i]
+        found = 0
+        for e in range(starts[front], starts[front + 1]):
+            t = entry[e]
+            for j in range(3):
+                corner[j, 0] = uv[triangle[t, j], 0] * size
+                corner[j, 1] = uv[triangle[t, j], 1] * size
+            n = clip_to_square(corner, x0, y0, cut, spare)
+            if n < 3:
+                continue
+            cx = cy = 0.0
+            for j in range(n):
+                cx += cut[j, 0] / n
+                cy += cut[j, 1] / n
+            a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
+            for j in range(n):
+                x = x0 + cx + _CORNER * (cut[j, 0] - cx)
+                y = y0 + cy + _CORNER * (cut[j, 1] - cy)
+                place(
+                    position, shading, face, triangle, least, t, a * x + b * y + c, d * x + g * y + h,
+                    back[i], point, facing, 0, found,
+                )  # fmt: skip
+                found += 1
+                if found == LANES:
+                    cast += _look_for_corners(
+                        point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
+                    )
+                    found = 0
+            if hidden[m] != 0:
+                break
+        if found > 0 and hidden[m] == 0:
+            cast += _look_for_corners(
+                point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
+            )
+    return cast
+
+
+@inner
+def _look_for_corners(  # type: ignore[no-untyped-def]
+    point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
+):
+    """Set hidden[m] if one of `found` corners (1, 16, 3) is seen by no point of item m; return rays cast."""
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    high = _f(HIGH) * side[m]
+    for k in range(LANES):
+        on[k] = -1 if k < found else 0
+    for k in range(found):
+        for axis in range(3):
+            rays[(ORG_X + axis) * LANES + k] = point[0, k, axis]
+            rays[(DIR_X + axis) * LANES + k] = facing[0, k, axis]
+        rays[TFAR * LANES + k] = _f(2.0) * high
+        words[GEOM_ID * LANES + k] = np.uint32(0xFFFFFFFF)
+    trace_lanes(
+        caster.intersect, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+    )
+    for j in range(found):
+        headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * LANES + j])
+    cast = found
+    bits = np.int64(mask[m])
+    for j in range(found):
+        for k in range(N_POINTS):
+            on[k] = 0
+            if bits == 0 or (bits >> k) & 1:
+                h = smaller(headroom[0, j], height[m, k])
+                on[k] = _segment(
+                    rays, k,
+                    point[0, j, 0] + h * facing[0, j, 0], point[0, j, 1] + h * facing[0, j, 1],
+                    point[0, j, 2] + h * facing[0, j, 2],
+                    origin[m, k, 0] + h * normal[m, k, 0], origin[m, k, 1] + h * normal[m, k, 1],
+                    origin[m, k, 2] + h * normal[m, k, 2],
+                )  # fmt: skip
+                cast += 1
+        trace_lanes(
+            caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+        )
+        seen = False
+        for k in range(N_POINTS):
+            seen = seen or (on[k] != 0 and rays[TFAR * LANES + k] >= _f(0.0))
+        if not seen:
+            hidden[m] = 1
+            break
     return cast
 
 

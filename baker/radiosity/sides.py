@@ -34,6 +34,7 @@ from baker.kernels.sides import (
     crossed_texels,
     flood_regions,
     group_points,
+    hidden_corners,
     join_linked,
     no_sides,
     point_heights,
@@ -110,7 +111,7 @@ class _Entries(NamedTuple):
 
 @dataclass(frozen=True)
 class _Groups:
-    """Entries whose points form several groups.
+    """Entries whose points form several groups, or see not all corners of their surface.
 
     Attributes
     ----------
@@ -217,7 +218,9 @@ def _group(
         # Backs are measured like their fronts.
         point_heights(point, normal, side[own], caster, height)
         cast = group_points(point, normal, height, mask[own], caster, label)
-        several = label.max(axis=1, initial=0) > 0
+        hidden = np.zeros(len(own), np.uint8)
+        cast += hidden_corners(surface, own, point, normal, height, mask[own], side[own], caster, hidden)
+        several = (label.max(axis=1, initial=0) > 0) | (hidden != 0)
         found = _Groups(
             own[several].astype(np.int32), label[several], point[several], normal[several], height[several], n
         )
@@ -423,7 +426,7 @@ def _order_sides(
     np.add.at(score, (row, group), 1.0)
     score[backs > _MANY_BACKS] *= _OUTSIDE
     whole = entries.mask != 0
-    whole[entry] = False
+    whole[entry] = groups.count[row] == 1
     settled = np.zeros(len(root), bool)
     settled[root[whole]] = True
     score[row, group] += (N_POINTS + 1) * settled[root[entry]]
