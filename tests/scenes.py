@@ -258,7 +258,7 @@ def form_factors(
     patches = build_patches(world.texels)
     matrix = build_form_factors(
         patches,
-        world.texels.hit_image(patches.patch, fill=-1),
+        world.sides.seen_patches(patches.patch),
         world.surface, world.mask, world.table, world.rays.tracer,
         n_rays=n_rays, seed=seed, threads=2, progress=silent,
     )  # fmt: skip

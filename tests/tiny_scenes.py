@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from baker.kernels.sides import SeenLight, SeenPatch, no_sides
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.progress import silent
@@ -32,7 +33,7 @@ class Quad:
 
 @dataclass(frozen=True)
 class World:
-    """What `baker.pipeline.prepare` makes, without masks."""
+    """What `baker.world.prepare` makes, without masks."""
 
     scene: Any
     atlas: Any
@@ -54,6 +55,16 @@ class World:
         """What triangles tell rays that come from inside of something."""
         solids = scene_solids(self.scene, self.geometry, self.shading)
         return tell_tales(self.geometry, self.shading, solids)
+
+
+def seen_patches(texels, patch):
+    """Patches as rays find them where no texel is split."""
+    return SeenPatch(texels.hit_image(patch, -1), np.zeros(0, np.int32), no_sides())
+
+
+def seen_light(texels, exitance):
+    """Reflected light as rays find it where no texel is split."""
+    return SeenLight(texels.hit_image(exitance * np.float32([1, 1, 1, 0])), np.zeros((0, 4), np.float32), no_sides())
 
 
 def grey(albedo=0.5, emission=0.0, double_sided=False):

@@ -6,7 +6,7 @@ import naive
 import numpy as np
 import pytest
 from inner import compiled
-from tiny_scenes import Quad, box_quads, grey, quad_world
+from tiny_scenes import Quad, box_quads, grey, quad_world, seen_light
 
 from baker.core.progress import silent
 from baker.core.scene import PunctualLight
@@ -91,7 +91,7 @@ def rays_of(room):
             truth[i, INDIRECT : INDIRECT + 3] += indirect * np.pi / n_samples
             batch[k] += (got + indirect).sum() * np.pi / n_samples
         truth[i, SQUARE] = (batch**2).sum()
-    return net, shared, begin, origin, normal, room.texels.hit_image(exitance), lamps, n_light, truth
+    return net, shared, begin, origin, normal, seen_light(room.texels, exitance), lamps, n_light, truth
 
 
 def test_gather_is_the_sum_over_its_rays(room, rays_of):
@@ -235,7 +235,7 @@ def lit_floor(pieces, n_light, seed=0, n_gather=64):
         world.surface,
         world.free,
         world.table,
-        np.zeros((len(world.texels.lookup), 4), np.float32),
+        seen_light(world.texels, np.zeros((world.texels.n, 4), np.float32)),
         direct.exact,
         world.emitters,
         world.shading,

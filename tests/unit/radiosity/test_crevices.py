@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tiny_scenes import Quad, quad_world
+from tiny_scenes import Quad, quad_world, seen_patches
 
 from baker.core.progress import silent
 from baker.radiosity.crevices import gap_depth
@@ -93,7 +93,7 @@ def test_in_a_narrow_gap_each_texel_is_a_patch_and_light_does_not_cross_it():
         assert members[used == 0].max() == 16
         assert (members[deep].max() == 1) == (name == "texels")
         matrix = build_form_factors(
-            patches, texels.hit_image(patches.patch, fill=-1), world.surface, world.free, world.table,
+            patches, seen_patches(texels, patches.patch), world.surface, world.free, world.table,
             world.rays.tracer, n_rays=64, seed=0, threads=1, progress=silent,
         )  # fmt: skip
         source, albedo = patches.mean(light, texels.area), np.full((patches.n, 3), 0.7)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
-from tiny_scenes import Quad, box_quads, grey, quad_world
+from tiny_scenes import Quad, box_quads, grey, quad_world, seen_patches
 
 from baker.core.progress import silent
 from baker.radiosity.form_factors import build_form_factors
@@ -15,7 +15,7 @@ from baker.radiosity.patches import build_patches
 def factors(world, patches, mask=None, threads=1, n_rays=256):
     return build_form_factors(
         patches,
-        world.texels.hit_image(patches.patch, -1) if patches.n else np.zeros(576, np.int32),
+        seen_patches(world.texels, patches.patch),
         world.surface,
         world.free if mask is None else mask,
         world.table,
