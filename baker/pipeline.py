@@ -27,7 +27,7 @@ from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.io.load import load_scene
-from baker.kernels.sides import SeenLight
+from baker.kernels.side_table import SeenLight
 from baker.lint.in_bake import bake_warnings
 from baker.radiosity.crevices import gap_depth
 from baker.radiosity.direct import DirectLight, direct_light

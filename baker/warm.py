@@ -120,7 +120,7 @@ def cast_rays(kind: str = "") -> None:
     from baker.kernels.gather import N_COLUMNS, gather
     from baker.kernels.hits import HitTable
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-    from baker.kernels.sides import nothing_seen
+    from baker.kernels.side_table import nothing_seen
     from baker.lights.emissive import build_emitters
     from baker.shading.materials import resolve_materials
     from baker.shading.ray_tree import build_ray_tree

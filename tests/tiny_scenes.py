@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from baker.kernels.sides import SeenLight, SeenPatch, no_sides
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, Scene
+from baker.kernels.side_table import SeenLight, SeenPatch, no_sides
 from baker.lights.emissive import build_emitters
 from baker.radiosity.hit_table import build_hit_table
 from baker.radiosity.texels import build_texels
@@ -64,7 +64,8 @@ def seen_patches(texels, patch):
 
 def seen_light(texels, exitance):
     """Reflected light as rays find it where no texel is split."""
-    return SeenLight(texels.hit_image(exitance * np.float32([1, 1, 1, 0])), np.zeros((0, 4), np.float32), no_sides())
+    light = exitance * np.float32([1, 1, 1, 0])
+    return SeenLight(texels.hit_image(light), np.zeros((0, 4), np.float32), no_sides())
 
 
 def grey(albedo=0.5, emission=0.0, double_sided=False):

@@ -13,7 +13,7 @@ import numpy as np
 
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
-from baker.kernels.sides import find_side, new_hits, note_hit
+from baker.kernels.side_table import find_side, new_hits, note_hit
 from baker.kernels.tint import follow, light_kept
 from baker.trace.jit import inner, kernel, larger, smaller
 from baker.trace.packets import (
@@ -40,7 +40,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
-    seen : `sides.SeenPatch`, patches that hits lie on
+    seen : `side_table.SeenPatch`, patches that hits lie on
     net : (R, 2) uint32
     target : (m, R) int32 output, patch hit, LOST or SKY
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels

@@ -17,7 +17,7 @@ from baker.kernels.area_light import emitter_hit
 from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance, emitter_at
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
-from baker.kernels.sides import find_side, new_hits, note_hit
+from baker.kernels.side_table import find_side, new_hits, note_hit
 from baker.kernels.surface import N_POINTS
 from baker.kernels.tint import any_stopped, follow_gather, gather_turns, light_kept, trace_gather
 from baker.trace.jit import inner, kernel, scratch, smaller
@@ -52,7 +52,7 @@ def gather(  # type: ignore[no-untyped-def]
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    seen : `sides.SeenLight`, light that texels reflect
+    seen : `side_table.SeenLight`, light that texels reflect
     shading : from `emitters.needed_shading`
     net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS

@@ -12,12 +12,13 @@ side of a ray's hit: the side of the nearest point that is visible from just bef
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baker.kernels.clip import clip_to_square, new_polygon, new_triangle
+from baker.kernels.hits import front_facing
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.kernels.side_table import segment
 from baker.kernels.surface import N_POINTS, inverse_uv, place
 from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
@@ -26,9 +27,9 @@ from baker.trace.packets import (
     DIR_Z,
     GEOM_ID,
     LANES,
+    NO_HIT,
     ORG_X,
-    ORG_Y,
-    ORG_Z,
+    PRIM_ID,
     TFAR,
     trace_lanes,
 )  # fmt: skip
@@ -39,89 +40,11 @@ HIGH, LOW = 0.25, 0.02
 # Half length of the diagonals that look for a crossing surface: a little beyond the texel, so that a surface
 # exactly between two texels is met from both.
 _REACH = 0.55
-# A segment before a hit starts this far back along the ray, in sides of a texel.
-_BACK = 0.25
 # Corners of a texel's surface are examined at this share of their distance from its middle.
 _CORNER = 0.98
-# Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, face normal.
-HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
-HIT_ROWS = 10
 # Memory of the kernels.
-new_hits = scratch((HIT_ROWS * LANES,), np.float32)
 _points, _heights = scratch((1, LANES, 3), np.float32), scratch((1, LANES), np.float32)
-_frame, _saved = scratch((12 * LANES,), np.float32), scratch((3 * LANES,), np.float32)
-
-
-class SideTable(NamedTuple):
-    """The S texel entries that are split into sides, and their points.
-
-    Or whose surface has a corner that none of its points sees: a ray that hits there finds nothing.
-
-    point, normal (S, 16, 3) float32: ray origins and shading normals; height (S, 16) float32, metres;
-    member (S, 16) int32: row of the values of the point's side, -1 for points inside geometry;
-    side (S,) float32, metres, of the texel.
-    """
-
-    point: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    height: NDArray[np.float32]
-    member: NDArray[np.int32]
-    side: NDArray[np.float32]
-
-
-def no_sides() -> SideTable:
-    """Return the table of a scene without split texels."""
-    return SideTable(
-        np.zeros((0, N_POINTS, 3), _f),
-        np.zeros((0, N_POINTS, 3), _f),
-        np.zeros((0, N_POINTS), _f),
-        np.zeros((0, N_POINTS), np.int32),
-        np.zeros(0, _f),
-    )
-
-
-class SeenLight(NamedTuple):
-    """What rays of the final gather find.
-
-    image (sides * P * H * W, 4) float32, lx: light that the texel at each pixel reflects (RGB), and the
-    number of its row in `sides` plus 1, or 0; no rows if nothing reflects; value (K, 4) float32: the same
-    light of each side of the split texels; sides : SideTable
-    """
-
-    image: NDArray[np.float32]
-    value: NDArray[np.float32]
-    sides: SideTable
-
-
-def nothing_seen() -> SeenLight:
-    """Return the light that rays find where nothing reflects any."""
-    return SeenLight(np.zeros((0, 4), _f), np.zeros((0, 4), _f), no_sides())
-
-
-class SeenPatch(NamedTuple):
-    """What form-factor rays find.
-
-    image (sides * P * H * W,) int32: patch at each pixel, -1: none, `form_factor.SPLIT` - s: the texel in
-    row s of `sides`; value (K,) int32: patch of each side of the split texels; sides : SideTable
-    """
-
-    image: NDArray[np.int32]
-    value: NDArray[np.int32]
-    sides: SideTable
-
-
-@inner
-def _segment(rays, lane, x, y, z, tx, ty, tz):  # type: ignore[no-untyped-def]
-    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; returns -1 if it has a length, else 0."""
-    dx, dy, dz = tx - x, ty - y, tz - z
-    rays[ORG_X * LANES + lane] = x
-    rays[ORG_Y * LANES + lane] = y
-    rays[ORG_Z * LANES + lane] = z
-    rays[DIR_X * LANES + lane] = dx
-    rays[DIR_Y * LANES + lane] = dy
-    rays[DIR_Z * LANES + lane] = dz
-    rays[TFAR * LANES + lane] = _f(1.0)
-    return np.int32(-1) if dx * dx + dy * dy + dz * dz > _f(0.0) else np.int32(0)
+_frame = scratch((12 * LANES,), np.float32)
 
 
 @kernel
@@ -186,7 +109,7 @@ def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[
                     frame[(row + 2) * LANES + lane],
                 )
                 if crossed[group + lane] == 0:
-                    on[lane] = _segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
+                    on[lane] = segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
                     cast += 1
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
@@ -199,7 +122,7 @@ def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[
 def _between(rays, lane, origin, normal, height, m, i, k):  # type: ignore[no-untyped-def]
     """Write the segment between points i of item m and k of the same arrays into a lane."""
     h = smaller(height[m, i], height[m, k])
-    return _segment(
+    return segment(
         rays, lane,
         origin[m, i, 0] + h * normal[m, i, 0], origin[m, i, 1] + h * normal[m, i, 1],
         origin[m, i, 2] + h * normal[m, i, 2],
@@ -378,7 +301,7 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
             on[k] = 0
             if bits == 0 or (bits >> k) & 1:
                 h = smaller(headroom[0, j], height[m, k])
-                on[k] = _segment(
+                on[k] = segment(
                     rays, k,
                     point[0, j, 0] + h * facing[0, j, 0], point[0, j, 1] + h * facing[0, j, 1],
                     point[0, j, 2] + h * facing[0, j, 2],
@@ -415,7 +338,7 @@ def connected_pairs(  # type: ignore[no-untyped-def]
             on[k] = 0
         for k in range(origin_a.shape[1]):
             h = smaller(height_a[m, k], height_b[m, k])
-            on[k] = _segment(
+            on[k] = segment(
                 rays, k,
                 origin_a[m, k, 0] + h * normal_a[m, k, 0], origin_a[m, k, 1] + h * normal_a[m, k, 1],
                 origin_a[m, k, 2] + h * normal_a[m, k, 2],
@@ -429,113 +352,33 @@ def connected_pairs(  # type: ignore[no-untyped-def]
                 connected[m] = 1
 
 
-@inner
-def note_hit(hits, lane, rays, face, prim, front):  # type: ignore[no-untyped-def]
-    """Copy what `find_side` needs of a lane's hit to `hits` (10 * 16,); face: rows of the hit table."""
-    sign = _f(1.0) if front else _f(-1.0)
-    for a in range(3):
-        hits[(HIT_ORIGIN + a) * LANES + lane] = rays[(ORG_X + a) * LANES + lane]
-        hits[(HIT_DIRECTION + a) * LANES + lane] = rays[(DIR_X + a) * LANES + lane]
-        hits[(HIT_NORMAL + a) * LANES + lane] = sign * face[prim, 8 + a]
-    hits[HIT_DISTANCE * LANES + lane] = rays[TFAR * LANES + lane]
+@kernel
+def count_backs(origin, normal, table, caster, net, shared, count):  # type: ignore[no-untyped-def]
+    """Count how many rays, one from each point of a texel, meet the back of a one-sided surface first.
 
-
-@inner
-def find_side(point, normal, height, member, side, s, hits, lane, caster):  # type: ignore[no-untyped-def]
-    """Return the row of values of the side that a hit on split texel s lies on, or -1 if no point sees it.
-
-    point, normal, height, member, side : arrays of a `SideTable`
-    hits : (10 * 16,) float32, from `note_hit`; lane : int, which of them
-    The caster's sixteen rays are overwritten, but for their origins.
+    origin, normal : (m, 16, 3) float32; net : (16, 2) uint32; shared : uint32, see `sampling`
+    count : (m,) int32 output
     """
-    on, rays = caster.lane_valid, caster.lane_floats
-    saved = _saved()
-    for j in range(3 * LANES):
-        saved[j] = rays[ORG_X * LANES + j]
-    distance = hits[HIT_DISTANCE * LANES + lane]
-    x = hits[lane] + distance * hits[3 * LANES + lane]
-    y = hits[LANES + lane] + distance * hits[4 * LANES + lane]
-    z = hits[2 * LANES + lane] + distance * hits[5 * LANES + lane]
-    found = np.int32(-1)
-    for turn in range(2):
-        # First from the ray, before it hits, which is on the right side whatever rounding did to the hit.
-        step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
-        vx, vy, vz = -hits[3 * LANES + lane], -hits[4 * LANES + lane], -hits[5 * LANES + lane]
-        if turn == 1:
-            step = _f(LOW) * side[s]
-            vx, vy, vz = hits[7 * LANES + lane], hits[8 * LANES + lane], hits[9 * LANES + lane]
+    scene, intersect, width, query = caster.scene, caster.intersect, caster.width, caster.query
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    row = table.row
+    seeds, frame = new_seeds(), new_frame()
+    for group in range(0, len(origin), LANES):
+        lanes = smaller(LANES, len(origin) - group)
+        lane_seeds(group, lanes, 12, seeds)
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
         for k in range(N_POINTS):
-            on[k] = 0
-            if member[s, k] >= 0:
-                h = height[s, k]
-                on[k] = _segment(
-                    rays, k, x + step * vx, y + step * vy, z + step * vz,
-                    point[s, k, 0] + h * normal[s, k, 0], point[s, k, 1] + h * normal[s, k, 1],
-                    point[s, k, 2] + h * normal[s, k, 2],
+            load_frames(rays, frame, origin, normal, group, lanes, k)
+            aim_lanes(rays, words, frame, seeds, net[k, 0], net[k, 1], shared, FAR)
+            trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
+            for lane in range(lanes):
+                if words[GEOM_ID * LANES + lane] == NO_HIT:
+                    continue
+                prim = np.int64(words[PRIM_ID * LANES + lane])
+                dx, dy, dz = (
+                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
                 )  # fmt: skip
-        trace_lanes(
-            caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
-        )
-        least = _f(np.inf)
-        for k in range(N_POINTS):
-            if on[k] != 0 and rays[TFAR * LANES + k] >= _f(0.0):
-                dx, dy, dz = point[s, k, 0] - x, point[s, k, 1] - y, point[s, k, 2] - z
-                square = dx * dx + dy * dy + dz * dz
-                if square < least:
-                    least, found = square, member[s, k]
-        if found >= 0:
-            break
-    for j in range(3 * LANES):
-        rays[ORG_X * LANES + j] = saved[j]
-    return found
-
-
-@kernel
-def join_linked(link, root):  # type: ignore[no-untyped-def]
-    """Write the smallest node that each node is linked to, directly or over others: union-find.
-
-    link : (m, 2) int32; root : (n,) int32, each node's own number on entry
-    """
-    for m in range(len(link)):
-        a, b = link[m, 0], link[m, 1]
-        while root[a] != a:
-            root[a] = root[root[a]]
-            a = root[a]
-        while root[b] != b:
-            root[b] = root[root[b]]
-            b = root[b]
-        if a < b:
-            root[b] = a
-        else:
-            root[a] = b
-    for i in range(len(root)):
-        # Roots are smaller than what they stand for: the one above is final already.
-        root[i] = root[root[i]]
-
-
-@kernel
-def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
-    """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
-
-    chart, region : (H, W) int32, -1: empty, no region yet; queue : (H * W,) int64, memory
-    """
-    height, width = chart.shape
-    end = 0
-    for r in range(height):
-        for c in range(width):
-            if region[r, c] >= 0:
-                queue[end] = r * width + c
-                end += 1
-    first = 0
-    while first < end:
-        r, c = queue[first] // width, queue[first] % width
-        first += 1
-        for turn in range(4):
-            rr = r + (turn - 1 if turn % 2 == 0 else 0)
-            cc = c + (turn - 2 if turn % 2 == 1 else 0)
-            if rr < 0 or rr >= height or cc < 0 or cc >= width:
-                continue
-            if region[rr, cc] < 0 and chart[rr, cc] >= 0 and chart[rr, cc] == chart[r, c]:
-                region[rr, cc] = region[r, c]
-                queue[end] = rr * width + cc
-                end += 1
+                if row[prim, 7] == _f(0.0) and not front_facing(row, prim, dx, dy, dz):
+                    count[group + lane] += 1

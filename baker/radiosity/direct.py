@@ -21,7 +21,7 @@ from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shadow import add_visible
-from baker.kernels.sides import nothing_seen
+from baker.kernels.side_table import nothing_seen
 from baker.kernels.surface import N_POINTS, Surface
 from baker.lights.family import LIGHT_FAMILIES
 from baker.radiosity.points import KeptPoints, tile_points

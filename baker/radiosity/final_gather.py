@@ -14,7 +14,7 @@ from baker.kernels.emitters import Emitters, lamps_for, needed_shading
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.sides import SeenLight
+from baker.kernels.side_table import SeenLight
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE, batch_variance
 from baker.radiosity.points import KeptPoints, tile_points

@@ -25,7 +25,7 @@ from baker.kernels.form_factor import (
 )
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.sides import SeenPatch
+from baker.kernels.side_table import SeenPatch
 from baker.kernels.surface import N_POINTS, Surface
 from baker.radiosity.patches import PatchSet
 from baker.radiosity.points import KeptPoints, some_points

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.texels import TexelBuffer
-from baker.kernels.sides import join_linked
+from baker.kernels.regions import join_linked
 
 # The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
 MAX_PATCHES = 32768

@@ -24,19 +24,15 @@ from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.form_factor import SPLIT
 from baker.kernels.hits import HitTable
-from baker.kernels.probe import back_face_hits
+from baker.kernels.regions import flood_regions, join_linked
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
 from baker.kernels.sides import (
-    SeenLight,
-    SeenPatch,
-    SideTable,
     connected_pairs,
+    count_backs,
     crossed_texels,
-    flood_regions,
     group_points,
     hidden_corners,
-    join_linked,
-    no_sides,
     point_heights,
 )
 from baker.kernels.surface import N_POINTS, Surface, place_points
@@ -393,11 +389,10 @@ def _back_share(
         for begin in range(0, len(chosen), _SUSPECTS):
             own = chosen[begin : begin + _SUSPECTS]
             points = points_of(entries.surface, entries.mask, own)
-            hits = np.zeros((len(own), N_POINTS), np.uint8)
-            cast += back_face_hits(
-                *points, table, new_caster(tracer), 0, net, shared_bits_mask(N_POINTS), 1, 0, hits
-            )
-            share[row[begin : begin + _SUSPECTS], group] = hits.mean(axis=1)
+            count = np.zeros(len(own), np.int32)
+            count_backs(*points, table, new_caster(tracer), net, shared_bits_mask(N_POINTS), count)
+            cast += N_POINTS * len(own)
+            share[row[begin : begin + _SUSPECTS], group] = count / N_POINTS
     return share, cast
 
 

@@ -15,7 +15,7 @@ from baker.radiosity.patches import build_patches
 def factors(world, patches, mask=None, threads=1, n_rays=256):
     return build_form_factors(
         patches,
-        seen_patches(world.texels, patches.patch),
+        seen_patches(world.texels, patches.patch if patches.n else np.full(world.texels.n, -1, np.int32)),
         world.surface,
         world.free if mask is None else mask,
         world.table,

@@ -1,0 +1,56 @@
+"""Regions of charts: texels that see each other along the surface, by links between neighbours."""
+
+from __future__ import annotations
+
+from baker.trace.jit import kernel
+
+
+@kernel
+def join_linked(link, root):  # type: ignore[no-untyped-def]
+    """Write the smallest node that each node is linked to, directly or over others: union-find.
+
+    link : (m, 2) int32; root : (n,) int32, each node's own number on entry
+    """
+    for m in range(len(link)):
+        a, b = link[m, 0], link[m, 1]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        if a < b:
+            root[b] = a
+        else:
+            root[a] = b
+    for i in range(len(root)):
+        # Roots are smaller than what they stand for: the one above is final already.
+        root[i] = root[root[i]]
+
+
+@kernel
+def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
+    """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
+
+    chart, region : (H, W) int32, -1: empty, no region yet; queue : (H * W,) int64, memory
+    """
+    height, width = chart.shape
+    end = 0
+    for r in range(height):
+        for c in range(width):
+            if region[r, c] >= 0:
+                queue[end] = r * width + c
+                end += 1
+    first = 0
+    while first < end:
+        r, c = queue[first] // width, queue[first] % width
+        first += 1
+        for turn in range(4):
+            rr = r + (turn - 1 if turn % 2 == 0 else 0)
+            cc = c + (turn - 2 if turn % 2 == 1 else 0)
+            if rr < 0 or rr >= height or cc < 0 or cc >= width:
+                continue
+            if region[rr, cc] < 0 and chart[rr, cc] >= 0 and chart[rr, cc] == chart[r, c]:
+                region[rr, cc] = region[r, c]
+                queue[end] = rr * width + cc
+                end += 1
