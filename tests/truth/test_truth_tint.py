@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closed_forms import point_irradiance
+from closed_forms import point_irradiance, polygon_irradiance
 from scenes import SceneBuilder, form_factors
 from test_truth_alpha import floor_under
 
@@ -62,6 +62,30 @@ def test_every_kind_of_light_is_coloured(light):
         return floor.values(builder.bake(bounces=0)).mean(axis=(0, 1))
 
     assert mean(pane()) / mean() == pytest.approx(passed(COLOUR, HALF), rel=0.01)
+
+
+@pytest.mark.parametrize("alpha", [0.6, 0.9])
+def test_a_lamp_behind_a_dense_pane_is_no_noisier_than_without(alpha):
+    """Against Lambert's formula; 64 samples of a square in the open scatter by 2 % a texel."""
+    square = np.array([(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)])
+    builder, floor = floor_under(pane(alpha=alpha), light="", texels=24)
+    builder.quad(square[0], square[1] - square[0], square[3] - square[0], builder.material(0.0, 5.0), (8, 8))
+    found = floor.values(builder.bake(bounces=0, samples=64))
+    truth = 5.0 * floor.texel_mean(lambda p: polygon_irradiance(square, p, (0, 1, 0)))
+    ratio = found / (truth[..., None] * passed(COLOUR, alpha))
+    assert ratio.mean(axis=(0, 1)) == pytest.approx(1, abs=0.002)
+    assert ratio.std(axis=(0, 1)).max() < 0.03
+
+
+def test_sky_through_black_glass_all_around_has_no_noise():
+    """A closed box of glass that reflects nothing: each ray of the floor in it passes it once."""
+    alpha = 0.9
+    builder = SceneBuilder(96)
+    floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
+    builder.box((-2, -1, -2), (2, 1, 2), glass(builder, (0, 0, 0), alpha), 8)
+    found = floor.values(builder.bake(sky=(1.0, 2.0, 3.0), samples=16))
+    truth = np.pi * np.array([1.0, 2.0, 3.0]) * (1 - alpha) ** 2
+    np.testing.assert_allclose(found, np.broadcast_to(truth, found.shape), rtol=1e-4)
 
 
 def test_a_lamp_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_a_free_one():

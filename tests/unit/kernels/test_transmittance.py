@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import icosphere
 from test_alpha import shaded, sheet
 from test_tint import COLOUR, pane
 from tiny_scenes import Quad, box_quads, grey, quad_scene
@@ -230,6 +231,31 @@ def test_rays_of_all_directions_are_asked_once_at_each_crossing():
     found = visible(world, origin, way, far=1.5)
     wrong = abs(found / SHARE ** crossing[:, None] - 1).max(axis=1) > 1e-4
     assert wrong.sum() <= 1  # one at an edge may fall to the other side in float32
+
+
+def test_a_sphere_is_left_once_and_crossed_twice():
+    """Rays from its middle through all vertices, and middles of edges, of a sphere of 320 triangles."""
+    corner = icosphere(2)
+    world = mesh_scene((corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3)))
+    aim = np.concatenate([corner.reshape(-1, 3), 0.5 * (corner + np.roll(corner, 1, axis=1)).reshape(-1, 3)])
+    aim = np.float32(aim).astype(float)
+    found = visible(world, np.zeros_like(aim), aim)
+    np.testing.assert_allclose(found, np.tile(SHARE, (len(aim), 1)), rtol=1e-5)
+    found = visible(world, -2.0 * aim, aim)
+    np.testing.assert_allclose(found, np.tile(SHARE**2, (len(aim), 1)), rtol=1e-5)
+
+
+def test_a_wall_that_a_pane_passes_through_still_blocks():
+    """Rays across a wall that sticks in a pane; those beside it pass the pane once."""
+    wall = Quad((0.5, 0, -1), (0, 1, 0), (0, 0, 2), grey())
+    world = shaded([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), pane().material), wall])
+    origin, _ = down(200)
+    along = np.tile([0.0, 0.3, -5.0], (200, 1))
+    np.testing.assert_allclose(visible(world, origin - along, 2 * along)[0], SHARE, rtol=1e-5)
+    # To the other side of the wall.
+    across = np.column_stack([1.0 - 2.0 * origin[:, 0], np.zeros(200), np.full(200, -1.0)])
+    crossing = visible(world, origin * [1, 1, 0.1], across, far=1.0)
+    assert (crossing[origin[:, 0] != 0.5] == 0).all()
 
 
 def test_a_box_of_glass_is_left_once_from_within():
