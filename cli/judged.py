@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -43,6 +44,19 @@ def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
         stream.write(
             f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
         )
+
+
+def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
+    """Write the limits that were applied, and beside each the figure that was held against it."""
+    by_channel: dict[str, list[str]] = {}
+    for verdict in verdicts:
+        limit = verdict.limit
+        value = "none" if verdict.value is None else f"{verdict.value:.3g}"
+        entry = f"{limit.figure} {value} ({limit.sign} {limit.number:g})"
+        by_channel.setdefault(limit.channel, []).append(entry)
+    for channel, words in by_channel.items():
+        text = f"limits of {channel}, which fail beyond what is in brackets: {', '.join(words)}"
+        stream.write(textwrap.fill(text, 100, subsequent_indent="  ", break_on_hyphens=False) + "\n")
 
 
 def write_failed(verdicts: Iterable[Verdict], stream: TextIO) -> None:

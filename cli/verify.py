@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 from baker.cli.app import COMMANDS
-from baker.cli.judged import tell, write_failed, write_worst
+from baker.cli.judged import tell, write_failed, write_limits, write_worst
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -113,10 +113,12 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
     """Write a table of figures, what failed, and the worst texels."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
-    columns = ("texels", "bias", "median", "p95", "p99", "nrmse", "noise_floor", "z_rms")
-    stream.write(f"{'':12}" + "".join(f"{name:>13}" for name in columns) + "\n")
+    columns = (
+        "texels", "bias", "colour_bias", "median", "colour_median", "p95", "nrmse", "noise_floor", "z_rms"
+    )  # fmt: skip
+    stream.write(f"{'':12}" + "".join(f"{name:>14}" for name in columns) + "\n")
     for name, check in found.channels.items():
-        stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>13}" for c in columns) + "\n")
+        stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>14}" for c in columns) + "\n")
         ratio, error = check.figures["energy_ratio"], check.figures["energy_ratio_se"]
         if ratio is not None:
             give = "" if error is None else f" +- {error:.4f}"
@@ -124,11 +126,27 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
         if check.unresolved:
             share = check.unresolved / max(len(check.value), 1)
             stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")
+    _write_regions(found.regions[: None if verbose else 3], stream)
     write_worst(found.worst[: None if verbose else 3], stream)
+    write_limits(found.verdicts, stream)
     write_failed(found.verdicts, stream)
     for problem in found.problems:
         stream.write(f"failed: {problem}\n")
-    stream.write(f"{'passed' if found.passed else 'FAILED'} ({found.seconds:.0f} s)\n")
+    failed = sum(verdict.failed for verdict in found.verdicts)
+    how = f"{failed} of {len(found.verdicts)} limits" if failed else f"{len(found.verdicts)} limits hold"
+    single = "" if any(v.limit.figure == "max" for v in found.verdicts) else "; single texels have no limit"
+    compiling = f" and {found.compile_seconds:.0f} s of compiling" if found.compile_seconds >= 1 else ""
+    verdict = "FAILED" if failed else "passed"
+    stream.write(f"{verdict}: {how}{'' if failed else single} ({found.seconds:.0f} s{compiling})\n")
+
+
+def _write_regions(regions: list[dict[str, Any]], stream: TextIO) -> None:
+    for row in regions:
+        if row["deviation"] > 0:
+            stream.write(
+                f"region: {row['channel']} of {row['region']} ({row['texels']} texels, {row['area']:.3g} m2):"
+                f" {row['bias']:+.1%} +- {row['bias_se']:.1%}, typically {row['typical']:.1%} off\n"
+            )
 
 
 def _words(value: Any, name: str) -> str:
@@ -138,4 +156,4 @@ def _words(value: Any, name: str) -> str:
         return str(value)
     if name == "z_rms":
         return f"{value:.2f}"
-    return f"{value:+.2%}" if name == "bias" else f"{value:.2%}"
+    return f"{value:+.2%}" if name.endswith("bias") else f"{value:.2%}"

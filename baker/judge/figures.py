@@ -8,11 +8,15 @@ For each place the mean over colours v of the value and r of the reference:
     nrmse            rmse / mean(r)
     relmse           mean (v - r)^2 / (r^2 + 0.01 mean(r)^2)
     z                (v_c - r_c) / standard error of r_c
+    colour error     |v_c - r_c| / max(r_c, 0.1 r, floor)
     energy ratio     R = sum w v / sum w r            w: the surface, m2, that a place stands for
     its error        sqrt(sum w^2 (v - R r)^2) / sum w r
 
 `median`, `p95`, `p99`, `max` are of the relative error, whose floor keeps places in the dark from deciding:
 an error there counts against a tenth of the median light, or a hundredth of the mean, if that is more.
+`colour_median` and `colour_p95` are of the colour error, each in the colour where it is largest: a mean over
+colours does not see that red and blue are swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the
+colour where that is furthest from 0 (over a tenth of mean(r), if that is more).
 `noise_floor` is the median relative error that the reference alone would show, `noise_p95` its 95th
 percentile: two independent halves of it are compared, and their difference is halved, since the mean of both
 halves is nearer to the truth than either by that much.
@@ -34,11 +38,13 @@ from numpy.typing import NDArray
 
 FIGURES = (
     "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "noise_p95",
-    "z_rms", "energy_ratio", "energy_ratio_se",
+    "z_rms", "energy_ratio", "energy_ratio_se", "colour_bias", "colour_median", "colour_p95",
 )  # fmt: skip
 # Values below this share of the median, or of the mean, count as dark.
 _DARK_MEDIAN, _DARK_MEAN = 0.1, 0.01
 _EPSILON = 0.01
+# A colour is held against at least this share of the colours' mean: one that is hardly there tells nothing.
+_LEAST_COLOUR = 0.1
 
 
 def relative_error(
@@ -102,6 +108,7 @@ def figures(
     found["median"] = float(np.median(error))
     found["p95"], found["p99"] = (float(np.percentile(error, q)) for q in (95, 99))
     found["max"] = float(error.max())
+    found.update(_colour_figures(value, reference, floor))
     if halves is not None:
         apart = 0.5 * np.abs((halves[0] - halves[1]).mean(axis=1)) / np.maximum(r, max(floor, 1e-12))
         found["noise_floor"], found["noise_p95"] = (float(np.percentile(apart, q)) for q in (50, 95))
@@ -111,6 +118,21 @@ def figures(
     if weight is not None:
         found["energy_ratio"], found["energy_ratio_se"] = energy_ratio(v, r, weight)
     return found
+
+
+def _colour_figures(
+    value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
+) -> dict[str, float]:
+    mean = reference.mean(axis=1, keepdims=True)
+    scale = np.maximum(np.maximum(reference, _LEAST_COLOUR * mean), max(floor, 1e-12))
+    error = np.abs(value - reference) / scale
+    whole = np.maximum(np.maximum(reference.mean(axis=0), _LEAST_COLOUR * mean.mean()), 1e-12)
+    bias = (value - reference).mean(axis=0) / whole
+    return {
+        "colour_bias": float(bias[np.argmax(np.abs(bias))]),
+        "colour_median": float(np.median(error, axis=0).max()),
+        "colour_p95": float(np.percentile(error, 95, axis=0).max()),
+    }
 
 
 def energy_ratio(

@@ -1,7 +1,7 @@
 """Limits on figures, as `--fail-if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
-A limit names what must not be: it fails where its comparison is true. `bias` is compared by its size, so
-that a bake too dark fails like one too bright.
+A limit names what must not be: it fails where its comparison is true. `bias` and the like are compared by
+their size, so that a bake too dark fails like one too bright.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
 _LIMIT = re.compile(r"\s*([A-Za-z_]\w*)\s*\.\s*([A-Za-z_]\w*)\s*(>=|<=|>|<)\s*([^\s,]+)\s*")
-_SIZED = ("bias",)
+_SIZED = (
+    "bias", "colour_bias", "region_bias", "region_colour", "object_bias", "object_colour", "chart_bias",
+    "chart_colour", "whole_bias", "whole_colour", "edge_bias", "edge_colour",
+    "exponent_error",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -104,18 +108,22 @@ def _known(name: str, names: list[str], what: str) -> None:
     raise SettingsError(f"there is no {what} '{name}'; {hint}", object="--fail-if")
 
 
-def judge(limits: Iterable[Limit], channels: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
+def judge(
+    limits: Iterable[Limit], channels: Mapping[str, Mapping[str, Any]], *, missing_fails: bool = True
+) -> list[Verdict]:
     """Hold limits against figures.
 
     Parameters
     ----------
     channels : mapping of channel to mapping of figure to number or None
+    missing_fails : bool
+        A limit on a figure that is None fails.
     """
     verdicts = []
     for limit in limits:
         value = channels[limit.channel].get(limit.figure)
         if value is None:
-            verdicts.append(Verdict(limit, None, True))
+            verdicts.append(Verdict(limit, None, missing_fails))
             continue
         size = abs(value) if limit.figure in _SIZED and limit.number >= 0 else value
         verdicts.append(Verdict(limit, value, _OPERATORS[limit.sign](size, limit.number)))

@@ -1,4 +1,4 @@
-"""Tells if a map is shifted or turned against its surface, or bent by a curve.
+"""Tells if a map is shifted or turned against its surface, blurred, or bent by a curve.
 
 A map that fits better one texel further is shifted, however small its error is in smooth places. A map whose
 values follow a power of the truth other than 1 went through a gamma curve.
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
+# Texels over which curvature is measured; its share of the error that says blur.
+_WIDE, _BLUR = 2, 0.2
 # A shifted map must fit this much better before it is believed, and so many texels must tell.
 _BETTER = 0.9
 # By so many standard errors, too.
@@ -41,6 +43,63 @@ def best_shift(
     noise : (n,) float64, optional
         Standard errors of these: what they add to the misfit says nothing about a shift.
     """
+    misfit = _misfits(page, covered, pixel, truth, noise)
+    if misfit is None:
+        return 0, 0
+    error, excess = misfit
+    best = int(np.argmin(excess))
+    gain = error[0] - error[best]
+    # Where a map is even every shift fits alike but for noise.
+    sure = gain.mean() > _SURE * gain.std() / np.sqrt(len(gain))
+    return _STEPS[best] if excess[best] < _BETTER * excess[0] and sure else (0, 0)
+
+
+def is_blurred(
+    page: NDArray[np.float64],
+    covered: NDArray[np.bool_],
+    pixel: NDArray[np.int64],
+    truth: NDArray[np.float64],
+) -> bool:
+    """Tell whether the map's error follows its curvature, as a blur's does; parameters of `best_shift`.
+
+    A Gaussian blur of s texels adds s^2 / 2 times the Laplacian; noise of the map makes the slope negative.
+    """
+    height, width = page.shape[1:]
+    number, rest = np.divmod(pixel, height * width)
+    row, column = np.divmod(rest, width)
+    inside = np.ones(len(pixel), bool)
+    around = np.zeros(len(pixel))
+    for down, right in _STEPS:
+        y, x = row + _WIDE * down, column + _WIDE * right
+        within = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+        at = (number, np.clip(y, 0, height - 1), np.clip(x, 0, width - 1))
+        inside &= within & covered[at]
+        around += page[at]
+    if inside.sum() < _ENOUGH:
+        return False
+    value = page[number, row, column]
+    scale = np.maximum(np.maximum(truth, value), 0.1 * np.median(truth)) + 1e-12
+    curvature = (np.clip(((around - value) / 4 - value) / scale, -0.5, 0.5))[inside]
+    error = np.clip((value - truth) / scale, -0.5, 0.5)[inside]
+    square = float((curvature**2).sum())
+    if not square > 0:
+        return False
+    slope = float((curvature * error).sum()) / square
+    spread = float(np.sqrt((curvature**2 * (error - slope * curvature) ** 2).sum())) / square
+    return slope > _BLUR and slope > _SURE * spread
+
+
+def _misfits(
+    page: NDArray[np.float64],
+    covered: NDArray[np.bool_],
+    pixel: NDArray[np.int64],
+    truth: NDArray[np.float64],
+    noise: NDArray[np.float64] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return squared relative errors (k, m) of the map shifted by each of `_STEPS`, and their means.
+
+    From the means (k,) the reference's noise is taken off. None if too few texels tell.
+    """
     height, width = page.shape[1:]
     number, rest = np.divmod(pixel, height * width)
     row, column = np.divmod(rest, width)
@@ -49,23 +108,15 @@ def best_shift(
         at = (number, np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1))
         inside &= covered[at]
     if inside.sum() < _ENOUGH:
-        return 0, 0
+        return None
     number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
     scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
-    error = np.array(
-        [
-            np.minimum(((page[number, row + down, column + right] - truth) / scale) ** 2, _CLIP)
-            for down, right in _STEPS
-        ]
-    )
+    found = [page[number, row + down, column + right] for down, right in _STEPS]
+    error = np.array([np.minimum(((value - truth) / scale) ** 2, _CLIP) for value in found])
     mean = error.mean(axis=1)
     if noise is not None:
         mean = mean - np.minimum((noise[inside] / scale) ** 2, _CLIP).mean()
-    best = int(np.argmin(mean))
-    gain = error[0] - error[best]
-    # Where a map is even every shift fits alike but for noise.
-    sure = gain.mean() > _SURE * gain.std() / np.sqrt(len(gain))
-    return _STEPS[best] if mean[best] < _BETTER * mean[0] and sure else (0, 0)
+    return error, mean
 
 
 def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:

@@ -76,11 +76,11 @@ def texel_places(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    surface = covered * _square_metres(geometry, found, resolution).mean(axis=1)
+    surface = covered * square_metres(geometry, found, resolution).mean(axis=1)
     return TexelPlaces(position, normal, face, covered, surface, middle)
 
 
-def _square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:
+def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:
     """Return how many m2 of the world one texel's square is on triangles (n, k)."""
     corner = geometry.triangle[triangle]
     one, two = (

@@ -1,6 +1,7 @@
 """Judges a finished bake against path tracing."""
 
+from baker.verification.settings import VerifySettings
 from baker.verification.summary import verification_json
-from baker.verification.verify import Verification, VerifySettings, verify
+from baker.verification.verify import Verification, verify
 
 __all__ = ["Verification", "VerifySettings", "verification_json", "verify"]

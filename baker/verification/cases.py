@@ -1,4 +1,4 @@
-"""A verification as JUnit cases: one for each limit, one for each object and channel."""
+"""A verification as JUnit cases: one for each limit."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ def write_junit(path: Path, found: Verification) -> None:
     cases = []
     for verdict in found.verdicts:
         value = "missing" if verdict.value is None else f"{verdict.value:.6g}"
-        problem = f"{verdict.limit}: it is {value}" if verdict.failed else ""
+        problem = ""
+        if verdict.failed:
+            remark = found.channels[verdict.limit.channel].remarks.get(verdict.limit.figure)
+            problem = f"{verdict.limit}: it is {value}" + (f"; {remark}" if remark else "")
         cases.append(Case(f"not {verdict.limit}", scene, problem))
-    for problem in found.problems:
-        cases.append(Case(problem.split(":")[0], scene, problem))
     if cases:
         cases[0] = Case(cases[0].name, cases[0].group, cases[0].problem, found.seconds)
     write_text(path, junit_text("baker verify", cases))

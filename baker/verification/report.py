@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.io.png import encode_png, srgb_levels
-from baker.judge.figures import FIGURES, dark_floor, relative_error
+from baker.judge.figures import dark_floor, relative_error
 from baker.judge.junit import write_text
+from baker.verification.judgements.registry import FIGURE_NAMES
 from baker.verification.summary import mean_flip, verification_json
 from baker.verification.verify import ChannelCheck, Verification
 
-_SHOWN = 512
+_SHOWN, _REGIONS = 512, 40
 # Relative errors of these colours' ends: dark blue is none, yellow is this and more.
 _HOT = 0.10
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem}
@@ -49,9 +50,12 @@ def report_html(found: Verification) -> str:
     scene = html.escape(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
     parts = [
         f"<h1>{scene}: {verdict}</h1>",
-        f"<p>{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s. "
-        f"{found.invalid} buried texels are not judged.</p>",
+        f"<p>{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s,"
+        f" {found.compile_seconds:.0f} s of compiling before."
+        f" {found.invalid} buried texels are not judged.</p>",
         _failures(found),
+        _limits_table(found),
+        _regions_table(found),
         _figures_table(found),
     ]
     for name, check in found.channels.items():
@@ -77,11 +81,44 @@ def _failures(found: Verification) -> str:
     return f"<ul>{items}</ul>" if lines else ""
 
 
+def _limits_table(found: Verification) -> str:
+    rows = ""
+    for verdict in found.verdicts:
+        words = '<td class="bad">failed</td>' if verdict.failed else '<td class="good">holds</td>'
+        rows += f"<tr><td>{html.escape(str(verdict.limit))}</td><td>{_number(verdict.value)}</td>{words}</tr>"
+    head = "<tr><th>fails if</th><th>figure</th><th></th></tr>"
+    note = "<p>These limits decide, and no others: a single texel may be far off in a bake that passed.</p>"
+    return f"<h2>Limits</h2>{note}<table>{head}{rows}</table>"
+
+
+def _regions_table(found: Verification) -> str:
+    rows = ""
+    for row in found.regions[:_REGIONS]:
+        colour = " ".join(f"{shift:+.1%}" for shift in row["colour"])
+        where = ", ".join(f"{x:.2f}" for x in row["position"])
+        rows += (
+            f"<tr><td>{row['channel']} of {html.escape(row['region'])}<br>around {where}, of"
+            f" {html.escape(', '.join(row['objects']))}</td><td>{row['texels']}</td>"
+            f"<td>{row['area']:.3g}</td><td>{row['light']:.4g}</td>"
+            f"<td>{row['bias']:+.1%} &plusmn; {row['bias_se']:.1%}</td><td>{colour}</td>"
+            f"<td>{row['typical']:.1%} ({row['typical_noise']:.1%})</td></tr>"
+        )
+    head = "".join(
+        f"<th>{title}</th>"
+        for title in ("region", "texels", "m2", "light", "bias", "colour", "typical (noise)")
+    )
+    note = (
+        "<p>Each region is held against its own light: a room, as seen from one point, or those of its texels"
+        " that are lit alike. Worst first; what may be chance counts as nothing.</p>"
+    )
+    return f"<h2>Regions</h2>{note}<div class=wide><table><tr>{head}</tr>{rows}</table></div>"
+
+
 def _figures_table(found: Verification) -> str:
     # A row for each figure: side by side they are wider than a page.
     head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
     rows = ""
-    for key in FIGURES:
+    for key in FIGURE_NAMES:
         cells = "".join(f"<td>{_number(check.figures[key])}</td>" for check in found.channels.values())
         rows += f"<tr><td>{key}</td>{cells}</tr>"
     cells = "".join(f"<td>{_number(mean_flip(found, name))}</td>" for name in found.channels)

@@ -17,8 +17,6 @@ def verification_json(found: Verification) -> dict[str, Any]:
         "channels": {
             name: {
                 **check.figures,
-                "shift": list(check.shift),
-                "exponent": check.exponent,
                 "unresolved": check.unresolved,
                 "flip": mean_flip(found, name),
                 "z_histogram": _histogram(check),
@@ -26,12 +24,14 @@ def verification_json(found: Verification) -> dict[str, Any]:
             for name, check in found.channels.items()
         },
         "objects": found.objects,
+        "regions": found.regions,
         "worst": found.worst,
         "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in found.verdicts],
         "problems": found.problems,
         "invalid": found.invalid,
         "rays": found.rays,
         "seconds": found.seconds,
+        "compile_seconds": found.compile_seconds,
         "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in found.warnings],
     }
 

@@ -2,8 +2,9 @@
 
 A texel in the dark that only rare paths reach shows no spread at first: all its samples are black. Taken at
 its word it would be left alone, and found to be black. Each texel therefore counts as if one more of its
-samples had brought the mean light of all texels: what was not seen in n samples is known to that mean / n at
-best.
+samples had brought the mean light of its room: what was not seen in n samples is known to that mean / n at
+best. Errors are relative to a texel's own light, or a tenth of its room's median: a dim room is traced as
+long as a bright one.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
 from baker.judge.figures import dark_floor
 from baker.judge.texel_area import TexelPlaces
+from baker.reference.first_hit import first_hits
 from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
 from baker.reference.view import Reference
 
@@ -41,23 +44,37 @@ class Effort:
     deadline : float or None
         Of `time.monotonic`.
     seed : int
+    room : (n,) int32
+        Room of each texel, -1 for none.
     """
 
     spp: int | None
     target: float
     deadline: float | None
     seed: int
+    room: NDArray[np.int32]
 
     def passes(self, estimate: PointEstimate) -> int | None:
         """Return the passes asked for, two at least: there is no error of one."""
         return None if self.spp is None else max(-(-self.spp // estimate.samples), 2)
 
 
-def standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
+def standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the standard error (n, C), inf before two passes; see the head of this file."""
     samples = np.maximum(estimate.count.sum(axis=0), 1)[:, None] * estimate.samples
-    unseen = estimate.mean.mean(axis=0) / samples
-    return np.asarray(np.hypot(estimate.standard_error, unseen), np.float64)
+    mean = estimate.mean
+    light = np.broadcast_to(mean.mean(axis=0), mean.shape).copy()
+    for number in np.unique(room[room >= 0]):
+        light[room == number] = mean[room == number].mean(axis=0)
+    return np.asarray(np.hypot(estimate.standard_error, light / samples), np.float64)
+
+
+def room_floor(mean: NDArray[np.float64], room: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Return for points (n,) with light (n, C) below what it is dark in their room."""
+    floor = np.full(len(mean), dark_floor(mean))
+    for number in np.unique(room[room >= 0]):
+        floor[room == number] = dark_floor(mean[room == number])
+    return floor
 
 
 def _nearest_to_done(
@@ -68,24 +85,30 @@ def _nearest_to_done(
     return np.sort(chosen[np.argsort(need, kind="stable")[: -(-len(chosen) // 2)]])
 
 
-def relative_standard_error(estimate: PointEstimate) -> NDArray[np.float64]:
+def relative_standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[np.float64]:
     """Return the standard error (n,) of the colour mean, relative as errors are (colours taken as one)."""
     mean = estimate.mean
-    error = standard_error(estimate).mean(axis=1)
-    return np.asarray(error / np.maximum(mean.mean(axis=1), max(dark_floor(mean), 1e-12)), np.float64)
+    error = standard_error(estimate, room).mean(axis=1)
+    scale = np.maximum(mean.mean(axis=1), np.maximum(room_floor(mean, room), 1e-12))
+    return np.asarray(error / scale, np.float64)
 
 
-def first_rays(reference: Reference, places: TexelPlaces, channels: list[str]) -> None:
-    """Cast a few rays of each kind from one texel, before any time limit runs.
+def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) -> float:
+    """Cast a few rays of each kind from a triangle, before any time limit runs; return the seconds it took.
 
     On a machine's first run this compiles the kernels. That may take as long as the limit: a good bake would
     be judged by hardly any path, and fail.
     """
-    one = places.position[:1], places.normal[:1], places.face_normal[:1]
+    started = time.monotonic()
+    middle = geometry.position[geometry.triangle[:1]].astype(np.float64).mean(axis=1)
+    face = geometry.face_normal[:1].astype(np.float64)
+    one = middle[:, None], face[:, None], face[:, None]
+    first_hits(reference, middle, face)
     if "ao" in channels:
         openness_pass(reference, new_estimate(1, 1), *one, distance=1.0)
     if "irradiance" in channels:
         irradiance_pass(reference, new_estimate(1, 3), *one, chosen=np.arange(1))
+    return time.monotonic() - started
 
 
 def trace_openness(
@@ -106,7 +129,7 @@ def trace_openness(
         late = effort.deadline is not None and time.monotonic() > started + _OPENNESS_TIME * (
             effort.deadline - started
         )
-        if late or np.percentile(standard_error(estimate), 95) < OPENNESS_ERROR:
+        if late or np.percentile(standard_error(estimate, effort.room), 95) < OPENNESS_ERROR:
             break
     return estimate
 
@@ -129,7 +152,7 @@ def trace_irradiance(
             if estimate.rounds >= goal:
                 break
         elif estimate.rounds >= _FIRST:
-            error = relative_standard_error(estimate)
+            error = relative_standard_error(estimate, effort.room)
             chosen = np.flatnonzero(error > effort.target)
             share = 1.0 - len(chosen) / len(error)
             if effort.deadline is not None:

@@ -221,7 +221,8 @@ def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
     monkeypatch.setattr(tracing, "irradiance_pass", slow_at_first)
     found = verify(sound, VerifySettings(texels=40, target_se=1e-4, time_limit=1.0))
     assert len(passes) > 3
-    assert found.seconds > 2.0
+    # It is told apart.
+    assert found.compile_seconds > 1.5
 
 
 def test_few_bounces_are_judged_as_few(tmp_path):

@@ -1,0 +1,78 @@
+"""Regions: the texels of a room, and among them those of like light, each judged against its own light."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.verification.judgements.groups import make_groups, worst_figures
+from baker.verification.judgements.judgement import Evidence, Judged, Judgement
+
+# Light levels of a room, for each factor of ten.
+_LEVELS = 2
+_NAMED = 3
+
+
+def judge(evidence: Evidence) -> Judged:
+    """Return the figures of the worst region, and of all."""
+    points, compared = evidence.points, evidence.compared
+    mine = evidence.texels & ~points.gap
+    level = light_level(compared.value, compared.reference)
+    members: list[tuple[str, NDArray[np.int64]]] = []
+    keys: dict[str, tuple[int, list[float] | None]] = {}
+    for room in np.unique(points.room[mine]):
+        inside = mine & (points.room == room)
+        whole = f"room {room}" if room >= 0 else "hidden places"
+        members.append((whole, np.flatnonzero(inside)))
+        keys[whole] = int(room), None
+        levels = np.unique(level[inside])
+        for number in levels if len(levels) > 1 else ():
+            low, high = (float(10.0 ** ((number + end) / _LEVELS)) for end in (0, 1))
+            name = f"{whole}, light {low:.3g} to {high:.3g}"
+            members.append((name, np.flatnonzero(inside & (level == number))))
+            keys[name] = int(room), [low, high]
+    groups = make_groups(evidence, members)
+    worst, remarks = worst_figures("region", groups, evidence.channel)
+    position = points.position + evidence.geometry.origin
+    rows = []
+    for group in groups:
+        room, light = keys[group.name]
+        owner, count = np.unique(points.owner[group.member], return_counts=True)
+        named = owner[np.argsort(-count, kind="stable")[:_NAMED]]
+        rows.append(
+            {
+                "region": group.name,
+                "channel": evidence.channel,
+                "room": room,
+                "level": light,
+                "area": float(points.stands_for[group.member].sum()),
+                "position": position[group.member].mean(axis=0).tolist(),
+                "objects": [evidence.bake.scene.instances[int(i)].name for i in named],
+                **group.found.as_json(),
+                "deviation": group.badness,
+            }
+        )
+    return Judged(worst, remarks, rows)
+
+
+def light_level(value: NDArray[np.float64], reference: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the level (n,) of each point's light.
+
+    It is that of the mean of value and reference: levels of one of them would gather its noise to one side.
+    """
+    light = 0.5 * (value.mean(axis=1) + reference.mean(axis=1))
+    lit = light[light > 0]
+    least = 1e-7 * float(lit.max()) if len(lit) else 1.0
+    return np.asarray(np.floor(_LEVELS * np.log10(np.maximum(light, least))), np.int64)
+
+
+REGIONS = Judgement(
+    "regions",
+    ("region_bias", "region_colour", "region_noise"),
+    {
+        "irradiance": "irradiance.region_bias > 0.03, irradiance.region_colour > 0.015,"
+        " irradiance.region_noise > 0.15",
+        "ao": "ao.region_bias > 0.03, ao.region_noise > 0.15",
+    },
+    judge,
+)
