@@ -1,8 +1,8 @@
 """What lies around judged places: whether they are buried or in narrow gaps, and which room they are in.
 
-What is buried says `reference.buried`. A place is in a gap if most of what it sees is nearer than two
-texels: no texel can follow the light there, so gaps are counted, and judged
-by the figures over all texels only.
+`reference.buried` tells what is buried. A place is in a gap if most of what it sees is nearer than two
+texels: no texel can follow the light there, so gaps are counted, and judged by the figures over all texels
+only.
 A room is what can be seen from one point in the air. Such points are the middles of rays between surfaces;
 the one that sees most places makes the first room, the one that sees most of the rest the second. Closed
 rooms are told apart, and so are those whose doors stand open, but for what is seen through the door.

@@ -125,8 +125,11 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
     assert (code, before["passed"]) == (0, True)
     code, after = told(out, *QUICK, *limit)
     assert (code, [v["failed"] for v in after["limits"]]) == (1, [True, False])
-    ratio = [found["channels"]["irradiance"]["energy_ratio"] for found in (before, after)]
-    assert ratio[1] / ratio[0] == pytest.approx(1.03, rel=1e-3)
+    figures = [found["channels"]["irradiance"] for found in (before, after)]
+    ratio = [found["energy_ratio"] for found in figures]
+    # Rounding to half floats reorders texels by brightness, so some of those judged are others.
+    error = np.hypot(*(found["energy_ratio_se"] for found in figures))
+    assert ratio[1] / ratio[0] == pytest.approx(1.03, abs=4 * error)
     stream = StringIO()
     assert run(["verify", str(out), *QUICK, *limit], out=stream) == 1
     assert f"energy ratio {ratio[1]:.4f} +- " in stream.getvalue()
