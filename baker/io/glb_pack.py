@@ -279,7 +279,9 @@ def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[i
     return free, sorted(view for view in views - kept - named - extended if view < known)
 
 
-def _views_of(accessor: Json) -> Iterator[int]:
+def _views_of(accessor: Any) -> Iterator[int]:
+    if not isinstance(accessor, dict):
+        return
     sparse = accessor.get("sparse")
     holders = [accessor]
     if isinstance(sparse, dict):

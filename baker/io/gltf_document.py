@@ -45,6 +45,8 @@ IRRELEVANT = frozenset(
         "KHR_xmp_json_ld",
     }
 )
+# The lists that scene.glb may add to, whether a bake reads them or not.
+_LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -125,6 +127,8 @@ def open_document(path: Path, data: bytes) -> GltfDocument:
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
     root = JsonObject(_parse_json(chunks.json, file), "", file)
     _check_version(root)
+    for key in _LISTS:
+        root.children(key)
     warnings = _check_extensions(root)
     digest = hashlib.sha256(data)
     buffers: list[bytes] = []

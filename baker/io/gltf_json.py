@@ -57,7 +57,8 @@ class JsonObject:
         """Return an integer of at least `minimum`; without a default the member must be there."""
         value = self._get(key, default)
         if isinstance(value, float) and value.is_integer():
-            value = int(value)
+            # For good: who writes the document uses the number as an index, too.
+            value = self.value[key] = int(value)
         if not isinstance(value, int) or isinstance(value, bool):
             self.fail(f"expected an integer, found {_show(value)}", key)
         if value < minimum:

@@ -214,11 +214,12 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
 def _rewrite_accessor(
     packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], bounds: bool, compressed: bool
 ) -> int:
+    data = gather_rows(source.json, source.buffers, index, row)
     accessor = source.json["accessors"][index]
     if compressed and "bufferView" not in accessor:
         message = "its data is only there Draco-compressed; decompress the file first"
         raise InputError(message, object=f"accessor {index}")
-    return packer.add_rows(gather_rows(source.json, source.buffers, index, row), accessor, bounds=bounds)
+    return packer.add_rows(data, accessor, bounds=bounds)
 
 
 def _rewrite_target(

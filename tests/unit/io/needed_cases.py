@@ -182,6 +182,10 @@ SILENT = {
     "animation is no object": at("animations.0", "x"),
     "camera list": at("cameras.0.type", "orthographic"),
     "normal texture's sampler": at("textures.1.sampler", 9),
+    "indices written as 0.0": both(
+        at("nodes.0.mesh", 0.0),
+        at("meshes.0.primitives.0.attributes.POSITION", float(FIRST["attributes"]["POSITION"])),
+    ),
     "bounds of positions": accessor("POSITION", "min", [9, 9, 9]),
     "number beyond doubles in extras": at("extras", {"far": float("inf")}),
 }
@@ -224,6 +228,11 @@ WARNED = {
         at("meshes.0.primitives.0.attributes._HEAT", -1),
         "broken-attribute",
         "_HEAT",
+    ),
+    "attribute that is no index": (
+        at("meshes.0.primitives.0.attributes.TANGENT", {}),
+        "broken-attribute",
+        "TANGENT",
     ),
     "morph target": (accessor("POSITION", "bufferView", 999, TARGET), "broken-attribute", "morph target 0"),
 }
@@ -288,6 +297,7 @@ REFUSED = {
     "used node is no object": (at("nodes.0", 5), ["nodes[0]", "expected an object"]),
     "used mesh is no object": (at("meshes.0", 5), ["meshes[0]", "expected an object"]),
     "light's index": (at("nodes.2.extensions.KHR_lights_punctual.light", 4), ["light", "out of range"]),
+    "samplers are no list": (at("samplers", 5), ["samplers", "expected a list"]),
     "meshes are no list": (at("meshes", {}), ["meshes", "expected a list"]),
     "extension required": (at("extensionsRequired", ["ACME_magic"]), ["ACME_magic", "requires"]),
 }  # fmt: skip
