@@ -27,6 +27,8 @@ UNDERSTOOD = frozenset(
         "KHR_materials_unlit",
         "KHR_mesh_quantization",
         "KHR_texture_transform",
+        "KHR_node_visibility",
+        "EXT_mesh_gpu_instancing",
         "EXT_texture_webp",
     }
 )

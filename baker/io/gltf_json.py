@@ -138,6 +138,10 @@ class JsonObject:
             self._lists[key] = list(self._children(key))
         return self._lists[key]
 
+    def forget(self, key: str) -> None:
+        """Read the list under `key` anew the next time: it has changed."""
+        self._lists.pop(key, None)
+
     def _children(self, key: str) -> Iterator[JsonObject]:
         value = self.value.get(key, [])
         if not isinstance(value, list):

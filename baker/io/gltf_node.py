@@ -31,6 +31,8 @@ class Placed:
 def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Placed]:
     """Return all nodes below `roots`, parents first, in the file's order of children.
 
+    Nodes that KHR_node_visibility hides are left out with all that is below them.
+
     Parameters
     ----------
     nodes : sequence of JsonObject
@@ -53,6 +55,9 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
         if index in parent:
             _refuse_second_place(nodes, parent, index, above)
         parent[index] = above
+        visibility = nodes[index].extension("KHR_node_visibility")
+        if visibility is not None and not visibility.boolean("visible", True):
+            continue
         with np.errstate(over="ignore", invalid="ignore"):
             matrix = outer @ local_matrix(nodes[index])
         if not np.isfinite(matrix).all():

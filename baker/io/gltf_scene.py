@@ -7,6 +7,7 @@ Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctua
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +19,42 @@ from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning,
 from baker.core.triangle_check import LARGEST_COORDINATE
 from baker.io.gltf_camera import read_cameras
 from baker.io.gltf_document import GltfDocument, open_document
+from baker.io.gltf_instancing import refuse_broken, spread_instances
 from baker.io.gltf_json import JsonObject
 from baker.io.gltf_light import read_light
 from baker.io.gltf_material import MaterialReader
 from baker.io.gltf_mesh import read_primitives
 from baker.io.gltf_node import Placed, place_nodes
+from baker.io.gltf_skin import Poser
 from baker.io.gltf_unread import unneeded_faults
 from baker.io.load import SceneFile, importers
 from baker.io.mesh_build import build_mesh
 
 # Smallest over largest stretch of a node: below it a mesh is squashed flat.
 _FLATTEST = 1e-7
+
+
+_Key = tuple[int, int | None]
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A mesh of the file, in the pose of a skin if it has one.
+
+    Attributes
+    ----------
+    number : int, in the order of reading
+    mesh : int or None, index of the mesh that is baked
+    raw : RawMesh
+    extent : (3,) float64, the largest coordinate of that mesh along each axis
+    place : (4, 4) float64 or None, world from the posed mesh
+    """
+
+    number: int
+    mesh: int | None
+    raw: RawMesh
+    extent: NDArray[np.float64]
+    place: NDArray[np.float64] | None
 
 
 @importers.register(".glb")
@@ -51,6 +77,7 @@ def import_gltf(source: SceneFile) -> Scene:
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
+    spread_instances(document)
     number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
     reader = MaterialReader(document, reflections=source.reflections)
     meshes, instances, raw = _instances(document, placed, reader, warnings, lenient=source.lenient)
@@ -118,42 +145,44 @@ def _instances(
 ) -> tuple[list[Mesh], list[Instance], RawScene | None]:
     """Return the meshes that are used, each once, and where they stand."""
     sources = document.root.children("meshes")
-    built: dict[int, int | None] = {}
+    poser = Poser(document)
+    built: dict[_Key, _Built] = {}
     meshes: list[Mesh] = []
-    extents: list[NDArray[np.float64]] = []
     instances: list[Instance] = []
-    raw: dict[int, RawMesh] = {}
     shown: list[RawInstance] = []
     for node in placed:
         if "mesh" not in node.json:
             continue
+        refuse_broken(document, node.json)
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
-        if number not in built:
+        # A skinned mesh stands where its joints put it, whatever its node says.
+        key = number, node.index if "skin" in node.json else None
+        if key not in built:
             arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
+            place = None
+            if key[1] is not None:
+                arrays, place = poser.pose(sources[number], arrays, node)
             mesh, defects = build_mesh(name, arrays, reader.materials)
-            if lenient:
-                raw[number] = RawMesh(name, tuple(arrays))
             warnings += found + defects
             if mesh is None:
                 warnings.append(
                     SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
                 )
-            built[number] = None if mesh is None else len(meshes)
-            if mesh is not None:
-                meshes.append(mesh)
-                extents.append(np.abs(mesh.position).max(axis=0).astype(np.float64))
-        at = built[number]
+            raw = RawMesh(name, tuple(arrays) if lenient else ())
+            extent = np.zeros(3) if mesh is None else np.abs(mesh.position).max(axis=0).astype(np.float64)
+            built[key] = _Built(len(built), None if mesh is None else len(meshes), raw, extent, place)
+            meshes += [] if mesh is None else [mesh]
+        made = built[key]
         label = node.json.string("name", name)
-        if lenient:
-            shown.append(RawInstance(node.index, label, list(raw).index(number), node.matrix))
-        if at is None or not _stands(node, extents[at], label, warnings):
-            continue
-        if "skin" in node.json:
-            message = "the mesh is skinned; its bind pose is baked, placed by its node"
+        if made.place is not None:
+            node = Placed(node.index, node.json, made.place)
+            message = "the mesh is skinned; it is baked in the pose that its joints have in the file"
             warnings.append(SceneWarning("skinned", message, label))
-        instances.append(Instance(node.index, label, at, node.matrix))
-    kept = RawScene(tuple(raw.values()), tuple(shown)) if lenient else None
+        shown.append(RawInstance(node.index, label, made.number, node.matrix))
+        if made.mesh is not None and _stands(node, made.extent, label, warnings):
+            instances.append(Instance(node.index, label, made.mesh, node.matrix))
+    kept = RawScene(tuple(made.raw for made in built.values()), tuple(shown)) if lenient else None
     return *_drop_unused(meshes, instances), kept
 
 

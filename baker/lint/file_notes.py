@@ -23,7 +23,7 @@ NOTES = {
     "not-triangles": ("info", "nothing to do, if points and lines are not to be baked"),
     "odd-indices": ("warning", "export the mesh again: its index buffer is cut off"),
     "several-scenes": ("info", "export the scene wanted by itself"),
-    "skinned": ("info", "nothing to do, if the bind pose is what is to be baked"),
+    "skinned": ("info", "nothing to do, if the pose of the file is what is to be baked"),
     "unknown-material": ("warning", "export the material with a base colour"),
     "up-and-scale-ignored": ("info", "leave --up and --scale away for glTF"),
 }
@@ -33,8 +33,8 @@ NOTES = {
 def file_note(subject: Subject) -> Iterator[Found]:
     """Parts of the file that a bake passes by or reads in its own way.
 
-    The importer's own code is in `note`: unknown extensions, skins and morph targets (the base shape is
-    baked), primitives of points and lines, several scenes in one file, missing texture
+    The importer's own code is in `note`: unknown extensions, skins (posed by their joints), morph targets
+    (the base shape is baked), primitives of points and lines, several scenes in one file, missing texture
     coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
     needed: normal maps, unused files, tangents, cameras.
     """
