@@ -32,7 +32,7 @@ class ClosedParts(NamedTuple):
     Attributes
     ----------
     part : (T,) int32
-        Part of each triangle, -1 = left out.
+        Part of each triangle, -1 = left out, also a wall between two boxes of one object.
     outward : (T,) int8
         1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it;
         0 if its part encloses none.
@@ -93,17 +93,17 @@ def find_closed_parts(
         nothing = np.zeros(0, bool)
         return ClosedParts(part, outward, nothing, nothing, np.zeros(0), none, none)
     first, same_way = _twins(vertex)
-    single = np.flatnonzero(first == np.arange(len(rows)))
+    single = _single(vertex, first, same_way)
     corner = position[triangle[rows[single]]].astype(np.float64)
     vertex = vertex[single]
     pieces = _pieces(vertex, corner)
     pieces = _join_objects(pieces, vertex, corner)
     whole = _enclosing(pieces, corner)
-    number = np.zeros(len(rows), np.int64)
+    number = np.full(len(rows), -1)
     number[single] = np.arange(len(single))
     of = number[first]
-    part[rows] = pieces.piece[of]
-    outward[rows] = whole[of] * same_way
+    part[rows] = np.where(of >= 0, pieces.piece[of], -1)
+    outward[rows] = np.where(of >= 0, whole[of] * same_way, 0)
     n_parts = len(pieces.area)
     closed = np.zeros(n_parts, bool)
     closed[pieces.piece[whole != 0]] = True
@@ -147,6 +147,25 @@ def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
             turned = [np.roll(vertex[twin], shift).tolist() for shift in range(3)]
             way[twin] = 1 if vertex[first].tolist() in turned else -1
     return of, way
+
+
+def _single(
+    vertex: NDArray[np.int64], first: NDArray[np.int64], same_way: NDArray[np.int8]
+) -> NDArray[np.int64]:
+    """Return the faces that make pieces: one of each set of twins.
+
+    Two boxes of one object that touch have a wall in common, once for each: it lies inside both together and
+    is left out. Where all faces of a piece are there for both sides, one of each stays.
+    """
+    single = np.flatnonzero(first == np.arange(len(first)))
+    paired = np.zeros(len(first), bool)
+    paired[first[same_way < 0]] = True
+    if not paired.any():
+        return single
+    piece = find_edges(vertex[single]).connected_faces(len(single))
+    some = np.zeros(int(piece.max()) + 1, bool)
+    some[piece[~paired[single]]] = True
+    return single[~(paired[single] & some[piece])]
 
 
 def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.closed_parts import ClosedParts, find_closed_parts
+from baker.core.scene import Scene
 from baker.core.winding import winding_number
 
 # Where the inside of a solid is, seen from a triangle.
@@ -73,14 +74,21 @@ class Solids(NamedTuple):
     parts: ClosedParts
 
 
+def lamps_and_cameras(scene: Scene) -> NDArray[np.float64]:
+    """Return where lamps and cameras are, (N, 3) float64, metres, relative to the scene's origin."""
+    places = [light.position for light in scene.lights if light.kind != "directional"]
+    places += [camera.position for camera in scene.cameras]
+    return np.array(places, np.float64).reshape(-1, 3) - scene.origin
+
+
 def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:
     """Tell solids from rooms.
 
     Parameters
     ----------
     surfaces : Surfaces
-    places : (N, 3) float64, metres, world
-        Lamps and cameras: where one is, somebody sees.
+    places : (N, 3) float64, metres
+        Lamps and cameras, relative to the same origin as the surfaces: where one is, somebody sees.
     """
     parts = find_closed_parts(
         surfaces.position, surfaces.triangle, surfaces.instance, surfaces.opaque & (surfaces.instance >= 0)

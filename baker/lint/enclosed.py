@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids
+from baker.core.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
 from baker.lint.finding import Found, Place
 from baker.lint.registry import check
 from baker.lint.subject import Subject
@@ -78,7 +78,7 @@ def _found(subject: Subject, rows: NDArray[np.int64], text: str) -> Found:
     faces = world.face[rows]
     area = float(world.area[rows].sum())
     whole = float(world.area[world.instance == world.instance[rows[0]]].sum())
-    x, y, z = (float(v) for v in world.position[world.triangle[rows[0]]].mean(axis=0))
+    x, y, z = (float(v) for v in world.position[world.triangle[rows[0]]].mean(axis=0) + world.origin)
     return Found(
         text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
         Place(instance.name or subject.raw.meshes[instance.mesh].name, instance.node),
@@ -101,9 +101,7 @@ def _solids(subject: Subject, world: World) -> Solids:
         double_sided=world.double_sided,
         glows=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
     )
-    places = [light.position for light in subject.scene.lights if light.kind != "directional"]
-    places += [camera.position for camera in subject.scene.cameras]
-    return find_solids(surfaces, np.array(places, np.float64).reshape(-1, 3))
+    return find_solids(surfaces, lamps_and_cameras(subject.scene))
 
 
 def _holders(world: World, solids: Solids) -> NDArray[np.int64]:

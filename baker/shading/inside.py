@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene
-from baker.core.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids
+from baker.core.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 
 
@@ -33,9 +33,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Any) -> Solids:
         double_sided=geometry.double_sided,
         glows=(shading.emission.max(axis=1) > 0)[geometry.material],
     )
-    places = [light.position for light in scene.lights if light.kind != "directional"]
-    places += [camera.position for camera in scene.cameras]
-    return find_solids(surfaces, np.array(places, np.float64).reshape(-1, 3))
+    return find_solids(surfaces, lamps_and_cameras(scene))
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Any) -> tuple[Geometry, NDArray[np.uint8]]:
