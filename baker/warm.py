@@ -119,6 +119,7 @@ def cast_rays(kind: str = "") -> None:
     from baker.kernels.emitters import lamps_for, needed_shading, widest_view
     from baker.kernels.gather import N_COLUMNS, gather
     from baker.kernels.hits import HitTable
+    from baker.kernels.lamp_probe import probe_clusters
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
     from baker.kernels.side_table import nothing_seen
     from baker.lights.emissive import build_emitters
@@ -151,6 +152,9 @@ def cast_rays(kind: str = "") -> None:
     # direct light, the rays of gaps and form factors, and the matrix.
     weigh, two = np.array([16.0, 4.0]), np.array([1.0, 16.0])
     widest_view(emitters, origin)
+    counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
+    bounds = np.array([0, _TEXELS])
+    probe_clusters(origin, normal, emitters.row, emitters.first, caster, bounds, every, 16, *counts)
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
     light_samples(origin, normal, lamps, needed, caster, 0, net, shared, weigh, exact, sums, squares)
     dark, black = nothing_seen(), np.zeros(3, np.float32)

@@ -63,7 +63,8 @@ class Emitters(NamedTuple):
 class Lamps(NamedTuple):
     """Emitters as a tile of texels samples them: `Emitters` with the chances of its clusters.
 
-    row, triangle, first, node: see `Emitters`; chance, cumulative (C,) float32.
+    row, triangle, first, node: see `Emitters`; chance, cumulative (C,) float32; apart (C,) uint8, 1 for
+    clusters that have samples of their own: rays that find them count also where all other light is complete.
     """
 
     row: NDArray[np.float32]
@@ -72,6 +73,7 @@ class Lamps(NamedTuple):
     chance: NDArray[np.float32]
     cumulative: NDArray[np.float32]
     node: NDArray[np.int32]
+    apart: NDArray[np.uint8]
 
 
 def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
@@ -80,7 +82,8 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     cumulative = np.zeros_like(chance)
     if len(chance) and len(origin):
         cluster_chances(emitters, origin, chance, cumulative)
-    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node)
+    apart = np.zeros(len(chance), np.uint8)
+    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node, apart)
 
 
 def needed_shading(emitters: Emitters, shading: Any) -> Any:

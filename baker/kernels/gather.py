@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from baker.kernels.area_light import emitter_hit
-from baker.kernels.emitters import RADIANCE, TEXTURED, emitted_radiance, emitter_at
+from baker.kernels.emitters import CLUSTER, RADIANCE, TEXTURED, emitted_radiance, emitter_at
 from baker.kernels.hits import front_facing, hit_pixel
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.side_table import find_side, new_hits, note_hit
@@ -66,6 +66,10 @@ def gather(  # type: ignore[no-untyped-def]
     spare_on, spare = caster.valid, caster.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
     lamp, chance, cumulative, node = lamps.row, lamps.chance, lamps.cumulative, lamps.node
+    apart = lamps.apart
+    some_apart = False
+    for c in range(len(apart)):
+        some_apart = some_apart or apart[c] != 0
     radiance = _rgba()
     # Sums of one point's samples are short: float32; those of all points are not.
     part, missed = _parts(), _floats()
@@ -131,9 +135,9 @@ def gather(  # type: ignore[no-untyped-def]
                 hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
                 i = group + lane
                 m = np.int64(row[prim, 12])
-                if m < -1 and exact[i] == 0:
+                if m < -1 and (exact[i] == 0 or some_apart):
                     m = emitter_at(node, m, hit_u, hit_v)
-                if m >= 0 and exact[i] == 0:
+                if m >= 0 and (exact[i] == 0 or apart[np.int64(lamp[m, CLUSTER])] != 0):
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,
                         normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],

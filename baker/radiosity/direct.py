@@ -16,7 +16,7 @@ from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
 from baker.kernels.area_light import light_samples
-from baker.kernels.emitters import Emitters, lamps_for, needed_shading, widest_view
+from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
@@ -24,9 +24,10 @@ from baker.kernels.shadow import add_visible
 from baker.kernels.side_table import nothing_seen
 from baker.kernels.surface import N_POINTS, Surface
 from baker.lights.family import LIGHT_FAMILIES
+from baker.radiosity.lamp_choice import Choice, LampChooser
 from baker.radiosity.points import KeptPoints, tile_points
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import Caster, new_caster
 
 # Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
 TILE = 512
@@ -91,7 +92,8 @@ def direct_light(
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
     variance, exact = np.zeros(n, np.float32), np.zeros(n, np.uint8)
     net = sobol_reversed(n_light, seed, 1)
-    shared = shared_bits_mask(n_light)
+    chooser = LampChooser.build(emitters, n_light)
+    hidden_net = sobol_reversed(chooser.n_hidden, seed, 3)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
     weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
     families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
@@ -103,38 +105,55 @@ def direct_light(
     cast = np.zeros(-(-n // TILE), np.int64)
     shading = needed_shading(emitters, shading)
 
+    def from_emitters(
+        choice: Choice,
+        origin: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        begin: int,
+        caster: Caster,
+        out: NDArray[np.float32],
+        spread: NDArray[np.float32],
+        done: NDArray[np.uint8],
+    ) -> int:
+        near, n_cast = choice.view > CLOSE, 0
+        for lamps, own_net in ((choice.seen, net), (choice.hidden, hidden_net)):
+            if lamps is None or not lamps.chance.any():
+                continue
+            own, second = np.zeros_like(out), np.zeros(len(out), np.float32)
+            complete = done if lamps is choice.seen else np.zeros(len(out), np.uint8)
+            n_cast += light_samples(
+                origin, normal, lamps, shading, caster, begin, own_net, shared_bits_mask(len(own_net)),
+                weigh[near], complete, own, second,
+            )  # fmt: skip
+            out += own
+            spread += batch_variance(own[:, :3].sum(axis=1), second)
+        if near and (choice.hidden is not None or not done.all()):
+            n_cast += N_HEMISPHERE * len(out)
+            found = np.zeros((len(out), N_COLUMNS), np.float32)
+            gather(
+                origin, normal, table, dark, choice.found, shading, caster, begin, few, few_shared,
+                black, limits, done, found,
+            )  # fmt: skip
+            out[:, 3:] += found[:, DIRECT : DIRECT + 3]
+        return n_cast
+
     def work(begin: int, end: int) -> Part:
         caster = new_caster(tracer)
         origin, normal = tile_points(surface, mask, begin, end, kept)
-        lamps = lamps_for(emitters, origin)
-        out, second = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
-        spread, done = np.zeros(end - begin, np.float32), np.zeros(end - begin, np.uint8)
-        near, n_cast = widest_view(emitters, origin) > CLOSE, 0
-        if lamps.chance.any():
-            n_cast = light_samples(
-                origin, normal, lamps, shading, caster, begin, net, shared, weigh[near], done, out, second
-            )
-            spread = batch_variance(out[:, :3].sum(axis=1), second)
-        if near and not done.all():
-            n_cast += N_HEMISPHERE * (end - begin)
-            found = np.zeros((end - begin, N_COLUMNS), np.float32)
-            gather(
-                origin,
-                normal,
-                table,
-                dark,
-                lamps,
-                shading,
+        out, spread = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
+        done, n_cast = np.zeros(end - begin, np.uint8), 0
+        for choice in chooser.choose(origin, normal, caster):
+            part = choice.part
+            n_cast += from_emitters(
+                choice,
+                origin[part],
+                normal[part],
+                begin + part.start,
                 caster,
-                begin,
-                few,
-                few_shared,
-                black,
-                limits,
-                done,
-                found,
+                out[part],
+                spread[part],
+                done[part],
             )
-            out[:, 3:] += found[:, DIRECT : DIRECT + 3]
         if families:
             ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
             weight = np.zeros((end - begin, N_POINTS), np.float32)

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
-from baker.kernels.emitters import Emitters, lamps_for, needed_shading
+from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.side_table import SeenLight
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE, batch_variance
+from baker.radiosity.lamp_choice import LampChooser
 from baker.radiosity.points import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
@@ -85,27 +86,17 @@ def final_gather(
     limits = np.array([ao_distance, n_light], np.float64)
     radiance = np.array(sky, np.float32)
     shading = needed_shading(emitters, shading)
+    chooser = LampChooser.build(emitters, n_light)
 
     def work(begin: int, end: int) -> Part:
         origin, normal = tile_points(surface, mask, begin, end, kept)
-        lamps, caster = lamps_for(emitters, origin), new_caster(tracer)
-        out = np.zeros((end - begin, N_COLUMNS), np.float32)
-        gather(
-            origin,
-            normal,
-            table,
-            seen,
-            lamps,
-            shading,
-            caster,
-            begin,
-            net,
-            shared,
-            radiance,
-            limits,
-            exact[begin:end],
-            out,
-        )
+        caster, out = new_caster(tracer), np.zeros((end - begin, N_COLUMNS), np.float32)
+        for choice in chooser.choose(origin, normal, caster):
+            part = choice.part
+            gather(
+                origin[part], normal[part], table, seen, choice.found, shading, caster,
+                begin + part.start, net, shared, radiance, limits, exact[begin:end][part], out[part],
+            )  # fmt: skip
         spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
         return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread
 
