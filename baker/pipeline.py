@@ -200,6 +200,7 @@ def light_directly(
         seed=settings.seed,
         threads=thread_count(settings.threads),
         progress=progress,
+        chart=world.texels.chart,
         kept=world.kept,
         run=run,
     )
@@ -232,6 +233,7 @@ def gather_light(
         seed=settings.seed,
         threads=thread_count(settings.threads),
         progress=progress,
+        chart=world.texels.chart,
         kept=world.kept,
         run=run,
     )

@@ -72,6 +72,7 @@ def direct_light(
     seed: int,
     threads: int,
     progress: Progress,
+    chart: NDArray[np.int32] | None = None,
     kept: KeptPoints | None = None,
     run: TileRunner = run_tiles,
 ) -> DirectLight:
@@ -85,6 +86,8 @@ def direct_light(
         Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
     kept : KeptPoints, optional
         Where points are left for later stages with the same tiles.
+    chart : (n,) int32, optional
+        Of each entry: lights are chosen for each chart of a tile.
     run : TileRunner
         Works on the tiles.
     """
@@ -92,7 +95,7 @@ def direct_light(
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
     variance, exact = np.zeros(n, np.float32), np.zeros(n, np.uint8)
     net = sobol_reversed(n_light, seed, 1)
-    chooser = LampChooser.build(emitters, n_light)
+    chooser = LampChooser.build(emitters, n_light, chart)
     hidden_net = sobol_reversed(chooser.n_hidden, seed, 3)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
     weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
@@ -142,7 +145,7 @@ def direct_light(
         origin, normal = tile_points(surface, mask, begin, end, kept)
         out, spread = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
         done, n_cast = np.zeros(end - begin, np.uint8), 0
-        for choice in chooser.choose(origin, normal, caster):
+        for choice in chooser.choose(begin, origin, normal, caster):
             part = choice.part
             n_cast += from_emitters(
                 choice,

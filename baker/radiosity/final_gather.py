@@ -63,6 +63,7 @@ def final_gather(
     seed: int,
     threads: int,
     progress: Progress,
+    chart: NDArray[np.int32] | None = None,
     kept: KeptPoints | None = None,
     run: TileRunner = run_tiles,
 ) -> Gathered:
@@ -76,6 +77,7 @@ def final_gather(
         1 for entries whose direct light from emitters is complete already.
     sky : radiance, cd/m2
     ao_distance : metres, may be inf
+    chart : (n,) int32, of each entry
     kept : points of an earlier stage with the same tiles
     run : works on the tiles
     """
@@ -86,13 +88,17 @@ def final_gather(
     limits = np.array([ao_distance, n_light], np.float64)
     radiance = np.array(sky, np.float32)
     shading = needed_shading(emitters, shading)
-    chooser = LampChooser.build(emitters, n_light)
+    chooser = LampChooser.build(emitters, n_light, chart)
 
     def work(begin: int, end: int) -> Part:
-        origin, normal = tile_points(surface, mask, begin, end, kept)
+        # Lights are chosen for the tile that `direct_light` saw, which goes on with backs.
+        whole = min(begin + TILE, len(surface.pixel))
+        origin, normal = tile_points(surface, mask, begin, whole, kept)
         caster, out = new_caster(tracer), np.zeros((end - begin, N_COLUMNS), np.float32)
-        for choice in chooser.choose(origin, normal, caster):
-            part = choice.part
+        for choice in chooser.choose(begin, origin, normal, caster):
+            part = slice(choice.part.start, min(choice.part.stop, end - begin))
+            if part.start >= part.stop:
+                break
             gather(
                 origin[part], normal[part], table, seen, choice.found, shading, caster,
                 begin + part.start, net, shared, radiance, limits, exact[begin:end][part], out[part],

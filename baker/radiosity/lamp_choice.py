@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.emitters import AREA, CLUSTER, Emitters, Lamps, lamps_for, widest_view
+from baker.kernels.emitters import AREA, CLUSTER, TEXTURED, Emitters, Lamps, lamps_for, widest_view
 from baker.kernels.lamp_probe import probe_clusters
 from baker.trace.packets import LANES, Caster
 
@@ -32,14 +32,13 @@ _COST = 0.06
 _FEW = 32
 _HARMLESS = 0.25
 # A cluster that only some texels see is a reason to choose by blocks of neighbours if it is so many times as
-# bright as another one that is seen. Blocks end where the surface jumps by so many steps, or turns by 60
-# degrees.
+# bright as another one that is seen. Blocks end where a chart ends or the surface turns so much (cosine).
 _OUTSHINES = 4.0
-_JUMP, _TURN = 8.0, 0.5
+_TURN = 0.5
 # Emitters that touch and differ by less than this are one lamp: nothing is to be chosen.
 _ALIKE = 4.0
-# Samples of what no ray reached: this share of the others, but fewer than the closed form needs.
-_HIDDEN_SHARE, _MOST_HIDDEN = 1.0 / 16.0, 7
+# Samples of what no ray reached, as a share of the others.
+_HIDDEN_SHARE = 1.0 / 8.0
 
 
 class Choice(NamedTuple):
@@ -68,33 +67,36 @@ class LampChooser:
     emitters : Emitters
     n_light, n_hidden : int, samples of a texel, and those of what its tile does not see
     single : bool, whether all emitters are one lamp
+    chart : (n,) int32 or None, of each texel entry
     """
 
     emitters: Emitters
     n_light: int
     n_hidden: int
     single: bool
+    chart: NDArray[np.int32] | None
 
     @classmethod
-    def build(cls, emitters: Emitters, n_light: int) -> LampChooser:
-        """Return the chooser for `n_light` samples a texel."""
-        n_hidden = min(max(int(n_light * _HIDDEN_SHARE), 1), _MOST_HIDDEN)
-        return cls(emitters, n_light, n_hidden, _one_lamp(emitters))
+    def build(cls, emitters: Emitters, n_light: int, chart: NDArray[np.int32] | None = None) -> LampChooser:
+        """Return the chooser for `n_light` samples a texel; `chart` (n,) int32 of each texel entry."""
+        n_hidden = max(int(n_light * _HIDDEN_SHARE), 1)
+        return cls(emitters, n_light, n_hidden, _one_lamp(emitters), chart)
 
     def choose(
-        self, origin: NDArray[np.float32], normal: NDArray[np.float32], caster: Caster
+        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], caster: Caster
     ) -> list[Choice]:
         """Return the choices of a tile's parts, which cover it in order.
 
         Parameters
         ----------
+        begin : int, number of the tile's first texel entry
         origin, normal : (m, 16, 3) float32, points of the tile's texels, world
         """
         whole = slice(0, len(origin))
         lamps = lamps_for(self.emitters, origin)
         if self.single or np.count_nonzero(lamps.chance) < 2:
             return [Choice(whole, lamps, None, lamps, widest_view(self.emitters, origin))]
-        bounds, hidden = self._find_hidden(lamps, origin, normal, caster)
+        bounds, hidden = self._find_hidden(lamps, begin, origin, normal, caster)
         parts = [slice(*span) for span in pairwise(bounds.tolist())]
         if len(parts) == 1:
             return [self._choice(whole, origin, lamps, hidden[0])]
@@ -104,11 +106,16 @@ class LampChooser:
         ]
 
     def _find_hidden(
-        self, lamps: Lamps, origin: NDArray[np.float32], normal: NDArray[np.float32], caster: Caster
+        self,
+        lamps: Lamps,
+        begin: int,
+        origin: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        caster: Caster,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return where parts of a tile begin, (P + 1,), and the clusters (P, C) hidden from each."""
         weight = self._weights(lamps, origin)
-        blocks, broken = _blocks(origin, normal)
+        blocks, broken = self._blocks(begin, origin, normal)
         bounds = np.array([0, len(origin)])
         chosen = weight > 0
         unlike = weight.max() > _OUTSHINES * weight[chosen].min()
@@ -124,6 +131,22 @@ class LampChooser:
         hidden = np.stack([self._hidden(weight, np.where(chosen, own, seen[0])) for own in by_block])
         new = np.flatnonzero(np.append(True, (hidden[1:] != hidden[:-1]).any(axis=1)))
         return np.append(blocks[new], len(origin)), hidden[new]
+
+    def _blocks(
+        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int64], bool]:
+        """Return where blocks of up to sixteen neighbours of one surface begin, (B + 1,).
+
+        Also whether the texels belong to several surfaces.
+        """
+        facing = normal[:, 0]
+        apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
+        if self.chart is not None:
+            own = self.chart[begin : begin + len(origin)]
+            apart |= own[1:] != own[:-1]
+        breaks = np.flatnonzero(apart) + 1
+        bounds = np.unique(np.concatenate([np.arange(0, len(origin), LANES), breaks, [len(origin)]]))
+        return bounds, bool(apart.any())
 
     def _probe(
         self,
@@ -169,8 +192,10 @@ class LampChooser:
         hidden = hidden & (lamps.chance > 0)
         if not hidden.any() or not (lamps.chance[~hidden] > 0).any():
             return Choice(part, lamps, None, lamps, widest_view(self.emitters, origin))
-        visible = only(self.emitters, ~hidden)
-        seen, apart = lamps_for(visible, origin), lamps_for(only(self.emitters, hidden), origin)
+        visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
+        # What counts as textured has no closed form: a ray that gets there after all is never taken for many.
+        others.row[:, TEXTURED] = 1.0
+        seen, apart = lamps_for(visible, origin), lamps_for(others, origin)
         chance = np.zeros_like(lamps.chance)
         chance[~hidden] = seen.chance / seen.cumulative[-1]
         chance[hidden] = apart.chance / apart.cumulative[-1] * (self.n_hidden / self.n_light)
@@ -194,22 +219,6 @@ def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
         power=emitters.power[which],
         axis=emitters.axis[which],
         spread=emitters.spread[which],
-    )
-
-
-def _blocks(origin: NDArray[np.float32], normal: NDArray[np.float32]) -> tuple[NDArray[np.int64], bool]:
-    """Return where blocks of up to sixteen neighbours of one surface begin, (B + 1,).
-
-    Also whether the texels belong to several surfaces.
-    """
-    place, facing = origin.mean(axis=1), normal[:, 0]
-    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
-    apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
-    if len(step):
-        apart |= step > _JUMP * np.median(step)
-    breaks = np.flatnonzero(apart) + 1
-    return np.unique(np.concatenate([np.arange(0, len(origin), LANES), breaks, [len(origin)]])), bool(
-        apart.any()
     )
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import SceneBuilder
+from ztest import assert_unbiased
 
 
 def room_and_ground(sun, lamp=(1.0, 1.0, 1.0)):
@@ -34,3 +37,71 @@ def test_the_sun_outside_does_not_end_the_solve_of_a_room(lamp):
         np.testing.assert_allclose(other, light[0], rtol=2e-4)
     colours = np.divide(light[0], lamp)
     np.testing.assert_allclose(colours, colours[:, :1].repeat(3, axis=1), rtol=2e-4)
+
+
+def boxes(radiance):
+    """Closed rooms in a row, each with a lamp of this radiance."""
+    builder = SceneBuilder(96)
+    floors = []
+    for k, glow in enumerate(radiance):
+        white, at = builder.material(0.5), 2.5 * k
+        walls = builder.box((at, 0, 0), (at + 2, 2, 2), white, 10, inward=True)
+        lamp = builder.material(0.0, glow)
+        builder.quad((at + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), lamp, (4, 4))
+        floors.append(walls["-y"])
+    return builder, floors
+
+
+def noise(radiance, room, **settings):
+    """Return the relative RMS difference of a floor between two seeds, and the mean."""
+    builder, floors = boxes(radiance)
+    first, second = (floors[room].values(builder.bake(seed=seed, **settings)) for seed in (1, 2))
+    return float(np.sqrt(np.mean((first / second - 1.0) ** 2))), float((first + second).mean() / 2)
+
+
+@pytest.mark.parametrize("bright", [1e4, 1e6])
+def test_bright_lamps_next_door_take_no_samples(bright):
+    """Noise and light of a room are those that it has alone, whatever shines behind its walls."""
+    alone, light = noise((1.0,), 0)
+    for radiance, room in (((1.0, bright), 0), ((bright, 1.0, bright), 1)):
+        beside, same = noise(radiance, room)
+        # Before, 20 times as much.
+        assert beside < 1.3 * alone
+        # The mean of one bake scatters by 0.1 %.
+        assert same == pytest.approx(light, rel=4e-3)
+
+
+def test_light_through_a_keyhole_is_found():
+    """A hole of 8 cm lets the light of a lamp 10,000 times as bright into a room with a lamp of its own."""
+    builder = SceneBuilder(96)
+    grey = builder.material(0.5)
+    dim = builder.box((0, 0, 0), (2, 2, 2), grey, 12, inward=True)
+    bright = builder.box((2.1, 0, 0), (4.1, 2, 2), grey, 6, inward=True)
+    for wall, x in ((dim["+x"], 2.0), (bright["-x"], 2.1)):
+        # Both walls on this side become frames around the hole.
+        at = next(k for k, mesh in enumerate(builder.meshes) if np.allclose(mesh.position[0], wall.origin))
+        del builder.meshes[at], builder.instances[at]
+        for low, high in (
+            ((0, 0), (0.96, 2)),
+            ((1.04, 0), (2, 2)),
+            ((0.96, 0), (1.04, 0.96)),
+            ((0.96, 1.04), (1.04, 2)),
+        ):
+            up, along = (0, high[0] - low[0], 0), (0, 0, high[1] - low[1])
+            edges = (along, up) if x == 2.0 else (up, along)
+            builder.quad((x, *low), *edges, grey, (4, 4))
+    for k, glow in enumerate((1.0, 1e4)):
+        builder.quad(
+            (2.6 * k + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), builder.material(0.0, glow), (4, 4)
+        )
+    for k, instance in enumerate(builder.instances):
+        builder.instances[k] = replace(instance, mesh=k)
+    own = [quad for side, quad in dim.items() if side != "+x"]
+
+    def light(seed, samples):
+        result = builder.bake(seed=seed, samples=samples, bounces=0)
+        return np.mean([quad.values(result).mean() for quad in own])
+
+    # The truth's own standard error is 1.5 %.
+    truth = np.mean([light(seed, 2048) for seed in range(100, 104)])
+    assert_unbiased([light(seed, 256) for seed in range(8)], truth, least=0.05, slack=0.03)
