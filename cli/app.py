@@ -6,6 +6,7 @@ the settings) is imported only when it is the one that was asked for.
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from typing import Any, TextIO
@@ -29,6 +30,10 @@ COMMANDS = {
 def main() -> None:
     """Run the command line of this process; never returns."""
     argv = sys.argv[1:]
+    for stream in (sys.stdout, sys.stderr):
+        # A name that the terminal's encoding cannot show is no reason to fail.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     stop, notes = supervise(argv)
     try:
         out = _reserve_stdout() if _asks_json(argv) else sys.stdout

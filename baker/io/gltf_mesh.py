@@ -57,6 +57,12 @@ def read_primitives(
             message = f"primitive {i} has morph targets; its base shape is baked"
             warnings.append(SceneWarning("morphed", message, name))
         arrays.append(_primitive(document, primitive, i, mode, materials, lenient))
+        if _plain_integers(document, primitive.child("attributes")):
+            message = (
+                f"COLOR_0 of primitive {i} holds integers that are not marked as normalized; they are read "
+                "as 0 to 1: export it again with 'normalized', or an engine may show other colours"
+            )
+            warnings.append(SceneWarning("integer-colours", message, name))
         warnings += _unreadable(document, primitive, arrays[-1], name)
         left = _corner_count(document, primitive, arrays[-1]) % 3
         if mode == _TRIANGLES and left:
@@ -124,7 +130,7 @@ def _primitive(
     texcoords = {k: texcoord(k) for k in range(MOST_TEXCOORDS)}
     colour = optional("COLOR_0", ("VEC3", "VEC4"))
     if colour is not None:
-        colour = _colour(document, attributes.integer("COLOR_0"), colour)
+        colour = _colour(document, attributes, colour)
     return PrimitiveArrays(
         index=number,
         material=material,
@@ -182,11 +188,22 @@ def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list
         primitive.fail(f"the data is compressed with {_DRACO}, which is not understood; export without it")
 
 
-def _colour(document: GltfDocument, accessor: int, colour: NDArray[np.float32]) -> NDArray[np.float32]:
-    code = component_type(document, accessor)
-    if code != FLOAT and not document.root.children("accessors")[accessor].boolean("normalized", False):
+def _plain_integers(document: GltfDocument, attributes: JsonObject) -> bool:
+    """Tell whether vertex colours are integers that do not say that they mean 0 to 1."""
+    if "COLOR_0" not in attributes:
+        return False
+    accessor = attributes.integer("COLOR_0")
+    plain = not document.root.children("accessors")[accessor].boolean("normalized", False)
+    return plain and component_type(document, accessor) != FLOAT
+
+
+def _colour(
+    document: GltfDocument, attributes: JsonObject, colour: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    accessor = attributes.integer("COLOR_0")
+    if _plain_integers(document, attributes):
         # Integer colours have no meaning but 0 to 1; some exporters forget to say "normalized".
-        colour = colour / np.float32(255 if code == 5121 else 65535)
+        colour = colour / np.float32(255 if component_type(document, accessor) == 5121 else 65535)
     if colour.shape[1] == 3:
         colour = np.concatenate([colour, np.ones((len(colour), 1), np.float32)], axis=1)
     return colour

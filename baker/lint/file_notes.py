@@ -14,6 +14,7 @@ NOTES = {
     "broken-camera": ("info", "export the camera again if the level needs it"),
     "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
     "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
+    "integer-colours": ("warning", "export the vertex colours as normalized integers or floats"),
     "missing-file": ("info", "put the file beside the scene if the level needs it"),
     "missing-mtl": ("warning", "put the material library beside the scene"),
     "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),

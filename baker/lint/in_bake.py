@@ -13,6 +13,7 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     under the codes that `baker check` has for them; here comes the rest.
     """
     # Not through the register, which would import every check.
+    from baker.lint.collision import collision_hull
     from baker.lint.inside_out import inside_out
     from baker.lint.invisible import invisible
     from baker.lint.light_sources import light_range
@@ -26,6 +27,10 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     found += [
         SceneWarning("invisible", f"{f.message}; raise the alpha or leave the object out", f.place.object)
         for f in invisible(subject)
+    ]
+    found += [
+        SceneWarning("collision-hull", f"{f.message}; leave it out of the file", f.place.object)
+        for f in collision_hull(subject)
     ]
     if subject.wants_light:
         found += [SceneWarning("light-range", f.message, f.place.object) for f in light_range(subject)]

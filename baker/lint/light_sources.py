@@ -145,7 +145,8 @@ def light_intensity(subject: Subject) -> Iterator[Found]:
 
     Negative light is an error: a bake refuses it. Absurd is more than 1e6 cd for a point, 1e7 cd for a
     spot, 2e5 lx for a sun (ours gives 1.2e5) and 1e8 cd/m2 for a surface: often watts or lumens taken for
-    candela.
+    candela. Exporters that convert watts multiply by 683 lm/W: Blender does so with the lighting mode
+    Standard, and writes the numbers as they are with Unitless.
     """
     for light in subject.scene.lights:
         place = Place(light.name, light.node)
@@ -156,7 +157,9 @@ def light_intensity(subject: Subject) -> Iterator[Found]:
         elif max(light.intensity) == 0:
             yield Found(f"the {light.kind} light has no intensity", place, position=at)
         elif max(light.intensity) > ABSURD[light.kind]:
-            text = f"the {light.kind} light has {max(light.intensity):.3g} {unit}"
+            most = max(light.intensity)
+            text = f"the {light.kind} light has {most:.3g} {unit}; if watts were multiplied by 683 lm/W "
+            text += f"(Blender's lighting mode Standard), export it as Unitless: {most / 683:.3g} {unit}"
             yield Found(text, place, position=at)
     for k in subject.used_materials:
         material = subject.scene.materials[k]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -236,3 +238,28 @@ def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):
     # With it nothing is measured, and a bake that is named counts before one that is found.
     assert cost("--cost")["basis"] == "the bake in 'later'"
     assert cost("--rates", tmp_path / "first")["seconds"] < found["seconds"] / 100
+
+
+def test_a_light_in_watts_times_683_is_explained(tmp_path):
+    builder = quad_builder()
+    sun = {"type": "directional", "intensity": 683000.0}
+    builder.json["extensions"] = {"KHR_lights_punctual": {"lights": [sun]}}
+    builder.node(name="Sun", extensions={"KHR_lights_punctual": {"light": 0}})
+    _, result = check(write(tmp_path / "sun.glb", builder))
+    (found,) = (f for f in result["findings"] if f["code"] == "light-intensity")
+    assert "683 lm/W" in found["message"]
+    assert "Unitless: 1e+03 lx" in found["message"]
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_names_that_the_terminal_cannot_show_are_no_failure(tmp_path, encoding):
+    builder = quad_builder()
+    builder.json["nodes"][0]["name"] = "стена 💡"
+    path = write(tmp_path / "Räume-комната.glb", builder)
+    env = {**os.environ, "PYTHONIOENCODING": encoding, "LC_ALL": "C"}
+    env.pop("PYTHONUTF8", None)
+    done = subprocess.run(
+        [sys.executable, "-m", "baker.cli", "check", "-v", path], env=env, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"\\u0441\\u0442\\u0435\\u043d\\u0430 \\U0001f4a1" in done.stdout

@@ -204,3 +204,13 @@ def test_morph_targets_and_spare_indices_are_reported(tmp_path):
     scene = load_primitives(tmp_path, builder, primitive)
     assert scene.n_triangles == 2
     assert set(codes(scene)) == {"morphed", "odd-indices"}
+
+
+@pytest.mark.parametrize("normalized", [False, True])
+def test_integer_colours_that_are_not_marked_are_told(tmp_path, normalized):
+    builder = GltfBuilder()
+    part = builder.primitive(QUAD, QUAD_TRIANGLE, NORMAL=QUAD_NORMAL, COLOR_0=np.full((4, 4), 51, np.uint8))
+    builder.json["accessors"][part["attributes"]["COLOR_0"]]["normalized"] = normalized
+    scene = load_primitives(tmp_path, builder, part)
+    np.testing.assert_allclose(scene.meshes[0].colour, 0.2, rtol=1e-6)
+    assert [w.code for w in scene.warnings] == ([] if normalized else ["integer-colours"])

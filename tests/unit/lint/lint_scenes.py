@@ -109,6 +109,22 @@ def png(colour: int) -> bytes:
     return out.getvalue()
 
 
+def named(name: str) -> bytes:
+    """Return a square on a node of that name."""
+
+    def rename(builder: GltfBuilder) -> None:
+        builder.json["nodes"][0]["name"] = name
+
+    return scene(quad(), extra=rename)
+
+
+def painted(grey: float) -> bytes:
+    """Return a square with vertex colours, black but for one corner of that grey."""
+    colour = np.zeros((4, 3), np.float32)
+    colour[2] = grey
+    return scene(quad(COLOR_0=colour))
+
+
 def glowing(colour: int) -> bytes:
     """Return a floor whose emissive texture has one grey."""
 
@@ -280,6 +296,8 @@ CASES: dict[str, Case] = {
         scene(floor(), materials=({"pbrMetallicRoughness": {"baseColorFactor": [0.96, 0.5, 0.5, 1]}},)),
         scene(floor(), materials=({"pbrMetallicRoughness": {"baseColorFactor": [0.94, 0.5, 0.5, 1]}},)),
     ),
+    "collision-hull": Case(named("UCX_Wall_01"), named("Wall_01")),
+    "black-colours": Case(painted(0.0), painted(1.0)),
     "invisible": Case(
         scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 1.5},)),
         scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 0.5},)),
