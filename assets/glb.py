@@ -48,6 +48,10 @@ class GlbBuilder:
         emission: tuple[float, float, float] | None = None,
         texture: NDArray[np.uint8] | None = None,
         roughness: float = 0.9,
+        alpha: float = 1.0,
+        mode: str = "OPAQUE",
+        double_sided: bool = False,
+        glow: NDArray[np.uint8] | None = None,
     ) -> str:
         """Add a material and return its name.
 
@@ -58,12 +62,17 @@ class GlbBuilder:
             Linear base colour.
         emission : 3 floats or None
             Radiance, cd/m2.
-        texture : (H, W, 3) uint8 or None
-            sRGB, multiplied with `colour`.
+        texture : (H, W, 3 or 4) uint8 or None
+            sRGB and alpha, multiplied with `colour` and `alpha`.
         roughness : float
+        alpha : float
+        mode : "OPAQUE", "MASK" (what has an alpha of half or more is there) or "BLEND"
+        double_sided : bool
+        glow : (H, W, 3) uint8 or None
+            sRGB, multiplied with `emission`.
         """
         surface: dict[str, Any] = {
-            "baseColorFactor": [*colour, 1.0],
+            "baseColorFactor": [*colour, alpha],
             "metallicFactor": 0.0,
             "roughnessFactor": roughness,
         }
@@ -75,6 +84,12 @@ class GlbBuilder:
             entry["emissiveFactor"] = [part / strength for part in emission]
             entry["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self._use("KHR_materials_emissive_strength")
+        if glow is not None:
+            entry["emissiveTexture"] = {"index": self._texture(f"{name} glow", glow)}
+        if mode != "OPAQUE":
+            entry["alphaMode"] = mode
+        if double_sided:
+            entry["doubleSided"] = True
         self._materials[name] = len(self._json["materials"])
         self._json["materials"].append(entry)
         return name
@@ -210,13 +225,13 @@ class GlbBuilder:
 
 
 def png(pixel: NDArray[np.uint8]) -> bytes:
-    """Return an RGB PNG that is not compressed, so that its bytes do not hang on a zlib version.
+    """Return a PNG that is not compressed, so that its bytes do not hang on a zlib version.
 
     Parameters
     ----------
-    pixel : (H, W, 3) uint8
+    pixel : (H, W, 3 or 4) uint8
     """
-    height, width, _ = pixel.shape
+    height, width, channels = pixel.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixel.reshape(height, -1)], axis=1).tobytes()
     stored = bytearray(b"\x78\x01")
     for start in range(0, len(rows), 65535):
@@ -224,7 +239,7 @@ def png(pixel: NDArray[np.uint8]) -> bytes:
         last = start + len(block) == len(rows)
         stored += struct.pack("<BHH", last, len(block), len(block) ^ 0xFFFF) + block
     stored += struct.pack(">I", zlib.adler32(rows))
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 8, {3: 2, 4: 6}[channels], 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", bytes(stored)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))

@@ -1,0 +1,59 @@
+"""Makes levels as designers build them, to see whether their light is right.
+
+    python assets/make_levels.py            writes those with known answers to assets/levels
+    python assets/make_levels.py FOLDER     writes all of them to FOLDER, with the sky of each in levels.json
+
+The same bytes every time; tests make them anew and compare. Metres, +Y up, cd/m2, cd and lx.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import levels_indoors as indoors
+import levels_outdoors as outdoors
+from level_parts import Level
+
+LEVELS: dict[str, Callable[[], Level]] = {
+    "street": outdoors.make_street,
+    "huts": outdoors.make_huts,
+    "greenhouse": outdoors.make_greenhouse,
+    "rocks": outdoors.make_rocks,
+    "grove": outdoors.make_grove,
+    "skybox": outdoors.make_skybox,
+    "hulls": outdoors.make_hulls,
+    "balcony": outdoors.make_balcony,
+    "cave": outdoors.make_cave,
+    "closed": indoors.make_closed,
+    "garage": indoors.make_garage,
+    "corridors": indoors.make_corridors,
+    "storeys": indoors.make_storeys,
+    "decals": indoors.make_decals,
+    "tunnel": indoors.make_tunnel,
+    "kitchen": indoors.make_kitchen,
+    "church": indoors.make_church,
+    "warehouse": indoors.make_warehouse,
+    "cellar": indoors.make_cellar,
+    "centimetres": indoors.make_centimetres,
+}
+KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
+
+
+def main() -> None:
+    """Write the levels."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "levels"
+    folder.mkdir(parents=True, exist_ok=True)
+    skies = {}
+    for name in LEVELS if len(sys.argv) > 1 else KEPT:
+        level = LEVELS[name]()
+        level.glb.write(folder / f"{name}.glb")
+        skies[name] = level.sky
+        print(f"{folder / name}.glb: {(folder / f'{name}.glb').stat().st_size} bytes")
+    (folder / "levels.json").write_text(json.dumps(skies, indent=1) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
