@@ -1,6 +1,6 @@
 """Emissive triangles as one light: a table of who emits how much, in clusters of neighbours.
 
-    power = pi * area * mean luminance (twice that if two-sided)
+    power = pi * area * mean luminance, or brightness of a texture (twice that if two-sided)
 
 Textured triangles are cut into parts (`emissive_texture`), and each part has a row like a triangle. A part
 whose texture is constant, or too fine for the parts that there may be, shines with its exact mean.
@@ -31,8 +31,9 @@ from baker.kernels.emitters import (
     TWO_SIDED,
     Emitters,
 )  # fmt: skip
-from baker.lights.emissive_texture import LUMINANCE, EmissiveTextures, cut
+from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # At most so many clusters are weighed for every tile of texels.
 MAX_CLUSTERS = 256
 # Parts that all textured triangles together are cut into, beside what they were.
@@ -51,13 +52,15 @@ _SMALL = 1.0 / 128.0
 class _Pieces:
     """Rows of the table to be: whole triangles, then parts.
 
-    triangle (m,) int64; inside (m, 3) float64, see `emissive_texture.Parts`; radiance (m, 3) float64, what
-    power is made of; textured (m,) bool; node (k, 4), root (T,) int32, see `Emitters`.
+    triangle (m,) int64; inside (m, 3) float64, see `emissive_texture.Parts`; radiance (m, 3) float64, means;
+    brightness (m,) float64, one number for them; textured (m,) bool; node (k, 4), root (T,) int32, see
+    `Emitters`.
     """
 
     triangle: NDArray[np.int64]
     inside: NDArray[np.float64]
     radiance: NDArray[np.float64]
+    brightness: NDArray[np.float64]
     textured: NDArray[np.bool_]
     node: NDArray[np.int32]
     root: NDArray[np.int32]
@@ -76,7 +79,7 @@ def build_emitters(geometry: Geometry, shading: Any, most_parts: int = MOST_PART
     """
     piece = _find_pieces(geometry, shading, most_parts)
     area = (geometry.area[piece.triangle] * piece.inside[:, 2] ** 2).astype(np.float32)
-    power = np.pi * area * (piece.radiance @ LUMINANCE)
+    power = np.pi * area * piece.brightness
     two_sided = geometry.double_sided[piece.triangle]
     power = np.where(two_sided, 2.0 * power, power)
     corner = _corners(geometry, piece)
@@ -139,10 +142,11 @@ def _find_pieces(geometry: Geometry, shading: Any, most_parts: int) -> _Pieces:
     root = np.full(len(geometry.triangle), -1, np.int32)
     root[candidate] = np.arange(len(candidate))
     if not textured.any():
-        return _Pieces(candidate, whole, radiance, textured, np.zeros((0, 4), np.int32), root)
+        none = np.zeros((0, 4), np.int32)
+        return _Pieces(candidate, whole, radiance, radiance @ _LUMINANCE, textured, none, root)
     image = candidate[textured]
     parts = cut(
-        EmissiveTextures(shading, image),
+        EmissiveTextures.of(shading, image),
         geometry.area[image].astype(np.float64),
         _SMALL * geometry.diagonal / _longest(geometry.position[geometry.triangle[image]]),
         most_parts,
@@ -160,6 +164,7 @@ def _find_pieces(geometry: Geometry, shading: Any, most_parts: int) -> _Pieces:
         np.concatenate([plain, image[parts.owner]]),
         np.concatenate([whole[~textured], parts.inside]),
         np.concatenate([radiance[~textured], parts.mean]),
+        np.concatenate([radiance[~textured] @ _LUMINANCE, brightness(parts.mean)]),
         np.concatenate([np.zeros(len(plain), bool), varied]),
         node,
         root,

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.kernels.textures import TexturePack
 from baker.kernels.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums, uv_means
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # A triangle whose noise is lower is cut no further.
 ENOUGH = 0.05
 # Parts of a triangle this small are cut no further: float32 barycentrics could not tell them apart.
@@ -62,30 +62,40 @@ class Parts:
 class EmissiveTextures:
     """The emission of textured triangles, ready to be averaged over any part of them."""
 
-    def __init__(self, shading: Any, triangle: NDArray[np.int64]) -> None:
-        """Prepare triangles (n,) of the scene, all of materials with an emissive texture."""
-        self.shading = shading
-        material = shading.material[triangle]
-        self.factor = shading.emission[material].astype(np.float64)
-        uv = shading.emission_uv
-        uv = uv[shading.triangle[triangle]] if len(uv) > 1 else np.zeros((len(triangle), 3, 2))
-        self.uv = uv.astype(np.float64)
+    def __init__(
+        self,
+        pack: TexturePack,
+        texture: NDArray[np.integer[Any]],
+        factor: NDArray[np.float64],
+        uv: NDArray[np.float64],
+    ) -> None:
+        """Prepare triangles: texture (n,) in the pack, radiance without it (n, 3), image uv (n, 3, 2)."""
+        self.pack, self.factor, self.uv = pack, factor, uv.copy()
         # Materials alike but for their brightness share one set of sums.
         scaled = self.factor / np.maximum(self.factor.max(axis=1, keepdims=True), 1e-300)
-        key = np.column_stack([shading.emission_texture[material], scaled])
+        key = np.column_stack([texture, scaled])
         kinds, kind = np.unique(key, axis=0, return_inverse=True)
         self.kind = kind.reshape(-1)
-        self.sums = [row_sums(shading.pack, int(row[0]), row[1:] ** 2) for row in kinds]
+        self.sums = [row_sums(pack, int(row[0]), row[1:] ** 2) for row in kinds]
         # Texels that each triangle is wide, the larger of both axes.
-        self.texels = np.zeros(len(triangle))
+        self.texels = np.zeros(len(uv))
         self._bring_near()
+
+    @classmethod
+    def of(cls, shading: Any, triangle: NDArray[np.int64]) -> EmissiveTextures:
+        """Prepare triangles (n,) of the scene, all of materials with an emissive texture."""
+        material = shading.material[triangle]
+        uv = shading.emission_uv
+        uv = uv[shading.triangle[triangle]] if len(uv) > 1 else np.zeros((len(triangle), 3, 2))
+        factor = shading.emission[material].astype(np.float64)
+        return cls(shading.pack, shading.emission_texture[material], factor, uv.astype(np.float64))
 
     def _bring_near(self) -> None:
         """Move uv by whole repeats to the first ones, and shrink what has too many of them to count."""
         for k, sums in enumerate(self.sums):
             own = np.flatnonzero(self.kind == k)
-            uv, size = self.uv[own], np.array(self.shading.pack.level[sums.texture, 0, 1:])
-            repeats = self.shading.pack.wrap[sums.texture, :2] != 2
+            uv, size = self.uv[own], np.array(self.pack.level[sums.texture, 0, 1:])
+            repeats = self.pack.wrap[sums.texture, :2] != 2
             uv -= np.where(repeats, 2.0 * np.floor(0.5 * uv.min(axis=1)), 0.0)[:, None]
             texels = np.ptp(uv, axis=1) * size
             self.texels[own] = texels.max(axis=1)
@@ -103,7 +113,7 @@ class EmissiveTextures:
         size = inside[:, 2, None]
         uv = np.stack([first, first + size * edge[:, 0], first + size * edge[:, 1]], axis=1)
         mean, spread = np.zeros((len(owner), 3)), np.zeros(len(owner))
-        pack = self.shading.pack
+        pack = self.pack
         for k in np.unique(self.kind[owner]):
             own = np.flatnonzero(self.kind[owner] == k)
             sums = self.sums[k]
@@ -114,18 +124,19 @@ class EmissiveTextures:
             mean[own], spread[own] = part * self.factor[owner[own]], varied
         return mean, spread
 
-    def whole(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean radiance (n, 3) and spread (n,) of the triangles."""
-        n = len(self.uv)
-        return self.means(np.arange(n), np.tile([0.0, 0.0, 1.0], (n, 1)))
 
-
-def row_sums(pack: Any, texture: int, weight: NDArray[np.float64]) -> RowSums:
+def row_sums(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> RowSums:
     """Return the running sums of a texture of the pack."""
     offset, w, h = (int(x) for x in pack.level[texture, 0])
     block = np.zeros((h, w // BLOCK + 1, N_SUMS))
     fill_row_sums(pack.pixels[offset : offset + w * h], 0, weight, block)
     return RowSums(block, weight, texture)
+
+
+def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how bright radiance (n, 3) is when parts are chosen: by luminance blue would get few samples."""
+    mean: NDArray[np.float64] = radiance.mean(axis=1)
+    return mean
 
 
 def cut(
@@ -146,13 +157,13 @@ def cut(
     inside = np.tile([0.0, 0.0, 1.0], (n, 1))
     finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
     mean, spread = _means_of_parts(textures, owner, inside, finest)
-    whole = area * (mean @ LUMINANCE)
+    whole = area * brightness(mean)
     # Half of the parts go where the power is, half to all alike: a dim room has lamps of its own.
     lit = max(int((whole > 0).sum()), 1)
     weight = 0.5 * whole / max(float(whole.sum()), 1e-300) + 0.5 / lit
     child = np.full(n, -1, np.int64)
     while True:
-        share = area[owner] * inside[:, 2] ** 2 * (mean @ LUMINANCE) / np.maximum(whole[owner], 1e-300)
+        share = area[owner] * inside[:, 2] ** 2 * brightness(mean) / np.maximum(whole[owner], 1e-300)
         noise = np.where(child < 0, share * spread, 0.0)
         gain = noise * weight[owner] * (np.abs(inside[:, 2]) > _SMALLEST)
         gain[np.bincount(owner, noise, n)[owner] <= ENOUGH] = 0.0

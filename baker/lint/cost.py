@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from baker.lint.finding import Found
-from baker.lint.light_levels import emission
 from baker.lint.registry import check
 from baker.lint.subject import Subject
 
@@ -103,7 +102,7 @@ def _rays(subject: Subject, texels: int) -> dict[str, int]:
     rays = {"buried texels": _BURIED * texels}
     if subject.wants_light:
         lamps = sum(max(x.intensity) > 0 for x in subject.scene.lights)
-        glows = bool(subject.used_materials) and bool(emission(subject)[subject.used_materials].any())
+        glows = subject.glows
         rays["direct light"] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
         if settings.bounces != 0:
             each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)

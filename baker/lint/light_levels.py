@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight
 from baker.lint.finding import Found, Place
-from baker.lint.light_sources import image_mean
 from baker.lint.registry import check
 from baker.lint.subject import Subject
 
@@ -75,13 +74,18 @@ def spread_points(
 
 
 def _inside(
-    subject: Subject, triangle: NDArray[np.int64], random: np.random.Generator
+    subject: Subject,
+    triangle: NDArray[np.int64],
+    random: np.random.Generator,
+    part: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return a random point of each triangle."""
+    """Return a random point of each triangle, or of a part of it (n, 3), see `Emission.inside`."""
     world = subject.world
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    if part is not None:
+        u, v = part[:, 0] + part[:, 2] * u, part[:, 1] + part[:, 2] * v
     corner = world.position[world.triangle[triangle]].astype(np.float64)
     point: NDArray[np.float64] = (
         corner[:, 0] + u[:, None] * (corner[:, 1] - corner[:, 0]) + v[:, None] * (corner[:, 2] - corner[:, 0])
@@ -112,34 +116,25 @@ def _emissive(
     subject: Subject, origin: NDArray[np.float64], normal: NDArray[np.float64], random: np.random.Generator
 ) -> NDArray[np.float64]:
     """Light from emissive triangles, by points chosen by power, (n, 3) float64."""
-    world = subject.world
-    radiance = emission(subject)[world.material]
-    power = world.area * (radiance @ _LUMINANCE)
+    world, found = subject.world, subject.emission
+    power = found.area * (found.radiance @ _LUMINANCE)
     total = np.zeros((len(origin), 3))
     if not power.sum() > 0:
         return total
     share = np.cumsum(power) / power.sum()
     for _ in range(EMITTER_RAYS):
-        chosen = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
-        way = _inside(subject, chosen, random) - origin
+        part = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
+        chosen = found.triangle[part]
+        way = _inside(subject, chosen, random, found.inside[part]) - origin
         square = np.maximum(np.einsum("nx,nx->n", way, way), 1e-20)
         here = np.einsum("nx,nx->n", way, normal)
         there = -np.einsum("nx,nx->n", way, world.normal[chosen])
         there = np.where(world.double_sided[chosen], np.abs(there), there)
         hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 0.9999))
         geometry = np.maximum(here, 0) * np.maximum(there, 0) / square**2 * (hit < 0)
-        density = power[chosen] / power.sum() / np.maximum(world.area[chosen], 1e-300)
-        total += radiance[chosen] * (geometry / density)[:, None] / EMITTER_RAYS
+        density = power[part] / power.sum() / np.maximum(found.area[part], 1e-300)
+        total += found.radiance[part] * (geometry / density)[:, None] / EMITTER_RAYS
     return total
-
-
-def emission(subject: Subject) -> NDArray[np.float64]:
-    """Return each material's mean radiance, (M, 3) float64, cd/m2."""
-    out = np.array([m.emission for m in subject.scene.materials], np.float64).reshape(-1, 3)
-    for k, material in enumerate(subject.scene.materials):
-        if material.emission_texture is not None and out[k].any():
-            out[k] *= image_mean(material.emission_texture.image)
-    return out
 
 
 def cosine_ways(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
@@ -217,16 +212,13 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
     Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
     their front only.
     """
-    radiance = emission(subject).max(axis=1) if subject.scene.materials else np.zeros(0)
-    if not radiance.any() or len(subject.raw.instances) < 2:
+    if not subject.glows or len(subject.raw.instances) < 2:
         return
     world = subject.world
     random = np.random.default_rng(subject.settings.seed)
-    glows = radiance[world.material] > 0
+    glows = np.unique(subject.emission.triangle)
     for k in np.unique(world.instance[glows]):
-        own = np.flatnonzero(glows & (world.instance == k) & (world.area > 0))
-        if not len(own):
-            continue
+        own = glows[world.instance[glows] == k]
         share = np.cumsum(world.area[own])
         pick = (np.arange(FACING_RAYS) + 0.5) / FACING_RAYS * share[-1]
         chosen = own[np.minimum(np.searchsorted(share, pick), len(own) - 1)]

@@ -34,8 +34,8 @@ FLOOR = 0.5
 def no_light(subject: Subject) -> Iterator[Found]:
     """A scene without any light, emissive surface or sky: its irradiance is black."""
     lit = any(max(light.intensity) > 0 for light in subject.scene.lights)
-    glows = any(max(subject.scene.materials[k].emission) > 0 for k in subject.used_materials)
-    if not lit and not glows and not any(subject.settings.sky_radiance) and subject.wants_light:
+    dark = not lit and not any(subject.settings.sky_radiance) and subject.wants_light
+    if dark and not subject.glows:
         yield Found("nothing emits light: the irradiance will be black")
 
 
@@ -238,7 +238,7 @@ def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
     fix="paint the emissive texture, or give the material an emissiveFactor",
 )
 def emissive_black(subject: Subject) -> Iterator[Found]:
-    """Emissive materials whose texture is black all over, or whose factor is zero."""
+    """Emissive materials whose texture is black wherever they are used, or whose factor is zero."""
     for k in subject.used_materials:
         material = subject.scene.materials[k]
         if material.emission_texture is None:
@@ -250,6 +250,9 @@ def emissive_black(subject: Subject) -> Iterator[Found]:
         elif not max(material.emission) > 0 and image[..., :3].any():
             text = f"material '{material.name}' has an emissive texture, but its emissiveFactor is zero"
             yield Found(text, Place(material.name), severity="info")
+        elif max(material.emission) > 0 and k not in subject.world.material[subject.emission.triangle]:
+            text = f"all surfaces of material '{material.name}' lie where its emissive texture is black"
+            yield Found(text, Place(material.name))
 
 
 @check(

@@ -20,6 +20,7 @@ from baker.lint.world import World
 
 if TYPE_CHECKING:
     from baker.lint.cost import Rates
+    from baker.lint.emission import Emission
     from baker.lint.light_levels import Levels
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
@@ -109,14 +110,26 @@ class Subject:
         return any(name != "ao" for name in self.settings.channels)
 
     @cached_property
+    def emission(self) -> Emission:
+        """Return the triangles that emit."""
+        from baker.lint.emission import find_emission
+
+        return find_emission(self)
+
+    @property
+    def glows(self) -> bool:
+        """Tell whether any triangle emits; one whose part of the emissive texture is black does not."""
+        some = any(max(self.scene.materials[k].emission) > 0 for k in self.used_materials)
+        return some and len(self.emission.triangle) > 0
+
+    @cached_property
     def levels(self) -> Levels | None:
         """Return direct light at sample points; None without light, surface, or wish for either."""
-        from baker.lint.light_levels import emission, estimate_levels
+        from baker.lint.light_levels import estimate_levels
 
         bright = [max(light.intensity) for light in self.scene.lights]
-        glow = emission(self)[self.used_materials].max(initial=0.0) if self.used_materials else 0.0
-        lit = max([*bright, glow, *self.settings.sky_radiance], default=0.0) > 0
-        if not lit or not self.wants_light or not self.world.area.sum() > 0:
+        lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
+        if not self.wants_light or not (lit or self.glows) or not self.world.area.sum() > 0:
             return None
         return estimate_levels(self)
 

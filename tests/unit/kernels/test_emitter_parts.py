@@ -25,7 +25,6 @@ from baker.lights.emissive import MOST_PARTS, build_emitters
 
 emitted_radiance, emitter_at, emitter_density = compiled(emitted_radiance, emitter_at, emitter_density)
 on_triangle, sample_emitter = compiled(on_triangle, sample_emitter)
-LUMINANCE = [0.2126, 0.7152, 0.0722]
 
 
 def glowing(image, emission=(1.0, 1.0, 1.0), **how):
@@ -62,7 +61,7 @@ def plate(material, far=0.0):
 def test_power_is_that_of_the_texture(image, nearest):
     emission = (3.0, 1.0, 0.25)
     emitters = plate(glowing(image, emission, nearest=nearest)).emitters
-    truth = np.pi * 2.0 * (image.reshape(-1, 3).astype(float).mean(axis=0) * emission) @ LUMINANCE
+    truth = np.pi * 2.0 * (image.reshape(-1, 3).astype(float).mean(axis=0) * emission).mean()
     assert emitters.power.sum() == pytest.approx(truth, rel=1e-6)
     assert len(emitters.row) < MOST_PARTS
 
@@ -120,7 +119,9 @@ def test_sampled_points_lie_where_their_density_says():
     for u, v in rng.random((n, 2), np.float32):
         m, density, b1, b2 = sample_emitter(*choice, u, v, point)
         a1, a2 = on_triangle(lamps.row, m, b1, b2)
-        assert emitter_at(lamps.node, int(world.emitters.root[lamps.triangle[m]]), a1, a2) == m
+        # On a part's edge it may be either side.
+        if min(b1, b2, 1 - b1 - b2) > 1e-4:
+            assert emitter_at(lamps.node, int(world.emitters.root[lamps.triangle[m]]), a1, a2) == m
         corner = world.geometry.position[world.geometry.triangle[lamps.triangle[m]]].astype(float)
         np.testing.assert_allclose(point, corner.T @ [1 - a1 - a2, a1, a2], atol=1e-6)
         out[:3] = lamps.row[m, RADIANCE : RADIANCE + 3]

@@ -271,7 +271,7 @@ def test_textured_emission():
     )
     # Black pictures do not emit; the table's power is the mean over the picture.
     np.testing.assert_array_equal(np.unique(world.emitters.triangle), [0, 1])
-    truth = np.pi * 0.5 * 4 * (0.2126 + 0.7152 * 0.5)
+    truth = np.pi * 0.5 * 4 * (1 + 0.5) / 3
     assert world.emitters.power.sum() == pytest.approx(truth, rel=1e-6)
     out = np.zeros(4)
     emitted_radiance(world.shading, 0, 0.8, 0.1, out)
