@@ -6,6 +6,7 @@ A MASK hit counts where alpha reaches the cutoff. For a BLEND hit it depends on 
   `packets.Tint.colour`, and the hit does not count. Their ends are fixed, so every crossing on the way is
   asked for, in whatever order.
 - Rays that pass BLEND surfaces unaware (ID `packets.UNAWARE`): the hit counts where alpha is 1.
+- Rays that ask what lies on which side (ID `packets.SOLID`): the hit counts where alpha is above 0.
 - Other rays (ID 0): the hit counts with probability alpha. The number that decides is a hash of the bits of
   the ray and the triangle: the same ray always gets the same answer, however it is packed and on whatever
   thread, and surfaces along a ray decide independently. Rays of one texel differ in direction, so each has
@@ -36,6 +37,7 @@ from baker.trace.packets import (
     NG_X,
     ORG_X,
     PRIM_ID,
+    SOLID,
     TFAR,
     TINT_COLOUR,
 )  # fmt: skip
@@ -117,6 +119,8 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
             continue
         if share <= 0.0:
             valid[lane] = 0
+            continue
+        if ray_words[ID * n + lane] == SOLID:
             continue
         number = np.int64(ray_words[ID * n + lane]) - 1
         if number < 0:

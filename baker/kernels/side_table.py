@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.surface import N_POINTS
+from baker.kernels.tint import number_rays
 from baker.trace.jit import inner, scratch, smaller
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR, trace_lanes
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, SOLID, TFAR, trace_lanes
 
 _f = np.float32
 # A segment before a hit starts this far back along the ray, one above it that high, in sides of a texel.
@@ -116,7 +117,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, caster):  # ty
     hits : (10 * 16,) float32, from `note_hit`; lane : int, which of them
     The caster's sixteen rays are overwritten, but for their origins.
     """
-    on, rays = caster.lane_valid, caster.lane_floats
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    number_rays(caster.tint, words, SOLID)
     saved = _saved()
     for j in range(3 * LANES):
         saved[j] = rays[ORG_X * LANES + j]
@@ -162,4 +164,5 @@ def find_side(point, normal, height, member, side, s, hits, lane, caster):  # ty
             break
     for j in range(3 * LANES):
         rays[ORG_X * LANES + j] = saved[j]
+    number_rays(caster.tint, words, np.uint32(0))
     return found

@@ -216,12 +216,18 @@ def trace_gather(tint, turn, intersect, scene, width, query, on, rays, words, sp
     if tint is None:
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
         return
-    number = UNAWARE if turn == 1 else np.uint32(0)
+    number_rays(tint, words, UNAWARE if turn == 1 else np.uint32(0))
+    trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
+    number_rays(tint, words, np.uint32(0))
+
+
+@inner
+def number_rays(tint, words, number):  # type: ignore[no-untyped-def]
+    """Say of sixteen rays what BLEND surfaces are to them: 0, `packets.UNAWARE` or `packets.SOLID`."""
+    if tint is None:
+        return
     for lane in range(LANES):
         words[ID * LANES + lane] = number
-    trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-    for lane in range(LANES):
-        words[ID * LANES + lane] = np.uint32(0)
 
 
 @inner

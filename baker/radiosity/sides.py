@@ -173,7 +173,9 @@ def split_texels(
     cast = np.zeros(-(-n // _TILE), np.int64)
 
     def look(begin: int, end: int) -> None:
-        cast[begin // _TILE] = crossed_texels(surface, begin, end, new_caster(tracer), crossed, side)
+        cast[begin // _TILE] = crossed_texels(
+            surface, begin, end, new_caster(tracer, solid=True), crossed, side
+        )
 
     run_tiles(n, _TILE, look, threads=threads, stage=STAGE, progress=progress, rays_per_item=4)
     suspect = np.flatnonzero(crossed)
@@ -210,7 +212,7 @@ def _group(
         own = chosen[begin:end]
         point, normal = points_of(surface, mask, own)
         height, label = np.zeros(point.shape[:2], np.float32), np.zeros(point.shape[:2], np.int8)
-        caster = new_caster(tracer)
+        caster = new_caster(tracer, solid=True)
         # Backs are measured like their fronts.
         point_heights(point, normal, side[own], caster, height)
         cast = group_points(point, normal, height, mask[own], caster, label)
@@ -325,7 +327,7 @@ def _see(
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
         def work(begin: int, end: int) -> None:
-            own, caster = chosen[begin:end], new_caster(tracer)
+            own, caster = chosen[begin:end], new_caster(tracer, solid=True)
             ends = []
             for k in range(2):
                 entry = pair[own, k].astype(np.int64)

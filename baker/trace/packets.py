@@ -36,9 +36,9 @@ NO_HIT = np.uint32(0xFFFFFFFF)
 BLEND_GEOMETRY = np.uint32(2)
 # What the ID of a ray says about BLEND surfaces. In the tree of all triangles: 0, it stops at them by chance;
 # n from 1 to 16, it passes, and the transmittance is multiplied into the n-th of `Tint.colour`; UNAWARE, it
-# passes but where alpha is 1. In the tree of BLEND triangles: n, lerp(1, c, a) is multiplied, PASSES + n,
-# the transmittance.
-PASSES, UNAWARE = LANES, np.uint32(2 * LANES + 1)
+# passes but where alpha is 1; SOLID, it stops but where alpha is 0. In the tree of BLEND triangles: n,
+# lerp(1, c, a) is multiplied; PASSES + n, the transmittance.
+PASSES, UNAWARE, SOLID = LANES, np.uint32(2 * LANES + 1), np.uint32(2 * LANES + 2)
 # Words of what filter functions of BLEND triangles find: RTCRayQueryContext, `Tint.stop`, `Tint.colour`,
 # `Tint.edge_hits`, and so many hits on edges for each ray: distance and surface of each (`edge_hits`).
 EDGE_HITS = 32
@@ -152,13 +152,17 @@ class Caster(NamedTuple):
     tint: Tint | None = None
 
 
-def new_caster(tracer: Tracer) -> Caster:
+def new_caster(tracer: Tracer, *, solid: bool = False) -> Caster:
     """Return packet memory at multiples of 64 bytes, as Embree wants.
 
     What no kernel changes is set here: time and tnear 0, all bits of the mask.
+
+    solid : whether the sixteen rays stop at BLEND surfaces wherever alpha is above 0, see `SOLID`
     """
     valid, floats = _packet_memory(tracer.width)
     lane_valid, lane_floats = _packet_memory(LANES)
+    if solid:
+        lane_floats.view(np.uint32)[ID * LANES : (ID + 1) * LANES] = SOLID
     return Caster(
         *tracer[:4],
         *(valid, floats, floats.view(np.uint32)),

@@ -88,6 +88,20 @@ def test_sky_through_black_glass_all_around_has_no_noise():
     np.testing.assert_allclose(found, np.broadcast_to(truth, found.shape), rtol=1e-4)
 
 
+def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
+    """Texels on both sides of it hold the light of one side, and not of some points by chance."""
+    builder = SceneBuilder(64)
+    floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (24, 24))
+    builder.quad((0.013, -0.2, -1.2), (0, 1.6, 0), (0, 0, 2.4), glass(builder, alpha=0.9), (4, 4))
+    builder.light("directional", 1.0, direction=(-(0.5**0.5), -(0.5**0.5), 0.0))
+    found = floor.values(builder.bake(bounces=0, samples=16)) / 0.5**0.5
+    # Rows run along x; the pane stands in row 12.
+    np.testing.assert_allclose(found[13:], 1, rtol=1e-5)
+    np.testing.assert_allclose(found[:12], np.broadcast_to(passed(COLOUR, 0.9), (12, 24, 3)), rtol=1e-5)
+    assert np.ptp(found[12], axis=0).max() < 1e-5
+    assert min(abs(found[12, 0] - 1).max(), abs(found[12, 0] - passed(COLOUR, 0.9)).max()) < 1e-5
+
+
 def test_a_lamp_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_a_free_one():
     """Of 256 rays all pass as a rule; each has to be asked for its colour nevertheless."""
     builder, floor = floor_under(pane((1.0, 0.0, 0.0), 1 / 1024), light="")
