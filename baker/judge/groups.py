@@ -4,7 +4,8 @@ For the places of a group with values v_c and reference r_c (v, r: means over co
 
     bias       B = sum v / sum r - 1
     colour     S_c = (V_c / V - R_c / R) / max(R_c / R, 0.3)     V, R: sums of v, r; V_c, R_c: of one colour
-    typical    median of |v - r| / mean(r), and what two halves of the reference, compared, show of it
+    typical    median of |v - r| / max(r, floor), floor as in `figures` but of the group; beside it what two
+               halves of the reference, compared, show of it
 
 A single place is known to some percent; a mean over a hundred of them to a tenth of that. So a deviation
 of a whole object, colour or room is seen far below the noise of its texels. It is believed if it lies more
@@ -27,6 +28,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from baker.judge.figures import dark_floor
 
 # Fewer places are not judged as a group.
 LEAST = 8
@@ -145,6 +148,8 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
     bias = float(v.sum() - r.sum()) / total
     spread = _jackknife((v.sum() - v - (r.sum() - r))[:, None] / np.maximum(total - r, total / n)[:, None])[0]
     colour, colour_se = _colour_shift(places)
+    lowest = max(dark_floor(places.reference), least)
+    scale = np.maximum(r, lowest) if lowest > 0 else np.full(n, total / n)
     apart = 0.5 * np.abs((places.halves[0] - places.halves[1]).mean(axis=1))
     return GroupFigures(
         texels=n,
@@ -153,8 +158,8 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
         bias_se=max(spread, own / total),
         colour=colour,
         colour_se=colour_se,
-        typical=float(np.median(np.abs(v - r))) / (total / n),
-        typical_noise=float(np.median(apart)) / (total / n),
+        typical=float(np.median(np.abs(v - r) / scale)),
+        typical_noise=float(np.median(apart / scale)),
     )
 
 

@@ -21,9 +21,9 @@ from baker.reference.view import Reference
 from baker.verification.surroundings import buried_places, in_contact, lifted, seen_along
 
 # Shares of the points: at the borders of charts, near other surfaces, anywhere.
-_BORDER, _CONTACT = 0.5, 0.3
+_BORDER, _CONTACT = 0.4, 0.5
 # How many texels are looked at for one that lies near another surface.
-_POOL = 24
+_POOL = 16
 _PLACES, _POOL_PLACES = 16, 8
 # A place belongs to a point's surface if it is this near, in texels, and faces the same way (cosine).
 _REACH, _SAME = 4.0, 0.5

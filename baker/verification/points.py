@@ -24,7 +24,8 @@ from baker.verification.surroundings import look_around
 TEXEL, SUSPECT, STEEP, EDGE = 0, 1, 2, 3
 PLACES = 64
 # Points at edges, texels that stand out, and steep ones, in each channel, for each judged texel.
-_EDGES, _SUSPECTS, _STEEP = 0.3, 0.05, 0.1
+_EDGES, _SUSPECTS, _STEEP = 0.35, 0.05, 0.1
+_LEAST_EDGES = 500
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def choose_points(
     brightness = bake.maps[names[0]].mean(axis=3, dtype=np.float64).reshape(-1)
     texel = choose_texels(owner, covered, brightness, settings.texels, seed)
     suspect, steep = _telling_texels(bake, pages, names, settings.texels)
-    count = max(int(_EDGES * settings.texels), 1)
+    count = max(int(_EDGES * settings.texels), _LEAST_EDGES)
     edge = edge_points(reference, geometry, pages.owner, pages.covered, count, PLACES, seed)
     parts = texel, suspect, steep
     pixel = np.concatenate([*parts, edge.pixel])

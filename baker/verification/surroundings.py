@@ -45,7 +45,7 @@ class Surroundings:
         All places are.
     gap : (n,) bool
     room : (n,) int32
-        Rooms by falling number of places; -1 for places that no point in the air sees.
+        Number of the room; -1 for places that no point in the air sees.
     air : (m, 3) float64
         Points in the air that rooms were made of.
     """
@@ -65,9 +65,15 @@ def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroun
     buried = np.zeros(len(places.position), bool)
     if len(suspect):
         places, buried[suspect] = _free_places(reference, places, suspect, random)
-    air = air[random.permutation(len(air))[:_AIR]]
-    room = _rooms(reference, places, air)
-    return Surroundings(places, buried, near.mean(axis=1) > _GAP, room, air)
+    room = np.full(len(air), -1, np.int32)
+    eyes = np.zeros((0, 3))
+    # Places that none of the first points in the air see get some of their own: small rooms.
+    for _ in range(2):
+        left = np.flatnonzero(room < 0)
+        some = air[left[random.permutation(len(left))[:_AIR]]]
+        _add_rooms(reference, places, some, room)
+        eyes = np.concatenate([eyes, some])
+    return Surroundings(places, buried, near.mean(axis=1) > _GAP, room, eyes)
 
 
 def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[np.bool_]:
@@ -128,21 +134,20 @@ def _first_look(
     return black, near, middle.reshape(n, k, 3)[np.arange(n), longest]
 
 
-def _rooms(reference: Reference, places: TexelPlaces, air: NDArray[np.float64]) -> NDArray[np.int32]:
-    n = len(places.position)
-    seen = visible(reference, air, places.position[:, 0], places.face_normal[:, 0])
-    room = np.full(n, -1, np.int32)
-    left = np.ones(n, bool)
-    number = 0
-    while left.any():
-        count = (seen & left).sum(axis=1)
-        best = int(np.argmax(count)) if len(count) else 0
-        if not len(count) or count[best] < _LEAST_ROOM:
+def _add_rooms(
+    reference: Reference, places: TexelPlaces, air: NDArray[np.float64], room: NDArray[np.int32]
+) -> None:
+    """Make rooms of the places without one, as seen from points in the air (m, 3); `room` is changed."""
+    left = np.flatnonzero(room < 0)
+    seen = visible(reference, air, places.position[left, 0], places.face_normal[left, 0])
+    alone = np.ones(len(left), bool)
+    while len(air):
+        count = (seen & alone).sum(axis=1)
+        best = int(np.argmax(count))
+        if count[best] < _LEAST_ROOM:
             break
-        room[left & seen[best]] = number
-        left &= ~seen[best]
-        number += 1
-    return room
+        room[left[alone & seen[best]]] = room.max() + 1
+        alone &= ~seen[best]
 
 
 def visible(

@@ -49,6 +49,8 @@ def judge(evidence: Evidence) -> Judged:
         instance = evidence.bake.scene.instances[int(number)]
         name = f"points at edges of '{instance.name}' (node {instance.node})"
         members.append((name, chosen[points.owner[chosen] == number]))
+    for room in np.unique(points.room[chosen]):
+        members.append((f"points at edges in room {room}", chosen[points.room[chosen] == room]))
     worst, remarks = worst_figures("edge", make_groups(evidence, members), evidence.channel)
     remarks |= {
         "edge_wrong_share": f"{int(wrong.sum())} of {len(v)} points at edges hold twice, or less than half,"

@@ -32,7 +32,9 @@ def judge(evidence: Evidence) -> Judged:
             members.append((name, np.flatnonzero(inside & (level == number))))
             keys[name] = int(room), [low, high]
     groups = make_groups(evidence, members)
-    worst, remarks = worst_figures("region", groups, evidence.channel)
+    # What cannot be seen from anywhere is told, but not held against limits.
+    in_rooms = [group for group in groups if keys[group.name][0] >= 0]
+    worst, remarks = worst_figures("region", in_rooms, evidence.channel)
     position = points.position + evidence.geometry.origin
     rows = []
     for group in groups:

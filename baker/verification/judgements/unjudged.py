@@ -32,6 +32,7 @@ def judge(evidence: Evidence) -> Judged:
         "gap_share": gap / max(judged, 1e-30),
     }
     remarks = {
+        "gap_share": f"{gap:.3g} m2 of {judged:.3g} lie in gaps of two texels, or inside of solids",
         "invalid_share": f"{area.invalid:.3g} m2 of {total:.3g} hold no light of their own (invalid texels)",
         "visible_invalid_share": f"{area.visible:.3g} m2 of invalid texels can be seen",
         "uncovered_share": f"{area.uncovered:.3g} m2 of {total:.3g} lie on texels without a measured value",
@@ -51,7 +52,7 @@ UNJUDGED = Judgement(
     ),
     {
         "irradiance": "irradiance.invalid_share > 0.4, irradiance.visible_invalid_share > 0.02,"
-        " irradiance.uncovered_share > 0.1, irradiance.unresolved_share > 0.5",
+        " irradiance.uncovered_share > 0.1, irradiance.unresolved_share > 0.5, irradiance.gap_share > 0.5",
         "ao": "ao.unresolved_share > 0.5",
     },
     judge,

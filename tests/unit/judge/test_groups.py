@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baker.judge.groups import Compared, bright_light, compare_group, z_needed
+
+
+def places(value, reference, noise=0.0, samples=256):
+    value, reference = np.atleast_2d(value), np.atleast_2d(reference)
+    error = np.full(reference.shape, noise)
+    return Compared(value, reference, error, (reference, reference), np.full(len(value), samples))
+
+
+def noisy(rng, n, noise=0.05, colours=3):
+    truth = np.exp(rng.normal(0, 0.5, (n, 1))) * rng.uniform(0.5, 1.5, colours)
+    # Paths' colours rise and fall together.
+    return truth, truth * (1 + noise * rng.standard_normal((n, 1)))
+
+
+def test_by_hand():
+    found = compare_group(places([[2.0, 1.0, 0.0], [2.0, 1.0, 3.0]], [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]), 2.0)
+    assert (found.texels, found.light) == (2, 1.5)
+    # Means over colours 1, 2 and 1, 2; shares of the colours 4, 2, 3 thirds and 1, 1, 1.
+    assert found.bias == pytest.approx(0)
+    np.testing.assert_allclose(found.colour, [1 / 3, -1 / 3, 0], atol=1e-12)
+    # Without the first place 0, without the second 0.
+    assert found.bias_se == pytest.approx(0)
+
+
+def test_the_error_of_the_bias_is_its_spread():
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(400):
+        truth, reference = noisy(rng, 50)
+        found.append(compare_group(places(1.02 * truth, reference), 1.0))
+    assert np.mean([f.bias for f in found]) == pytest.approx(0.02, abs=0.002)
+    assert np.std([f.bias for f in found]) == pytest.approx(np.mean([f.bias_se for f in found]), rel=0.15)
+    # Two percent in fifty texels of 5 % noise are seldom sure; nothing at all never is.
+    assert sum(f.sure_bias != 0 for f in found) < 80
+    assert (
+        sum(compare_group(places(t, r), 1.0).sure_bias != 0 for t, r in (noisy(rng, 50) for _ in range(400)))
+        == 0
+    )
+
+
+def test_a_shift_of_colour_is_seen_through_noise():
+    rng = np.random.default_rng(1)
+    truth, reference = noisy(rng, 40, noise=0.3)
+    found = compare_group(places(truth * [1.04, 1, 1], reference), 1.0)
+    assert found.sure_bias == 0
+    assert found.sure_colour == pytest.approx(found.colour[0])
+    assert found.colour[0] == pytest.approx(0.028, abs=0.01)
+    assert compare_group(places(truth, reference), 1.0).sure_colour == 0
+
+
+def test_one_bright_place_decides_nothing():
+    truth = np.ones((30, 3))
+    truth[0] = 500
+    value = truth.copy()
+    value[0] *= 0.8
+    found = compare_group(places(value, truth), 1.0)
+    assert found.bias == pytest.approx(-0.19, abs=0.01)
+    assert found.sure_bias == 0
+
+
+def test_light_where_none_should_be():
+    dark = np.zeros((20, 3))
+    # Fifty times what a path too few would explain.
+    leak = compare_group(places(dark + 0.05, dark, samples=4096), 100.0)
+    assert leak.sure_bias == pytest.approx(0.05 / (1e-3 * 100))
+    few = compare_group(places(dark + 0.05, dark, samples=16), 100.0)
+    assert few.sure_bias == 0
+    assert compare_group(places(dark, dark), 100.0).sure_bias == 0
+
+
+def test_noise_of_a_map_is_more_than_that_of_the_reference():
+    rng = np.random.default_rng(2)
+    truth = np.ones((60, 3))
+    halves = tuple(truth * (1 + 0.1 * rng.standard_normal((60, 1))) for _ in range(2))
+    reference = 0.5 * (halves[0] + halves[1])
+    good = Compared(truth, reference, 0.07 * truth, halves, np.full(60, 64))
+    assert compare_group(good, 1.0).sure_noise == 0
+    spoilt = good._replace(value=truth * (1 + 0.4 * rng.standard_normal((60, 1))))
+    assert compare_group(spoilt, 1.0).sure_noise == pytest.approx(0.27, abs=0.08)
+
+
+def test_few_places_need_more():
+    assert z_needed(8) > z_needed(100) > 4
+    assert bright_light(np.linspace(0, 1, 101)[:, None]) == pytest.approx(0.95)

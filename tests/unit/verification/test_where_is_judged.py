@@ -1,0 +1,160 @@
+"""Which points of a bake are judged, in which room they are, and what lookups at edges are held against."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_scenes import Quad, box_quads, grey, quad_atlas, quad_scene
+
+from baker.core.geometry import world_geometry
+from baker.judge.texel_area import instance_map, texel_places
+from baker.reference.view import build_reference
+from baker.verification.edges import border_texels, edge_points
+from baker.verification.points import chart_numbers
+from baker.verification.surroundings import in_contact, look_around, visible
+
+SIZE = 64
+
+
+def surface(quads, size=SIZE):
+    scene = quad_scene(quads)
+    geometry = world_geometry(scene, quad_atlas(scene, size, inset=0.3))
+    return geometry, instance_map(geometry, 1, size), build_reference(scene, lambertian=True, buried=True)
+
+
+def judged(geometry, owner, step=1):
+    pixel = np.flatnonzero(owner.reshape(-1) >= 0)[::step]
+    return pixel, texel_places(geometry, pixel, SIZE, 16, 0)
+
+
+def two_rooms():
+    return [
+        *box_quads((0, 0, 0), (1, 1, 1), inward=True, material=grey(0.5, 1.0)),
+        *box_quads((1.1, 0, 0), (2, 1, 1), inward=True, material=grey(0.5, 1.0, double_sided=True)),
+    ]
+
+
+def test_closed_rooms_are_told_apart():
+    geometry, owner, reference = surface(two_rooms())
+    with reference:
+        pixel, places = judged(geometry, owner, 3)
+        found = look_around(reference, places, 0)
+        again = look_around(reference, places, 0)
+    first = owner.reshape(-1)[pixel] < 6
+    assert set(found.room[first]) | set(found.room[~first]) <= {-1, 0, 1}
+    for side in (first, ~first):
+        room = np.bincount(found.room[side] + 1, minlength=3)
+        assert room.max() > 0.95 * side.sum()
+    assert np.argmax(np.bincount(found.room[first] + 1)) != np.argmax(np.bincount(found.room[~first] + 1))
+    assert not found.buried.any()
+    np.testing.assert_array_equal(found.room, again.room)
+
+
+def test_a_gap_is_no_room():
+    floor = Quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    plate = box_quads((0.3, 0.3, 0.002), (0.7, 0.7, 0.1), inward=False)
+    geometry, owner, reference = surface([floor, *plate])
+    with reference:
+        pixel, places = judged(geometry, owner)
+        found = look_around(reference, places, 0)
+        near = in_contact(reference, places, 0)
+    on_floor = owner.reshape(-1)[pixel] == 0
+    under = (np.abs(places.position[:, :, :2] - 0.5).max(axis=(1, 2)) < 0.2) & on_floor
+    out = (np.abs(places.position[:, :, :2] - 0.5).max(axis=2).min(axis=1) > 0.25) & on_floor
+    assert under.sum() > 10
+    assert found.gap[under].all()
+    assert not found.gap[out].any()
+    assert near[under].all()
+    assert not near[np.abs(places.position[:, 0, :2] - 0.5).max(axis=1) > 0.45].all()
+
+
+def test_what_is_seen_from_a_point():
+    _, _, reference = surface(two_rooms())
+    place = np.array([[0.5, 0.5, 0.0], [1.0, 0.5, 0.5], [1.5, 0.5, 0.0]])
+    face = np.array([[0.0, 0, 1], [-1, 0, 0], [0, 0, 1]])
+    with reference:
+        seen = visible(reference, np.array([[0.5, 0.4, 0.6], [1.6, 0.5, 0.5]]), place, face)
+    np.testing.assert_array_equal(seen, [[True, True, False], [False, False, True]])
+
+
+def floor_under_a_wall():
+    floor = Quad((0, 0, 0), (2, 0, 0), (0, 2, 0))
+    wall = Quad((1.013, 0, -0.5), (0, 2, 0), (0, 0, 1.5), grey(double_sided=True))
+    return surface([floor, wall])
+
+
+def test_lookups_beside_a_wall_are_held_against_their_own_side():
+    geometry, owner, reference = floor_under_a_wall()
+    covered = owner >= 0
+    with reference:
+        found = edge_points(reference, geometry, owner, covered, 400, 16, 0)
+    mine = found.owner == 0
+    # Where lookups take place: the floor's uv follows its x and y.
+    column = found.pixel % SIZE + 0.5 + found.places.middle[:, 0]
+    uv, position = geometry.uv[:4], geometry.position[:4]
+    fit = np.polyfit(uv[:, 0] * SIZE, position[:, 0], 1)
+    x = np.polyval(fit, column)
+    width = fit[0]
+    straddles = mine & (np.abs(x - 1.013) < width)
+    assert straddles.sum() > 10
+    side = np.sign(found.places.position[..., 0] - 1.013)
+    assert (side[straddles] == np.sign(x - 1.013)[straddles, None]).all()
+    # Elsewhere they lie around the point, no further than a lookup reaches.
+    off = np.abs(found.places.position[..., 0] - x[:, None])[mine]
+    assert off.max() < 2.1 * width
+
+
+def test_footprints_have_the_mean_of_a_lookup():
+    """Light that is linear over the floor: the mean of a footprint is the light at its point."""
+    geometry, owner, reference = surface([Quad((0, 0, 0), (2, 0, 0), (0, 2, 0))])
+    with reference:
+        found = edge_points(reference, geometry, owner, owner >= 0, 500, 256, 0)
+    inside = np.flatnonzero(~border_texels(owner, owner >= 0).reshape(-1)[found.pixel])
+    assert len(inside) > 40
+    at = np.stack([found.pixel % SIZE, found.pixel // SIZE], axis=1) + 0.5 + found.places.middle
+    fit = [np.polyfit(geometry.uv[:4, k] * SIZE, geometry.position[:4, k], 1) for k in (0, 1)]
+    for k in (0, 1):
+        mean = found.places.position[inside, :, k].mean(axis=1)
+        error = (mean - np.polyval(fit[k], at[inside, k])) / fit[k][0]
+        # Sixteen places of each texel stand for it: 0.07 texels each, and a lookup takes four.
+        assert np.abs(error).mean() < 0.05
+        assert abs(error.mean()) < 0.02
+
+
+def test_border_texels():
+    owner = np.full((1, 8, 8), -1, np.int32)
+    owner[0, 1:7, 1:7] = 0
+    covered = owner >= 0
+    covered[0, 6] = False
+    found = border_texels(owner, covered)[0]
+    assert found[1:7, 1].all()
+    assert found[5, 1:7].all(), "the last covered row"
+    assert found[6, 1:7].all(), "surface beyond it"
+    assert not found[2:5, 2:6].any()
+    assert not found[0].any()
+
+
+def test_charts_are_pieces_of_uv():
+    quads = [Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((0, 0, 2), (0, 3, 0), (1, 0, 1))]
+    scene = quad_scene(quads)
+    geometry = world_geometry(scene, quad_atlas(scene, 32))
+    np.testing.assert_array_equal(chart_numbers(geometry), [0, 0, 1, 1])
+    # Corners that were split for their normals still join, other objects in the same place do not.
+    split = replace(
+        geometry,
+        uv=geometry.uv[geometry.triangle.reshape(-1)],
+        triangle=np.arange(12, dtype=np.int32).reshape(4, 3),
+    )
+    np.testing.assert_array_equal(chart_numbers(split), [0, 0, 1, 1])
+    same = replace(geometry, uv=np.concatenate([geometry.uv[:4]] * 2))
+    assert len(set(chart_numbers(same).tolist())) == 2
+
+
+@pytest.mark.parametrize("covered", [True, False])
+def test_a_bake_without_edges_is_no_error(covered):
+    geometry, owner, reference = surface([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0))])
+    with reference:
+        found = edge_points(reference, geometry, owner, (owner >= 0) & covered, 20, 4, 0)
+    assert len(found.pixel) == len(found.places.position)
