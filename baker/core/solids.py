@@ -239,17 +239,31 @@ class _Judge:
             return False
         # The largest are asked, and speak for the rest.
         held = held[np.argsort(-area[held], kind="stable")][:_HELD]
-        found = sum(float(area[other]) for other in held if self._is_inside(int(other), part))
-        return found > _MOST_OF_SCENE * float(area[held].sum())
+        found, open_ = 0.0, float(area[held].sum())
+        enough = _MOST_OF_SCENE * open_
+        surface = self._surface(part)
+        for other in held:
+            if found > enough or found + open_ <= enough:
+                break
+            open_ -= float(area[other])
+            found += float(area[other]) * self._is_inside(int(other), part, surface=surface)
+        return found > enough
 
-    def _is_inside(self, part: int, shell: int, *, mostly: bool = False) -> bool:
-        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does."""
+    def _is_inside(
+        self, part: int, shell: int, *, mostly: bool = False, surface: NDArray[np.float64] | None = None
+    ) -> bool:
+        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does.
+
+        surface : (F, 3, 3), that of the shell if it is known
+        """
         rows = self.order[self.start[part] : self.start[part + 1]]
         if mostly and self.glows[part]:
             rows = rows[self.surfaces.glows[rows]]
         chosen = rows[np.linspace(0, len(rows) - 1, min(_WITNESSES, len(rows))).round().astype(int)]
         points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
-        surface, found = self._surface(shell), 0
+        if surface is None:
+            surface = self._surface(shell)
+        found = 0
         for point in points:
             number = winding_number(surface, point)
             if not mostly and number < _OUTSIDE:
