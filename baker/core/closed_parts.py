@@ -22,6 +22,10 @@ NO_HOLES = 1e-6
 # A part whose mean thickness is below this share of its diagonal encloses nothing: origins of rays leave
 # a surface by as much.
 THINNEST = 1e-5
+# The one open loop of a part without a lid is flat: it leaves its plane by at most this share of its width.
+_FLAT = 0.1
+# ... and its area is at most this share of the part's, or the part is but a sheet.
+_WIDEST_LID = 0.9
 # Vertices of different objects are one if they differ by at most this share of the largest coordinate.
 _TOGETHER = 4e-7
 
@@ -35,9 +39,11 @@ class ClosedParts(NamedTuple):
         Part of each triangle, -1 = left out, also a wall between two boxes of one object.
     outward : (T,) int8
         1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it;
-        0 if its part encloses none.
+        0 if its part encloses none. The same for parts without a lid.
     closed, exact : (P,) bool
         The part encloses a space; it has no holes at all.
+    lidless : (P,) bool
+        The part is open, but a flat lid on its only hole would close it.
     area : (P,) float64, m2
     low, high : (P, 3) float64, bounds, metres
     """
@@ -46,6 +52,7 @@ class ClosedParts(NamedTuple):
     outward: NDArray[np.int8]
     closed: NDArray[np.bool_]
     exact: NDArray[np.bool_]
+    lidless: NDArray[np.bool_]
     area: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
@@ -55,7 +62,7 @@ class _Pieces(NamedTuple):
     """Pieces that F faces form.
 
     piece (F,), of each face; turn (F,), 1 or -1, see `_turns`; bad (B,), edges that do not cancel;
-    holes, area (P,) float64, m2.
+    holes, area (P,) float64, m2; flat (P,) bool, there is one hole, and it is flat.
     """
 
     piece: NDArray[np.int32]
@@ -64,6 +71,7 @@ class _Pieces(NamedTuple):
     edges: Edges
     holes: NDArray[np.float64]
     area: NDArray[np.float64]
+    flat: NDArray[np.bool_]
 
 
 def find_closed_parts(
@@ -91,7 +99,7 @@ def find_closed_parts(
     if not len(rows):
         none = np.zeros((0, 3))
         nothing = np.zeros(0, bool)
-        return ClosedParts(part, outward, nothing, nothing, np.zeros(0), none, none)
+        return ClosedParts(part, outward, nothing, nothing, nothing, np.zeros(0), none, none)
     first, same_way = _twins(vertex)
     single = _single(vertex, first, same_way)
     corner = position[triangle[rows[single]]].astype(np.float64)
@@ -107,12 +115,14 @@ def find_closed_parts(
     n_parts = len(pieces.area)
     closed = np.zeros(n_parts, bool)
     closed[pieces.piece[whole != 0]] = True
+    lidless = closed & (pieces.holes > SMALL_HOLES * pieces.area)
+    closed &= ~lidless
     order = np.argsort(pieces.piece, kind="stable")
     start = np.searchsorted(pieces.piece[order], np.arange(n_parts))
     low = np.minimum.reduceat(corner.min(axis=1)[order], start, axis=0)
     high = np.maximum.reduceat(corner.max(axis=1)[order], start, axis=0)
     exact = closed & (pieces.holes <= NO_HOLES * pieces.area)
-    return ClosedParts(part, outward, closed, exact, pieces.area, low, high)
+    return ClosedParts(part, outward, closed, exact, lidless, pieces.area, low, high)
 
 
 def _weld(
@@ -182,13 +192,16 @@ def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     total = np.bincount(piece, area, minlength=n_pieces).astype(np.float64)
     bad = np.flatnonzero(net != 0)
-    holes = np.zeros(n_pieces)
+    holes, flat = np.zeros(n_pieces), np.zeros(n_pieces, bool)
     if len(bad):
-        loop, size = _loops(vertex, corner, edges, bad, net[bad])
+        loop, size, even = _loops(vertex, corner, edges, bad, net[bad])
         owner = np.zeros(len(size), np.int64)
         owner[loop] = piece[edges.face[edges.first[bad]]]
         holes = holes + np.bincount(owner, size, minlength=n_pieces)
-    return _Pieces(piece, turn, bad, edges, holes, total)
+        count = np.bincount(owner, minlength=n_pieces)
+        flat[owner[even]] = True
+        flat &= count == 1
+    return _Pieces(piece, turn, bad, edges, holes, total, flat)
 
 
 def _loops(
@@ -197,8 +210,8 @@ def _loops(
     edges: Edges,
     bad: NDArray[np.int64],
     net: NDArray[np.int64],
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the loop of each bad edge, and the area of each loop, m2: bad edges that share vertices."""
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the loop of each bad edge (those that share vertices), loops' areas, m2, and which are flat."""
     name, ends = np.unique(np.stack([edges.low[bad], edges.high[bad]]), return_inverse=True)
     ends = ends.reshape(2, -1)
     loop = number_by_first(connected(ends[0], ends[1], len(name))[ends[0]])
@@ -210,7 +223,11 @@ def _loops(
     middle = np.stack([np.bincount(loop, begin[:, k]) / count for k in range(3)], axis=1)[loop]
     turned = 0.5 * net[:, None] * np.cross(begin - middle, end - middle)
     vector = np.stack([np.bincount(loop, turned[:, k]) for k in range(3)], axis=1)
-    return loop, np.linalg.norm(vector, axis=1)
+    size = np.linalg.norm(vector, axis=1)
+    normal = vector / np.maximum(size, 1e-300)[:, None]
+    away = np.zeros(len(count))
+    np.maximum.at(away, loop, np.abs(np.einsum("bx,bx->b", begin - middle, normal[loop])))
+    return loop, size, away <= _FLAT * np.sqrt(size)
 
 
 def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
@@ -279,7 +296,10 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     holes = np.concatenate([pieces.holes, again.holes])[name]
     # What is left of a piece that lost faces to a closed one keeps its holes, and more.
     area = np.concatenate([pieces.area, again.area])[name]
-    return pieces._replace(piece=number.reshape(-1).astype(np.int32), turn=turn, holes=holes, area=area)
+    flat = np.concatenate([pieces.flat, again.flat])[name]
+    return pieces._replace(
+        piece=number.reshape(-1).astype(np.int32), turn=turn, holes=holes, area=area, flat=flat
+    )
 
 
 def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
@@ -307,6 +327,7 @@ def _enclosing(pieces: _Pieces, corner: NDArray[np.float64]) -> NDArray[np.int8]
     far = np.zeros(n_pieces)
     np.maximum.at(far, pieces.piece, np.einsum("fcx,fcx->fc", local, local).max(axis=1))
     thick = np.abs(volume) > THINNEST * np.sqrt(far) * pieces.area
-    closed = thick & (pieces.holes <= SMALL_HOLES * pieces.area)
+    lidless = pieces.flat & (pieces.holes <= _WIDEST_LID * pieces.area)
+    closed = thick & (lidless | (pieces.holes <= SMALL_HOLES * pieces.area))
     sign = np.where(volume < 0, -1, 1) * closed
     return (sign[pieces.piece] * pieces.turn).astype(np.int8)

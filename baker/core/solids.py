@@ -8,6 +8,8 @@ The rule does not ask whether materials are double-sided where the shape tells e
   (sky spheres).
 - One whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls), else
   a room. If it has nothing inside and does not glow, it is a solid wound the wrong way.
+- An open part that a flat lid would close, wound outwards and with nothing inside (a crate without a bottom),
+  is a cover: what sees nothing but its inside is hidden, for something else is the lid.
 
 A solid has no light inside and lets none in, so what a wrong guess can hide is dark in any case.
 """
@@ -28,7 +30,7 @@ NOWHERE, BEHIND, BEFORE = 0, 1, 2
 # A part is inside another one if most of so many of its triangles' centres are and none is outside.
 _WITNESSES = 8
 # Winding numbers above and below which a point is inside or outside.
-_INSIDE, _OUTSIDE = 0.75, 0.25
+_INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
 # A part that holds more than this share of the other parts' area is a room.
 _MOST_OF_SCENE = 0.5
 # At most so many parts are examined as holding most of the scene, and so many as being held.
@@ -62,6 +64,8 @@ class Solids(NamedTuple):
         The triangle belongs to a solid without any hole.
     room : (T,) bool
         The triangle belongs to a closed part that is a room.
+    cover : (T,) bool
+        The triangle belongs to a cover.
     part : (T,) int32
         Part of each triangle, -1 for those that let light through.
     parts : ClosedParts
@@ -70,6 +74,7 @@ class Solids(NamedTuple):
     inside: NDArray[np.uint8]
     sealed: NDArray[np.bool_]
     room: NDArray[np.bool_]
+    cover: NDArray[np.bool_]
     part: NDArray[np.int32]
     parts: ClosedParts
 
@@ -94,20 +99,23 @@ def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:
         surfaces.position, surfaces.triangle, surfaces.instance, surfaces.opaque & (surfaces.instance >= 0)
     )
     n = len(surfaces.triangle)
-    if not parts.closed.any():
+    if not parts.closed.any() and not parts.lidless.any():
         none = np.zeros(n, bool)
-        return Solids(np.zeros(n, np.uint8), none, none, parts.part, parts)
+        return Solids(np.zeros(n, np.uint8), none, none, none, parts.part, parts)
     judge = _Judge(surfaces, parts, places)
     room = judge.rooms()
     known = parts.part >= 0
-    is_room = np.zeros(n, bool)
+    is_room, is_cover = np.zeros(n, bool), np.zeros(n, bool)
     is_room[known] = room[parts.part[known]]
-    outward = np.where(is_room, 0, parts.outward)
+    is_cover[known] = judge.covers()[parts.part[known]]
+    solid = np.zeros(n, bool)
+    solid[known] = (parts.closed & ~room)[parts.part[known]]
+    outward = np.where(solid, parts.outward, 0)
     # A hollow is wound as a solid's surface is: its normals point out of the material.
     outward[np.isin(parts.part, judge.hollows()) & known] *= -1
     inside = np.where(outward > 0, BEHIND, np.where(outward < 0, BEFORE, NOWHERE)).astype(np.uint8)
     sealed = (inside != NOWHERE) & parts.exact[parts.part]
-    return Solids(inside, sealed, is_room, parts.part, parts)
+    return Solids(inside, sealed, is_room, is_cover, parts.part, parts)
 
 
 class _Judge:
@@ -164,6 +172,19 @@ class _Judge:
             room[part] = self._inward_room(int(part))
         return room
 
+    def covers(self) -> NDArray[np.bool_]:
+        """Return (P,) bool: parts without a lid that hide what is under them."""
+        parts = self.parts
+        cover = parts.lidless & ~self.inward
+        for part in np.flatnonzero(cover):
+            # Black backs hide what is under them anyway.
+            cover[part] = (
+                bool(self.two_sided[part])
+                and not self._holds_place(int(part))
+                and not self._holds(int(part), None, mostly=True)
+            )
+        return cover
+
     def _outward_room(self, part: int, large: bool) -> bool:
         # A lamp may stick in the ceiling of a room, whose back would shine. Black backs make no room.
         mostly = bool(self.two_sided[part])
@@ -204,8 +225,12 @@ class _Judge:
         near = self.places[((self.places > low) & (self.places < high)).all(axis=1)]
         if not len(near):
             return False
-        surface = self._surface(part)
-        return any(winding_number(surface, place) > _INSIDE for place in near)
+        surface, inside = self._surface(part), self._inside_from(part)
+        return any(winding_number(surface, place) > inside for place in near)
+
+    def _inside_from(self, part: int) -> float:
+        """Return the winding number above which points are inside: 1/2 in the plane of a missing lid."""
+        return _WITHOUT_LID if self.parts.lidless[part] else _INSIDE
 
     def _boxes_around(self, part: int, shells: NDArray[np.int64]) -> NDArray[np.bool_]:
         low, high = self.parts.low, self.parts.high
@@ -263,10 +288,10 @@ class _Judge:
         points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
         if surface is None:
             surface = self._surface(shell)
-        found = 0
+        found, inside = 0, self._inside_from(shell)
         for point in points:
             number = winding_number(surface, point)
             if not mostly and number < _OUTSIDE:
                 return False
-            found += number > _INSIDE
+            found += number > inside
         return 2 * found > len(points) if mostly else 2 * found >= len(points)

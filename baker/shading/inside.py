@@ -56,11 +56,13 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Any) -> tuple[Geometry
 def tell_tales(geometry: Geometry, shading: Any, solids: Solids) -> NDArray[np.uint8]:
     """Return (T,) uint8 for `kernels.probe`: what a ray from inside of something meets.
 
-    Backs of one-sided sheets are black; those of rooms and of what lets light through say nothing.
+    Backs of one-sided sheets are black, those of covers as good as black; those of rooms and of what lets
+    light through say nothing.
     """
     tells = np.where(geometry.double_sided, 0, BLACK_BACK).astype(np.uint8)
     tells[~_opaque(geometry, shading)] = 0
     tells[solids.room] = 0
+    tells[solids.cover] = BLACK_BACK
     tells[solids.inside == BEHIND] = SOLID_BACK
     tells[solids.inside == BEFORE] = SOLID_FRONT
     return tells

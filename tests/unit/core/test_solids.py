@@ -37,8 +37,13 @@ CRATE = box((0, 0, 0), (1, 1, 1))
 SMALL = box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))
 
 
+def covers(*objects, **more):
+    """Tell of each object whether it is a cover."""
+    return [bool(cover.all()) for _, _, _, cover in judge(*objects, **more)]
+
+
 def judge(*objects, places=NOBODY, double_sided=True, glows=(), see_through=()):
-    """Return (inside, room, sealed) of each object's triangles."""
+    """Return (inside, room, sealed, cover) of each object's triangles."""
     count = [len(one) for one in objects]
     corner = np.concatenate(objects).reshape(-1, 3)
     owner = np.repeat(np.arange(len(objects)), count)
@@ -51,15 +56,13 @@ def judge(*objects, places=NOBODY, double_sided=True, glows=(), see_through=()):
         glows=np.isin(owner, glows),
     )
     solids = find_solids(surfaces, np.array(places, float).reshape(-1, 3))
-    return [
-        (solids.inside[owner == k], solids.room[owner == k], solids.sealed[owner == k])
-        for k in range(len(count))
-    ]
+    columns = solids.inside, solids.room, solids.sealed, solids.cover
+    return [tuple(column[owner == k] for column in columns) for k in range(len(count))]
 
 
 def kinds(found):
     """Return the distinct codes of each object."""
-    return [sorted(set(inside.tolist())) for inside, _, _ in found]
+    return [sorted(set(inside.tolist())) for inside, *_ in found]
 
 
 @pytest.mark.parametrize("double_sided", [False, True])
@@ -104,9 +107,23 @@ def test_what_encloses_nothing():
     assert kinds(judge(FLOOR, box((0, 0, 0), (4, 3, 0.001)))) == [[NOWHERE], [BEHIND]]
 
 
+def test_a_crate_without_a_bottom_covers_what_it_stands_on():
+    bottomless = np.delete(CRATE, [4, 5], axis=0)
+    assert covers(FLOOR, bottomless) == [False, True]
+    assert covers(FLOOR, bottomless, double_sided=False) == [False, False]
+    assert covers(FLOOR, bottomless[:, ::-1]) == [False, False]
+    # A hut with a lamp, and one with furniture.
+    assert covers(FLOOR, bottomless, places=[(0.5, 0.5, 0.5)]) == [False, False]
+    assert covers(FLOOR, bottomless, shifted(SMALL, 0, -0.4, 0)) == [False, False, False]
+    two_holes = np.delete(CRATE, [4, 5, 6, 7], axis=0)
+    assert covers(FLOOR, two_holes) == [False, False]
+    # A door: half of a wall is absent.
+    assert covers(FLOOR, np.delete(CRATE, [4, 5, 11], axis=0)) == [False, False]
+
+
 def test_small_holes_do_no_harm():
     holed = np.delete(ball(1.0, level=3), 7, axis=0)
-    (_, (inside, _, sealed)) = judge(FLOOR, holed)
+    (_, (inside, _, sealed, _)) = judge(FLOOR, holed)
     assert (inside == BEHIND).all()
     assert not sealed.any()
     # Something stands in it: one looks in.
@@ -123,7 +140,7 @@ def test_rooms_are_told_from_crates_by_what_is_in_them():
     lamp = (0.5, 0.9, 0.5)
     out = (3.0, 0.9, 0.5)
     assert kinds(judge(FLOOR, CRATE, SMALL, places=[out])) == [[NOWHERE], [BEHIND], [BEHIND]]
-    inside, room, _ = judge(FLOOR, CRATE, SMALL, places=[out, lamp])[1]
+    inside, room, *_ = judge(FLOOR, CRATE, SMALL, places=[out, lamp])[1]
     assert (inside == NOWHERE).all()
     assert room.all()
     assert kinds(judge(FLOOR, CRATE, SMALL, glows=[2]))[1:] == [[NOWHERE], [BEHIND]]
@@ -143,7 +160,7 @@ def test_rooms_that_look_inwards():
     for objects in ((house, room), (np.concatenate([house, room]),)):
         found = judge(*objects, CRATE, places=[(0, 2, 0)])
         assert kinds(found) == [[BEHIND]] * len(found)
-        assert all(sealed.all() for _, _, sealed in found)
+        assert all(sealed.all() for _, _, sealed, _ in found)
 
 
 @pytest.mark.parametrize("inward", [False, True])
