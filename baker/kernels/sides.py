@@ -133,26 +133,27 @@ def _between(rays, lane, origin, normal, height, m, i, k):  # type: ignore[no-un
 
 @kernel
 def point_heights(origin, normal, side, caster, height):  # type: ignore[no-untyped-def]
-    """Write the height at which segments from points run (m, w) float32: see the module.
+    """Write the height at which segments from points run, (n,) float32: see the module.
 
-    origin, normal : (m, w, 3) float32, w at most 16; side : (m,) float32, metres
+    origin, normal : (n, 3) float32; side : (n,) float32, metres, of the texel of each
     """
     scene, intersect, width, query = caster.scene, caster.intersect, caster.width, caster.query
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     spare_on, spare = caster.valid, caster.floats
-    for m in range(len(origin)):
-        high = _f(HIGH) * side[m]
-        for k in range(LANES):
-            on[k] = -1 if k < origin.shape[1] else 0
-        for k in range(origin.shape[1]):
+    for group in range(0, len(origin), LANES):
+        lanes = smaller(LANES, len(origin) - group)
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+        for lane in range(lanes):
+            i = group + lane
             for axis in range(3):
-                rays[(ORG_X + axis) * LANES + k] = origin[m, k, axis]
-                rays[(DIR_X + axis) * LANES + k] = normal[m, k, axis]
-            rays[TFAR * LANES + k] = _f(2.0) * high
-            words[GEOM_ID * LANES + k] = np.uint32(0xFFFFFFFF)
+                rays[(ORG_X + axis) * LANES + lane] = origin[i, axis]
+                rays[(DIR_X + axis) * LANES + lane] = normal[i, axis]
+            rays[TFAR * LANES + lane] = _f(2.0 * HIGH) * side[i]
+            words[GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-        for k in range(origin.shape[1]):
-            height[m, k] = smaller(high, _f(0.5) * rays[TFAR * LANES + k])
+        for lane in range(lanes):
+            height[group + lane] = _f(0.5) * rays[TFAR * LANES + lane]
 
 
 @kernel
@@ -275,6 +276,19 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
 
 
 @inner
+def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m, k):  # type: ignore[no-untyped-def]
+    """Write the segment from corner j to point k of item m into a lane."""
+    h = smaller(headroom[0, j], height[m, k])
+    return segment(
+        rays, lane,
+        point[0, j, 0] + h * facing[0, j, 0], point[0, j, 1] + h * facing[0, j, 1],
+        point[0, j, 2] + h * facing[0, j, 2],
+        origin[m, k, 0] + h * normal[m, k, 0], origin[m, k, 1] + h * normal[m, k, 1],
+        origin[m, k, 2] + h * normal[m, k, 2],
+    )  # fmt: skip
+
+
+@inner
 def _look_for_corners(  # type: ignore[no-untyped-def]
     point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
 ):
@@ -294,20 +308,28 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
     )
     for j in range(found):
         headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * LANES + j])
-    cast = found
     bits = np.int64(mask[m])
+    first = 0
+    while first + 1 < N_POINTS and bits != 0 and (bits >> first) & 1 == 0:
+        first += 1
+    # One point sees most corners; only for the others all are asked.
     for j in range(found):
+        on[j] = _to_point(rays, j, point, facing, headroom, j, origin, normal, height, m, first)
+    trace_lanes(
+        caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+    )
+    left = np.int64(0)
+    for j in range(found):
+        if on[j] == 0 or rays[TFAR * LANES + j] < _f(0.0):
+            left |= np.int64(1) << j
+    cast = 2 * found
+    for j in range(found):
+        if (left >> j) & 1 == 0:
+            continue
         for k in range(N_POINTS):
             on[k] = 0
             if bits == 0 or (bits >> k) & 1:
-                h = smaller(headroom[0, j], height[m, k])
-                on[k] = segment(
-                    rays, k,
-                    point[0, j, 0] + h * facing[0, j, 0], point[0, j, 1] + h * facing[0, j, 1],
-                    point[0, j, 2] + h * facing[0, j, 2],
-                    origin[m, k, 0] + h * normal[m, k, 0], origin[m, k, 1] + h * normal[m, k, 1],
-                    origin[m, k, 2] + h * normal[m, k, 2],
-                )  # fmt: skip
+                on[k] = _to_point(rays, k, point, facing, headroom, j, origin, normal, height, m, k)
                 cast += 1
         trace_lanes(
             caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
@@ -322,34 +344,33 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def connected_pairs(  # type: ignore[no-untyped-def]
-    origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, connected
+def free_segments(  # type: ignore[no-untyped-def]
+    origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, free
 ):
-    """Find pairs of entries of which some point k of one sees point k of the other.
+    """Find out which pairs of points see each other.
 
-    origin_*, normal_* : (m, w, 3) float32, w at most 16; height_* : (m, w) float32
-    connected : (m,) uint8 output
+    origin_*, normal_* : (n, 3) float32; height_* : (n,) float32; free : (n,) uint8 output
     """
     scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
     on, rays = caster.lane_valid, caster.lane_floats
     spare_on, spare = caster.valid, caster.floats
-    for m in range(len(origin_a)):
-        for k in range(LANES):
-            on[k] = 0
-        for k in range(origin_a.shape[1]):
-            h = smaller(height_a[m, k], height_b[m, k])
-            on[k] = segment(
-                rays, k,
-                origin_a[m, k, 0] + h * normal_a[m, k, 0], origin_a[m, k, 1] + h * normal_a[m, k, 1],
-                origin_a[m, k, 2] + h * normal_a[m, k, 2],
-                origin_b[m, k, 0] + h * normal_b[m, k, 0], origin_b[m, k, 1] + h * normal_b[m, k, 1],
-                origin_b[m, k, 2] + h * normal_b[m, k, 2],
+    for group in range(0, len(origin_a), LANES):
+        lanes = smaller(LANES, len(origin_a) - group)
+        for lane in range(LANES):
+            on[lane] = 0
+        for lane in range(lanes):
+            i = group + lane
+            h = smaller(height_a[i], height_b[i])
+            on[lane] = segment(
+                rays, lane,
+                origin_a[i, 0] + h * normal_a[i, 0], origin_a[i, 1] + h * normal_a[i, 1],
+                origin_a[i, 2] + h * normal_a[i, 2],
+                origin_b[i, 0] + h * normal_b[i, 0], origin_b[i, 1] + h * normal_b[i, 1],
+                origin_b[i, 2] + h * normal_b[i, 2],
             )  # fmt: skip
         trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
-        connected[m] = 0
-        for k in range(origin_a.shape[1]):
-            if on[k] == 0 or rays[TFAR * LANES + k] >= _f(0.0):
-                connected[m] = 1
+        for lane in range(lanes):
+            free[group + lane] = 1 if on[lane] == 0 or rays[TFAR * LANES + lane] >= _f(0.0) else 0
 
 
 @kernel

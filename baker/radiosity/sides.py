@@ -28,9 +28,9 @@ from baker.kernels.regions import flood_regions, join_linked
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
 from baker.kernels.sides import (
-    connected_pairs,
     count_backs,
     crossed_texels,
+    free_segments,
     group_points,
     hidden_corners,
     point_heights,
@@ -38,13 +38,13 @@ from baker.kernels.sides import (
 from baker.kernels.surface import N_POINTS, Surface, place_points
 from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import Caster, new_caster
 
 STAGE = "texel sides"
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Pairs of neighbours are examined with the first four points of each, then with all.
-_SOME = np.arange(0, N_POINTS, 4, dtype=np.uint8)[None]
+# Pairs of neighbours are examined with one point of each, then with all.
+_ONE = np.zeros((1, 1), np.uint8)
 # A side is the outside of one-sided geometry if more than this share of its rays meet backs; then each of its
 # points counts as much less.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
@@ -183,7 +183,11 @@ def split_texels(
     rays += int(cast.sum())
     entries = _cut(texels, surface, mask, side, groups)
     pair = _of_sides(neighbours(texels, suspect), groups)
-    connected, more = _see(entries, pair, tracer, threads, progress)
+    # A surface between two whole texels is met from both.
+    doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
+    doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
+    connected: NDArray[np.bool_] = np.logical_not(doubtful)
+    connected[doubtful], more = _see(entries, pair[doubtful], tracer, threads, progress)
     rays += more
     if connected.all() and not len(groups.owner):
         return Sides(*entries[:3], groups.owner, groups.owner, no_sides(), pair[:0], rays)
@@ -211,10 +215,8 @@ def _group(
     def work(begin: int, end: int) -> None:
         own = chosen[begin:end]
         point, normal = points_of(surface, mask, own)
-        height, label = np.zeros(point.shape[:2], np.float32), np.zeros(point.shape[:2], np.int8)
-        caster = new_caster(tracer, solid=True)
-        # Backs are measured like their fronts.
-        point_heights(point, normal, side[own], caster, height)
+        caster, label = new_caster(tracer, solid=True), np.zeros(point.shape[:2], np.int8)
+        height = _with_heights(point, normal, side[own], caster)[2].reshape(label.shape)
         cast = group_points(point, normal, height, mask[own], caster, label)
         hidden = np.zeros(len(own), np.uint8)
         cast += hidden_corners(surface, own, point, normal, height, mask[own], side[own], caster, hidden)
@@ -239,6 +241,16 @@ def _group(
         np.concatenate([part.height for part in found]),
         n,
     ), sum(rays for _, rays in ordered)
+
+
+def _with_heights(
+    point: NDArray[np.float32], normal: NDArray[np.float32], side: NDArray[np.float32], caster: Caster
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Return points and normals (m * w, 3), from (m, w, 3), and the heights (m * w,) of their segments."""
+    height = np.zeros(point.shape[0] * point.shape[1], np.float32)
+    flat, up = point.reshape(-1, 3), normal.reshape(-1, 3)
+    point_heights(flat, up, np.repeat(side, point.shape[1]), caster, height)
+    return flat, up, height
 
 
 def _cut(
@@ -277,26 +289,29 @@ def neighbours(
     Returns
     -------
     pair : (p, 2) int32
-        Each pair once, the smaller entry first.
+        Each pair once.
     """
     size = texels.resolution
-    pixel, back = texels.pixel[chosen], texels.back[chosen]
-    found = [np.zeros((0, 2), np.int64)]
+    own = np.zeros(texels.n, bool)
+    own[chosen] = True
+    pixel, back, chart = texels.pixel[chosen], texels.back[chosen], texels.chart[chosen]
+    found = [np.zeros((0, 2), np.int32)]
     for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-        row, column = pixel // size % size + down, pixel % size + right
-        inside = (row >= 0) & (row < size) & (column >= 0) & (column < size)
-        beside = np.where(inside, pixel + down * size + right, 0)
-        other = texels.lookup[beside].astype(np.int64)
-        inside &= (other >= 0) & (texels.pixel[other] == beside)
+        edge = pixel % size == (size - 1 if right > 0 else 0) if right else np.zeros(len(pixel), bool)
+        if down:
+            edge = pixel // size % size == (size - 1 if down > 0 else 0)
+        beside = np.where(edge, pixel, pixel + down * size + right)
+        other = texels.lookup[beside]
+        inside = ~edge & (other >= 0) & (texels.pixel[other] == beside)
         other = np.where(back, texels.back_entry[other], other)
-        inside &= (other >= 0) & (texels.chart[other] == texels.chart[chosen])
+        inside &= (other >= 0) & (texels.chart[other] == chart)
         if allowed is not None:
             inside &= allowed[other]
-        found.append(np.stack([chosen, other], axis=1)[inside])
-    pair = np.concatenate(found)
-    pair.sort(axis=1)
-    key = np.unique(pair[:, 0] * texels.n + pair[:, 1])
-    return np.stack(np.divmod(key, max(texels.n, 1)), axis=1).astype(np.int32)
+        if down + right < 0:
+            # The other one, if chosen, has found this pair.
+            inside &= ~own[other]
+        found.append(np.stack([chosen[inside], other[inside]], axis=1).astype(np.int32))
+    return np.concatenate(found)
 
 
 def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
@@ -328,23 +343,21 @@ def _see(
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
         def work(begin: int, end: int) -> None:
             own, caster = chosen[begin:end], new_caster(tracer, solid=True)
-            ends = []
+            ends: list[NDArray[np.float32]] = []
             for k in range(2):
                 entry = pair[own, k].astype(np.int64)
-                point, normal = points_of(entries.surface, entries.mask, entry, wanted)
-                height = np.zeros(point.shape[:2], np.float32)
-                point_heights(point, normal, entries.side[entry], caster, height)
-                ends += [point, normal, height]
-            found = np.zeros(len(own), np.uint8)
-            connected_pairs(*ends, caster, found)
-            connected[own] = found
+                points = points_of(entries.surface, entries.mask, entry, wanted)
+                ends += _with_heights(*points, entries.side[entry], caster)
+            free = np.zeros(len(own) * wanted.size, np.uint8)
+            free_segments(*ends, caster, free)
+            connected[own] = free.reshape(len(own), -1).max(axis=1)
 
         run_tiles(len(chosen), _PAIRS, work, threads=threads, stage=STAGE, progress=progress)
 
-    examine(np.arange(len(pair)), _SOME)
+    examine(np.arange(len(pair)), _ONE)
     left = np.flatnonzero(connected == 0)
     examine(left, _EVERY)
-    return connected != 0, 3 * (_SOME.size * len(pair) + _EVERY.size * len(left))
+    return connected != 0, 3 * (_ONE.size * len(pair) + _EVERY.size * len(left))
 
 
 def _keep_largest(
