@@ -21,6 +21,7 @@ from baker.core.export import check_exports
 from baker.core.farm import Farm, LocalFarm
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import TileRunner, thread_count
+from baker.core.precision import coarse_warnings
 from baker.core.progress import Progress, silent
 from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
@@ -92,7 +93,7 @@ def bake(
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
-        record.warnings.extend(atlas.warnings)
+        record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
         farm.open(scene, atlas, settings)
         world = prepare(scene, atlas, settings, record)
         if any(channel.needs_light for channel in channels.values()):

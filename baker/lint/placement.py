@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from baker.core.precision import coarse_objects
+from baker.lint.cost import estimate_cost
 from baker.lint.finding import Found, Place
 from baker.lint.registry import check
 from baker.lint.subject import Subject
@@ -76,6 +78,31 @@ def non_uniform_scale(subject: Subject) -> Iterator[Found]:
                 place,
                 position=at,
             )
+
+
+@check(
+    "coarse-positions",
+    group="geometry",
+    severity="warning",
+    fix="keep vertices near their own origin and far-apart places in scenes of their own",
+)
+def coarse_positions(subject: Subject) -> Iterator[Found]:
+    """Objects whose positions have steps of more than a tenth of a texel in single precision.
+
+    Files store vertices in single precision: 100 km from the mesh's own origin its steps are 8 mm. A node's
+    translation is exact, so a level far from the world's origin is no problem if its nodes take it there.
+    """
+    scene, world = subject.scene, subject.world
+    area = float(world.area.sum())
+    if not area > 0:
+        return
+    texels = estimate_cost(subject).texels
+    found = coarse_objects(scene, np.full(len(scene.instances), np.sqrt(area / max(texels, 1))))
+    if found is not None:
+        worst = scene.instances[found.worst]
+        x, y, z = (float(v) for v in worst.world_from_object[:3, 3])
+        text = f"{found.text}; {found.fix}"
+        yield Found(text, Place(worst.name, worst.node), count=found.count, position=(x, y, z))
 
 
 @check(

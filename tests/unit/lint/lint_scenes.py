@@ -220,6 +220,10 @@ CASES: dict[str, Case] = {
         scene((QUAD, QUAD_TRIANGLE, {}, {"scale": [1, 1.1, 1]})),
         scene((QUAD, QUAD_TRIANGLE, {}, {"scale": [1.1, 1.1, 1.1]})),
     ),
+    "coarse-positions": Case(
+        scene((FLOOR + np.float32([1e6, 0, 0]), QUAD_TRIANGLE)),
+        scene((FLOOR, QUAD_TRIANGLE, {}, {"translation": [1e6, 0, 0]})),
+    ),
     "scene-size": Case(scene((QUAD * 1e4, QUAD_TRIANGLE)), scene((QUAD * 1e3, QUAD_TRIANGLE))),
     "missing-normals": Case(scene((QUAD, QUAD_TRIANGLE)), scene(quad())),
     "bad-normals": Case(scene(_normal(0.0)), scene(_normal(1.0))),

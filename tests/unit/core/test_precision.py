@@ -1,0 +1,75 @@
+"""Steps of single precision against texels: what is stored far out, what is far from everything else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_scenes import Quad, quad_scene
+
+from baker.core.precision import coarse_objects
+
+
+def floor(at, by="node", size=2.0, scale=1.0):
+    """Return a scene of one floor at x = `at`, moved there by its node or by its vertices."""
+    scene = quad_scene([Quad((-size / 2, 0, -size / 2), (0, 0, size), (size, 0, 0))])
+    if by == "vertices":
+        mesh = replace(scene.meshes[0], position=scene.meshes[0].position + np.float32([at, 0, 0]))
+        return replace(scene, meshes=(mesh,))
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[0, 3] = at
+    return replace(scene, instances=(replace(scene.instances[0], world_from_object=matrix),))
+
+
+def both(one, two):
+    """Return the objects of two scenes of one mesh each in one."""
+    second = replace(two.instances[0], node=1, mesh=1, name="second")
+    return replace(
+        one, meshes=(*one.meshes, *two.meshes), materials=one.materials, instances=(*one.instances, second)
+    )
+
+
+@pytest.mark.parametrize("at", [0, 1e3, 1e5, 1e7])
+def test_nodes_far_away_are_exact(at):
+    assert coarse_objects(floor(at), np.array([0.01])) is None
+
+
+@pytest.mark.parametrize(
+    ("at", "texel", "step"), [(1e5, 0.05, "7.81 mm"), (1e4, 0.005, "0.977 mm"), (2e7, 1.0, "2 m")]
+)
+def test_vertices_far_away_are_named_with_their_step(at, texel, step):
+    found = coarse_objects(floor(at, "vertices"), np.array([texel]))
+    assert step in found.text
+    assert f"{1000 * texel:.3g} mm" in found.text or "1 m" in found.text
+    assert "coarser" in found.text
+    assert "translation" in found.fix
+    # Ten times the texel would do.
+    assert coarse_objects(floor(at, "vertices"), np.array([100 * texel])) is None
+
+
+def test_a_node_that_takes_far_vertices_back_does_not_help():
+    scene = floor(1e5, "vertices")
+    matrix = np.eye(4)
+    matrix[0, 3] = -1e5
+    scene = replace(scene, instances=(replace(scene.instances[0], world_from_object=matrix),))
+    assert "7.81 mm" in coarse_objects(scene, np.array([0.05])).text
+
+
+def test_a_level_in_millimetres_is_judged_in_metres():
+    # Coordinates of 2000 and a scale of 1/1000: steps of a tenth of a micron.
+    assert coarse_objects(floor(0, size=2000.0, scale=1e-3), np.array([0.01])) is None
+
+
+def test_two_objects_far_apart_cannot_both_be_fine():
+    found = coarse_objects(both(floor(0), floor(1e5)), np.array([0.05, 0.05]))
+    assert found.count == 1
+    assert "100 km" in found.text
+    assert "scenes of their own" in found.fix
+    # A backdrop with large texels may be there.
+    assert coarse_objects(both(floor(0), floor(1e5, size=1e4)), np.array([0.05, 5.0])) is None
+
+
+def test_objects_without_texels_are_not_judged():
+    assert coarse_objects(floor(1e5, "vertices"), np.array([np.inf])) is None
+    assert coarse_objects(replace(floor(0), instances=()), np.zeros(0)) is None
