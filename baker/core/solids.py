@@ -136,7 +136,8 @@ class _Judge:
         self.glows = np.bincount(of, surfaces.glows[known], minlength=n) > 0
         glows_behind = surfaces.glows & surfaces.double_sided
         self.glows_behind = np.bincount(of, glows_behind[known], minlength=n) > 0
-        self.slack = 1e-6 * float(np.abs(surfaces.position).max(initial=0.0))
+        # Boxes are compared but for rounding, which follows the coordinates of each part.
+        self.slack = 1e-6 * np.maximum(np.abs(parts.low), np.abs(parts.high)).max(axis=1, initial=0.0)
         self.around: dict[int, int] = {}
 
     def _areas(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -234,7 +235,8 @@ class _Judge:
 
     def _boxes_around(self, part: int, shells: NDArray[np.int64]) -> NDArray[np.bool_]:
         low, high = self.parts.low, self.parts.high
-        inside = (low[shells] <= low[part] + self.slack) & (high[shells] >= high[part] - self.slack)
+        slack = self.slack[part]
+        inside = (low[shells] <= low[part] + slack) & (high[shells] >= high[part] - slack)
         found: NDArray[np.bool_] = inside.all(axis=1) & (shells != part)
         return found
 
@@ -244,7 +246,8 @@ class _Judge:
         if share:
             inside = ((low < high[part]) & (high > low[part])).all(axis=1)
         else:
-            inside = ((low >= low[part] - self.slack) & (high <= high[part] + self.slack)).all(axis=1)
+            slack = self.slack[:, None]
+            inside = ((low >= low[part] - slack) & (high <= high[part] + slack)).all(axis=1)
         inside[part] = False
         for hollow, shell in self.around.items():
             inside[hollow] &= shell != part

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.kernels.clip import MAX_CORNERS
+from baker.kernels.surface import ROUNDING
 from baker.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 
 # Less of a texel's square than this is no surface to be judged.
@@ -76,6 +77,9 @@ def texel_places(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
+    # Off large triangles by some of their float32 steps: whoever starts rays here does not know their size.
+    edge = geometry.position[corner[..., 1:]].astype(np.float64) - geometry.position[corner[..., :1]]
+    position += ROUNDING * np.abs(edge).max(axis=(2, 3))[..., None] * face
     surface = covered * square_metres(geometry, found, resolution).mean(axis=1)
     return TexelPlaces(position, normal, face, covered, surface, middle)
 

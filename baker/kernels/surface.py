@@ -21,8 +21,9 @@ from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
-# Ray origins leave the surface by this share of the largest coordinate: a few dozen float32 steps.
-OFFSET = 1.0e-5
+# Ray origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever
+# is less; but at least by four float32 steps of either, which is what rounding in origins and hits may take.
+OFFSET, ROUNDING = 1.0e-5, 4.8e-7
 # They also move so many of these steps towards the middle of their triangle (at most half the way).
 INWARD = 2.0
 # Only points with a barycentric below this lie near the border.
@@ -30,7 +31,7 @@ BORDER = 0.01
 # Vertices whose normal leans further from the face (cosine) lift nothing: that is no smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
-_flat_row = scratch((4, 3), np.float64)
+_flat_row = scratch((5, 3), np.float64)
 
 
 class Surface(NamedTuple):
@@ -39,7 +40,7 @@ class Surface(NamedTuple):
     position, normal (V, 3) float32; uv (V, 2) float32; triangle (T, 3) int32; face_normal (T, 3)
     float32; size int; pixel (n,) int64; front (n,) int32, the front entry of each; back (n,) bool;
     first (n_front + 1,) int64; entry (m,) int32; entry_area (m,) float32; net (16, 2) uint32;
-    least float32, metres: no offset is computed from a smaller coordinate.
+    least float32, metres: no offset is computed from a smaller coordinate (but from smaller triangles).
     """
 
     position: NDArray[np.float32]
@@ -72,6 +73,16 @@ def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
         cy / det, -cx / det, (ay * cx - ax * cy) / det,
         -by / det, bx / det, (ax * by - ay * bx) / det,
     )  # fmt: skip
+
+
+@inner
+def offset_step(x, y, z, size, least):  # type: ignore[no-untyped-def]
+    """Return how far a ray origin at (x, y, z) leaves a triangle of this size, metres.
+
+    size : largest edge component of the triangle; least : see `Surface`
+    """
+    far = larger(larger(abs(x), abs(y)), abs(z))
+    return larger(ROUNDING * larger(far, size), OFFSET * smaller(larger(far, least), size))
 
 
 @inner
@@ -108,7 +119,10 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
                 lx -= weight * below * vx
                 ly -= weight * below * vy
                 lz -= weight * below * vz
-    step = OFFSET * larger(larger(larger(abs(px), abs(py)), abs(pz)), least)
+    size = 0.0
+    for a in range(3):
+        size = larger(size, larger(abs(float(p[i1, a]) - p[i0, a]), abs(float(p[i2, a]) - p[i0, a])))
+    step = offset_step(px, py, pz, size, least)
     away = sign * step
     if smaller(smaller(b0, b1), b2) < BORDER:
         # Also along the face: rounding must not put a point of its border behind the wall that meets it.
@@ -132,7 +146,8 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
 def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-def]
     """Tell if all of triangle t is shaded with its face normal.
 
-    row : (4, 3) float64, becomes what `place_flat` needs: corner 0, the edges from it, the normal times sign
+    row : (5, 3) float64, becomes what `place_flat` needs: corner 0, the edges from it, the normal times sign,
+        the triangle's size
     """
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     along0 = along1 = along2 = 0.0
@@ -144,6 +159,7 @@ def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-de
         row[1, a] = float(p[i1, a]) - p[i0, a]
         row[2, a] = float(p[i2, a]) - p[i0, a]
         row[3, a] = sign * face[t, a]
+        row[4, 0] = larger(0.0 if a == 0 else row[4, 0], larger(abs(row[1, a]), abs(row[2, a])))
     return smaller(smaller(along0, along1), along2) > 0.999999
 
 
@@ -153,7 +169,7 @@ def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-unt
     px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
     py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
     pz = row[0, 2] + b1 * row[1, 2] + b2 * row[2, 2]
-    step = OFFSET * larger(larger(larger(abs(px), abs(py)), abs(pz)), least)
+    step = offset_step(px, py, pz, row[4, 0], least)
     origin[n, k, 0] = px + step * row[3, 0]
     origin[n, k, 1] = py + step * row[3, 1]
     origin[n, k, 2] = pz + step * row[3, 2]

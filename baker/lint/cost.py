@@ -132,8 +132,8 @@ def probe(subject: Subject) -> Rates:
     share = np.cumsum(world.area)
     pick = np.sort(random.random(1 << 16)) * share[-1]
     chosen = np.minimum(np.searchsorted(share, pick), len(share) - 1)
-    origin = world.position[world.triangle[chosen]].mean(axis=1)
-    origin = origin + 1e-5 * subject.diagonal * world.normal[chosen]
+    middle = world.position[world.triangle[chosen]].mean(axis=1).astype(np.float64)
+    origin = world.lifted(middle, chosen, world.normal[chosen])
     way = random.normal(size=origin.shape)
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     way += world.normal[chosen]

@@ -13,8 +13,6 @@ from baker.lint.registry import check
 from baker.lint.subject import Subject
 from baker.lint.world import World
 
-# Rays start so far in front of a face, as share of the largest coordinate; the same as those of a bake.
-_OFFSET = 1e-5
 # A face is looked at in its middle and beside its corners, which are drawn in by this share.
 _DRAWN_IN = 0.02
 # Rays from the inside of a solid that prove a point to be there.
@@ -78,7 +76,7 @@ def _found(subject: Subject, rows: NDArray[np.int64], text: str) -> Found:
     faces = world.face[rows]
     area = float(world.area[rows].sum())
     whole = float(world.area[world.instance == world.instance[rows[0]]].sum())
-    x, y, z = (float(v) for v in world.position[world.triangle[rows[0]]].mean(axis=0) + world.origin)
+    x, y, z = world.place_of(rows[0])
     return Found(
         text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
         Place(instance.name or subject.raw.meshes[instance.mesh].name, instance.node),
@@ -108,14 +106,12 @@ def _holders(world: World, solids: Solids) -> NDArray[np.int64]:
     """Return (T,) int64: an object with a solid that each face lies in, or -1."""
     corner = world.position[world.triangle].astype(np.float64)
     middle = corner.mean(axis=1)
-    least = 0.05 * float(np.linalg.norm(corner.max(axis=(0, 1)) - corner.min(axis=(0, 1))))
     rows = np.flatnonzero(world.area > 0)
     found = np.full(len(corner), -1, np.int64)
     for k in range(4):
         point = middle[rows] if k == 0 else corner[rows, k - 1]
         point = point + _DRAWN_IN * (middle[rows] - point)
-        step = _OFFSET * np.maximum(np.abs(point).max(axis=1, initial=0.0), least)
-        holder = _held(world, solids, point + step[:, None] * world.normal[rows], world.normal[rows])
+        holder = _held(world, solids, world.lifted(point, rows, world.normal[rows]), world.normal[rows])
         found[rows] = holder
         rows = rows[holder >= 0]
     return found

@@ -22,8 +22,6 @@ POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
 FACING_RAYS = 64
 HALF_MAX = 65504.0
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# Rays start this share of the scene's diagonal off the surface.
-OFFSET = 1e-5
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ def estimate_levels(subject: Subject) -> Levels:
     random = np.random.default_rng(subject.settings.seed)
     position, normal, triangle = spread_points(subject, POINTS, random)
     total = np.zeros((len(position), 3))
-    origin = position + OFFSET * subject.diagonal * normal
+    origin = world.lifted(position, triangle, normal)
     for light in subject.scene.local_lights:
         if max(light.intensity) > 0:
             total += _punctual(subject, light, origin, normal)
@@ -226,7 +224,7 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
         met = False
         for side in sides:
             normal = side * world.normal[chosen]
-            origin = _inside(subject, chosen, random) + OFFSET * subject.diagonal * normal
+            origin = world.lifted(_inside(subject, chosen, random), chosen, normal)
             way = cosine_ways(normal, 1, random)
             hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
             met = met or bool((hit >= 0).any())

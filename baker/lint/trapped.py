@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.lint.light_levels import OFFSET, cosine_ways, spread_points
+from baker.lint.light_levels import cosine_ways, spread_points
 from baker.lint.subject import Subject
 
 # Points on surfaces (a multiple of 16), paths from each, and their reflections.
@@ -39,7 +39,7 @@ def trapped_gain(subject: Subject, albedo: NDArray[np.float64]) -> float:
     for _ in range(REFLECTIONS):
         left *= reflected[world.material[triangle]]
         way = cosine_ways(normal, 1, random)
-        origin = position + OFFSET * subject.diagonal * normal
+        origin = world.lifted(position, triangle, normal)
         hit, distance = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
         met = np.maximum(hit, 0)
         behind = np.einsum("nx,nx->n", way, world.normal[met]) > 0

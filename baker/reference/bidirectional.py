@@ -81,10 +81,10 @@ _new_values = scratch((3, MAX_WIDTH), np.float64)
 
 
 @inner
-def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, least):  # type: ignore[no-untyped-def]
+def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):  # type: ignore[no-untyped-def]
     """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
     at_surface = n_subpaths == 0.0
-    start_path(path, row, lane, where, toward, normal, at_surface, least)
+    start_path(path, row, lane, where, toward, normal, at_surface, sizes)
     for r in range(BACK, N_ROWS_BOTH):
         path[r, lane] = 0.0
     if at_surface:
@@ -236,6 +236,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
         surfaces.least,
         surfaces.lambertian,
     )
+    sizes = (least, surfaces.most)
     triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
     cumulative, sky = lamps.cumulative, lamps.sky
     alpha = len(shading.alpha.slot) > 0
@@ -288,7 +289,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                 if eye[lane]:
                     k = (number_of_pass * samples + s) % places
                     start_at_eye(
-                        path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, least
+                        path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
                     )
                     stage[lane] = _VERTEX if n_subpaths == 0.0 else _RAY
             any_path = any_path or stage[lane] != _IDLE
@@ -445,7 +446,7 @@ def trace_both_ways(  # type: ignore[no-untyped-def]
                 i, s = job[lane] % m, job[lane] // m
                 k = (number_of_pass * samples + s) % places
                 start_at_eye(
-                    path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, least
+                    path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
                 )
                 eye[lane] = True
                 stage[lane] = _VERTEX if n_subpaths == 0.0 else _RAY

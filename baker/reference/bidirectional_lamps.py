@@ -47,7 +47,7 @@ from baker.reference.lamps import (
     spot_share,
 )
 from baker.reference.lamps import NORMAL as LAMP_NORMAL
-from baker.reference.vertex import BETA, DENSITY, GO, NORMAL, PLACE, place_off
+from baker.reference.vertex import BETA, DENSITY, GO, NORMAL, PLACE, place_off, size_of
 from baker.reference.view import EMISSION, FACE
 from baker.reference.view import TWO_SIDED as SURFACE_TWO_SIDED
 from baker.trace.jit import inner
@@ -107,7 +107,8 @@ def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, c
             path, lane,
             b0 * triangle[lamp, 0] + b1 * triangle[lamp, 3] + b2 * triangle[lamp, 6],
             b0 * triangle[lamp, 1] + b1 * triangle[lamp, 4] + b2 * triangle[lamp, 7],
-            b0 * triangle[lamp, 2] + b1 * triangle[lamp, 5] + b2 * triangle[lamp, 8], least,
+            b0 * triangle[lamp, 2] + b1 * triangle[lamp, 5] + b2 * triangle[lamp, 8],
+            least, size_of(triangle, lamp),
         )  # fmt: skip
         dx, dy, dz = cosine_sample(a, b)
         cosine = dz

@@ -164,6 +164,7 @@ def openness_pass(
     reach = np.float32(min(distance, 1.0e30))
     least = np.float32(reference.surfaces.least)
     alike = alike_within(reach, least)
+    sizes = (least, np.float32(reference.surfaces.most))
     dense = are_dense(position[:, 0], float(alike))
     setting = np.array([number, seed_salt(seed)], np.int64)
     arguments = np.stack([arguments_of(coherent=coherent) for coherent in (False, True)])
@@ -176,7 +177,7 @@ def openness_pass(
         found = np.zeros((end - begin, 1))
         open_rays(
             position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.rays),
-            arguments, net, shared, reach, alike, least, setting, found,
+            arguments, net, shared, reach, alike, sizes, setting, found,
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 

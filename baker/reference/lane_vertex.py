@@ -54,7 +54,7 @@ from baker.reference.lanes import (
     W_WAY,
     unsigned,
 )
-from baker.reference.vertex import MOST, OFFSET, SURE
+from baker.reference.vertex import MOST, OFFSET, ROUNDING, SURE
 from baker.reference.view import CORNER, FACE, SHADING, TWO_SIDED
 from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
@@ -63,7 +63,7 @@ _f = np.float32
 # A float64 constant would widen the whole expression.
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
-_OFFSET, _SHORT, _FAR = _f(OFFSET), _f(SHORT), _f(FAR)
+_OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
 _SURE, _MOST = _f(SURE), _f(MOST)
 _T = TRIANGLE * LANES
 _M = LAMP * LANES
@@ -71,12 +71,13 @@ _L = LANES
 
 
 @inner
-def stand(s, base, lane, x, y, z, least):  # type: ignore[no-untyped-def]
+def stand(s, base, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
     """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
 
-    least : float32, metres, see `Surfaces`
+    least, size : float32, metres, see `vertex.place_off`
     """
-    off = _OFFSET * max(max(abs(x), abs(y)), max(abs(z), least))
+    far = max(max(abs(x), abs(y)), abs(z))
+    off = max(_ROUNDING * max(far, size), _OFFSET * min(max(far, least), size))
     s[base + ORG_X * _L + lane] = x + off * s[base + NORMAL * _L + lane]
     s[base + ORG_Y * _L + lane] = y + off * s[base + (NORMAL + 1) * _L + lane]
     s[base + ORG_Z * _L + lane] = z + off * s[base + (NORMAL + 2) * _L + lane]
@@ -92,12 +93,19 @@ def stand(s, base, lane, x, y, z, least):  # type: ignore[no-untyped-def]
 
 
 @inner
-def stand_lanes(s, base, least):  # type: ignore[no-untyped-def]
-    """Make the lanes' places on surfaces vertices; see `stand`."""
+def stand_lanes(s, base, least, most):  # type: ignore[no-untyped-def]
+    """Make the lanes' places on surfaces vertices; least, most : float32, metres, see `Surfaces`."""
     base = unsigned(base)
     for lane in range(LANES):
         x, y, z = s[base + ORG_X * _L + lane], s[base + ORG_Y * _L + lane], s[base + ORG_Z * _L + lane]
-        stand(s, base, lane, x, y, z, least)
+        stand(s, base, lane, x, y, z, least, most)
+
+
+@inner
+def edge_lane(s, base, lane, a):  # type: ignore[no-untyped-def]
+    """Return the larger one along axis a of the two edges from corner 0 of a lane's triangle."""
+    at = base + _T + (CORNER + a) * _L + lane
+    return max(abs(s[at + 3 * _L] - s[at]), abs(s[at + 6 * _L] - s[at]))
 
 
 @inner
@@ -145,7 +153,8 @@ def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
         s[base + SHADED * _L + lane] = scale * (nx if bent else fx)
         s[base + (SHADED + 1) * _L + lane] = scale * (ny if bent else fy)
         s[base + (SHADED + 2) * _L + lane] = scale * (nz if bent else fz)
-        stand(s, base, lane, x, y, z, least)
+        size = max(max(edge_lane(s, base, lane, 0), edge_lane(s, base, lane, 1)), edge_lane(s, base, lane, 2))
+        stand(s, base, lane, x, y, z, least, size)
 
 
 @inner

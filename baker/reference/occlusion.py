@@ -143,7 +143,7 @@ def count_lanes(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def open_rays(  # type: ignore[no-untyped-def]
-    position, normal, face_normal, name, memory, arguments, net, shared, reach, alike, least, how, out
+    position, normal, face_normal, name, memory, arguments, net, shared, reach, alike, sizes, how, out
 ):
     """Count the rays of points that meet nothing within reach.
 
@@ -152,7 +152,7 @@ def open_rays(  # type: ignore[no-untyped-def]
     name : (m,) int64, what random numbers a point has; memory : `PathMemory`
     arguments : (2, 5) int64, `arguments_of` of packets whose rays do not go alike, and do
     net : (n, 2) uint32; shared : uint32, bits that all points share
-    reach, alike, least : float32, metres, see `alike_within`
+    reach, alike : float32, metres, see `alike_within`; sizes : (2,) float32, `Surfaces.least` and `.most`
     how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
     """
     scene, occluded = memory.scene, memory.occluded
@@ -168,7 +168,7 @@ def open_rays(  # type: ignore[no-untyped-def]
             k = (how[0] * samples + sample) % places
             if sample == 0 or places > 1:
                 place_lanes(s, position, normal, face_normal, group, k)
-                stand_lanes(s, 0, least)
+                stand_lanes(s, 0, sizes[0], sizes[1])
             if sample == 0:
                 asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
             number_lanes(words, net[sample, 0], net[sample, 1], shared)

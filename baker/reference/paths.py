@@ -370,7 +370,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
             if met:
                 arrive_lanes(s, base, _f(least))
             else:
-                stand_lanes(s, base, _f(least))
+                stand_lanes(s, base, _f(least), _f(surfaces.most))
             if lit:
                 choose_lamps(s, words, base, every, cumulative, lamp)
                 aim_lanes(s, base, mode, power)
@@ -385,7 +385,8 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                         np.int64(words[base + SAMPLE * LANES + lane]),
                     )
                     k = (number_of_pass * samples + sample) % places
-                    start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], True, least)
+                    sizes = (least, surfaces.most)
+                    start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], True, sizes)
                 for c in range(3):
                     path[PATH_BETA + c, lane] = s[base + (BETA + c) * LANES + lane]
                 if lit:

@@ -43,8 +43,9 @@ PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = 0, 3, 6, 9
 N_ROWS = 32
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
-# Origins leave the surface by this share of the largest coordinate.
-OFFSET = 1.0e-5
+# Origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever is
+# less; but at least by four float32 steps of either (as `kernels.surface` has it).
+OFFSET, ROUNDING = 1.0e-5, 4.8e-7
 # Roulette begins after this many bounces and lets at most this share live on.
 SURE, MOST = 3, 0.98
 
@@ -69,19 +70,33 @@ def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place_off(path, lane, x, y, z, least):  # type: ignore[no-untyped-def]
-    """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`."""
-    off = OFFSET * max(abs(x), abs(y), abs(z), least)
+def place_off(path, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
+    """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
+
+    least : see `Surfaces`; size : of the triangle, metres, or `Surfaces.most` where it is not known
+    """
+    far = max(abs(x), abs(y), abs(z))
+    off = max(ROUNDING * max(far, size), OFFSET * min(max(far, least), size))
     path[PLACE, lane] = x + off * path[NORMAL, lane]
     path[PLACE + 1, lane] = y + off * path[NORMAL + 1, lane]
     path[PLACE + 2, lane] = z + off * path[NORMAL + 2, lane]
 
 
 @inner
-def start_path(path, row, lane, where, toward, normal, at_surface, least):  # type: ignore[no-untyped-def]
+def size_of(corner, t):  # type: ignore[no-untyped-def]
+    """Return the largest component of the edges from corner 0 of row t, whose first columns are corners."""
+    size = 0.0
+    for a in range(3):
+        size = max(size, max(abs(corner[t, 3 + a] - corner[t, a]), abs(corner[t, 6 + a] - corner[t, a])))
+    return size
+
+
+@inner
+def start_path(path, row, lane, where, toward, normal, at_surface, sizes):  # type: ignore[no-untyped-def]
     """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
 
     where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
+    sizes : `Surfaces.least` and `.most`
     """
     for c in range(3):
         path[BETA + c, lane] = 1.0
@@ -98,7 +113,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, least):  # ty
         path[NORMAL + a, lane] = normal[a]
         row[a, lane] = 1.0
     row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
-    place_off(path, lane, where[0], where[1], where[2], least)
+    place_off(path, lane, where[0], where[1], where[2], sizes[0], sizes[1])
     set_frame(path, lane, toward[0], toward[1], toward[2])
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
 
@@ -118,7 +133,7 @@ def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  
     x = b0 * surface[prim, CORNER] + u * surface[prim, CORNER + 3] + v * surface[prim, CORNER + 6]
     y = b0 * surface[prim, CORNER + 1] + u * surface[prim, CORNER + 4] + v * surface[prim, CORNER + 7]
     z = b0 * surface[prim, CORNER + 2] + u * surface[prim, CORNER + 5] + v * surface[prim, CORNER + 8]
-    place_off(path, lane, x, y, z, least)
+    place_off(path, lane, x, y, z, least, size_of(surface, prim))
     nx = b0 * surface[prim, SHADING] + u * surface[prim, SHADING + 3] + v * surface[prim, SHADING + 6]
     ny = b0 * surface[prim, SHADING + 1] + u * surface[prim, SHADING + 4] + v * surface[prim, SHADING + 7]
     nz = b0 * surface[prim, SHADING + 2] + u * surface[prim, SHADING + 5] + v * surface[prim, SHADING + 8]

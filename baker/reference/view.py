@@ -37,19 +37,23 @@ CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES 
 )
 # Two cache lines.
 ROW_LENGTH = 32
+# Share of triangles that are smaller than half of what starts of paths are offset for.
+_SMALL = 0.1
 
 
 class Surfaces(NamedTuple):
     """What a path needs at a hit.
 
     row (T, 32) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
-    a texture scales the last two; least float, metres: offsets are never computed from smaller coordinates;
+    a texture scales the last two; least, most float, metres: offsets are never computed from smaller
+    coordinates, and from no larger ones where the triangle is not known;
     lambertian int: 1 if everything reflects as Lambert; painted int: 1 if any triangle is textured.
     """
 
     row: NDArray[np.float32]
     material: NDArray[np.float32]
     least: float
+    most: float
     lambertian: int
     painted: int
 
@@ -191,6 +195,14 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     kinds[:, :3] = shading.base
     kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
     kinds[:, 5] = shading.reflection_texture >= 0
-    return Surfaces(
-        row, kinds, max(1e-3 * geometry.diagonal, 1e-12), int(lambertian), int(row[:, TEXTURED].any())
-    )
+    least, most = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
+    return Surfaces(row, kinds, least, most, int(lambertian), int(row[:, TEXTURED].any()))
+
+
+def _small_size(geometry: Geometry) -> float:
+    """Return twice the size, metres, of small triangles: a sky around a room does not count."""
+    if not len(geometry.triangle):
+        return 1.0
+    corner = geometry.position[geometry.triangle]
+    size = np.abs(corner[:, 1:] - corner[:, :1]).max(axis=(1, 2))
+    return max(2.0 * float(np.quantile(size, _SMALL)), 1e-12)

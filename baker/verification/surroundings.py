@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from baker.judge.texel_area import TexelPlaces
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
+from baker.kernels.surface import OFFSET, ROUNDING
 from baker.reference.buried import RAYS, is_buried
 from baker.reference.buried import look_around as cast_around
 from baker.reference.first_hit import first_hits
 from baker.reference.view import Reference
 
-# Origins leave the surface by this share of the largest coordinate.
-_OFFSET = 1.0e-5
 # Texels; and the share of a place's rays that end within them in a gap.
 _NEAR, _GAP, _CONTACT = 2.0, 0.5, 0.1
 # Points in the air that rooms are made of; places that a room must have.
@@ -187,6 +186,8 @@ def lifted(
 ) -> NDArray[np.float64]:
     """Return places (n, k, 3) as (n k, 3), off their surface by what rounding needs."""
     position, face = position.reshape(-1, 3), face.reshape(-1, 3)
-    step = _OFFSET * np.maximum(np.abs(position).max(axis=1, keepdims=True), reference.surfaces.least)
+    far, sizes = np.abs(position).max(axis=1, keepdims=True), reference.surfaces
+    step = OFFSET * np.minimum(np.maximum(far, sizes.least), sizes.most)
+    step = np.maximum(step, ROUNDING * np.maximum(far, sizes.most))
     lifted: NDArray[np.float64] = position + step * face
     return lifted

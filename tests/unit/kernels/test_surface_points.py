@@ -12,7 +12,16 @@ from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.progress import silent
 from baker.kernels.sampling import sobol_reversed
-from baker.kernels.surface import BORDER, INWARD, N_POINTS, OFFSET, free_point, place, place_points
+from baker.kernels.surface import (
+    BORDER,
+    INWARD,
+    N_POINTS,
+    OFFSET,
+    ROUNDING,
+    free_point,
+    place,
+    place_points,
+)
 from baker.radiosity.texels import build_texels
 
 free_point, place = compiled(free_point, place)
@@ -72,7 +81,11 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     b1, b2 = bary[..., :1], bary[..., 1:]
     flat = corner[..., 0, :] * (1 - b1 - b2) + corner[..., 1, :] * b1 + corner[..., 2, :] * b2
     side = np.where(texels.back, -1.0, 1.0)[:, None, None] * geometry.face_normal[hit]
-    away = OFFSET * np.maximum(np.abs(flat).max(axis=2), surface.least)[..., None]
+    far, edges = np.abs(flat).max(axis=2), corner[..., 1:, :] - corner[..., :1, :]
+    size = np.abs(edges).max(axis=(2, 3))
+    away = np.maximum(
+        ROUNDING * np.maximum(far, size), OFFSET * np.minimum(np.maximum(far, surface.least), size)
+    )[..., None]
     # Near the border also along the face: no rounding puts a point of it behind the wall beside it.
     clipped = np.clip(np.concatenate([1 - b1 - b2, b1, b2], axis=2), 0, 1)
     near = clipped.min(axis=2, keepdims=True) < BORDER
