@@ -69,8 +69,8 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
         f"which is {_metres(texel[worst])} wide"
     )
     if stored[worst] == step[worst]:
-        far = float(reach[scene.instances[worst].mesh][1].max())
-        text = f"its vertices are stored with coordinates of up to {far:.3g}, {ends}"
+        largest = float(reach[scene.instances[worst].mesh][1].max())
+        text = f"its vertices are stored with coordinates of up to {largest:.3g}, {ends}"
         fix = "move the distance into the node's translation, so that the mesh lies around its own origin"
     else:
         text = f"it lies {_metres(distance[worst])} from the origin among the other objects, {ends}"

@@ -74,7 +74,7 @@ class World:
     def lifted(
         self, point: NDArray[np.float64], triangle: NDArray[np.int64], normal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return ray origins just off points (n, 3) of triangles (n,), along normals (n, 3) of either side."""
+        """Return ray origins just off points (n, 3) of triangles (n,), along normals (n, 3)."""
         # Here: it brings the compiler.
         from baker.kernels.surface import OFFSET, ROUNDING
 
