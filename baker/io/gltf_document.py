@@ -49,6 +49,8 @@ IRRELEVANT = frozenset(
 )
 # The lists that scene.glb may add to, whether a bake reads them or not.
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
+# Not applied, and told of each material that has it.
+_TOLD = frozenset({"KHR_materials_transmission"})
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -200,7 +202,7 @@ def _check_extensions(root: JsonObject) -> list[SceneWarning]:
     return [
         SceneWarning("extension-ignored", f"the extension {name} is not understood and was ignored", name)
         for name in root.strings("extensionsUsed")
-        if name not in known
+        if name not in known | _TOLD
     ]
 
 

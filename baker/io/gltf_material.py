@@ -88,6 +88,13 @@ class MaterialReader:
         mode = material.string("alphaMode", "OPAQUE")
         if mode not in _ALPHA:
             material.fail(f"'{mode[:20]}' is none of {', '.join(_ALPHA)}", "alphaMode")
+        through = material.extension("KHR_materials_transmission")
+        if mode == "OPAQUE" and through is not None and through.number("transmissionFactor", 0.0) > 0:
+            message = (
+                f"the material '{name}' transmits light (KHR_materials_transmission), which a bake does not "
+                "read: it blocks light; let light through with alphaMode BLEND and an alpha below 1"
+            )
+            self.warnings.append(SceneWarning("transmission", message, name))
         read = {(surface.holder.where, surface.texture)}
         needs_glow = strength > 0 and max(emission) > 0
         if needs_glow:
