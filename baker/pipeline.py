@@ -27,7 +27,7 @@ from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
-from baker.io.load import load_scene
+from baker.io.load import load_for_bake
 from baker.kernels.side_table import SeenLight
 from baker.lint.in_bake import bake_warnings
 from baker.radiosity.crevices import gap_depth
@@ -88,7 +88,7 @@ def bake(
             if isinstance(scene, Scene):
                 check_brightness(scene)
             else:
-                scene = load_scene(scene, up=settings.up, scale=settings.scale)
+                scene = load_for_bake(scene, settings)
         compiling = warm.suit(compiling, scene)
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
         with record.stage("unwrap"):

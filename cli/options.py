@@ -113,7 +113,7 @@ def given(values: dict[str, Any]) -> dict[str, Any]:
     """Return the settings among a command's values that were on the command line."""
     from baker.core.settings import BakeSettings
 
-    return {name: values[name] for name in BakeSettings.model_fields if values.get(name) is not None}
+    return {name: values[name] for name in BakeSettings.model_fields if values.get(name) not in (None, [])}
 
 
 def build(name: str, summary: str, work: Callable[..., None], flags: list[inspect.Parameter]) -> Any:
@@ -130,6 +130,8 @@ def build(name: str, summary: str, work: Callable[..., None], flags: list[inspec
 
 
 def _setting_flag(name: str, field: Any) -> inspect.Parameter:
+    from baker.core.settings import REPEATED
+
     dashed = name.replace("_", "-")
     remarks = [range_of(field), f"default {default_of(field)}" if default_of(field) else ""]
     remark = "; ".join(filter(None, remarks))
@@ -139,4 +141,6 @@ def _setting_flag(name: str, field: Any) -> inspect.Parameter:
             name, bool | None, typer.Option(f"--{dashed}/--no-{dashed}", help=text, show_default=False)
         )
     option = typer.Option(f"--{dashed}", help=text, metavar=metavar_of(field), show_default=False)
+    if name in REPEATED:
+        return flag(name, list[str] | None, option)
     return flag(name, str | None, option)

@@ -34,13 +34,13 @@ class ClusterBakery:
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
         """Read the scene and send it; a worker uses all its threads."""
-        from baker.io.load import load_scene
+        from baker.io.load import load_for_bake
         from baker.io.output import check_out
 
         assert job.out is not None
         try:
             check_out(job.out, force=force, scene_path=job.scene)
-            scene = load_scene(job.scene, up=job.settings.up, scale=job.settings.scale)
+            scene = load_for_bake(job.scene, job.settings)
             self._send(ticket, job, scene, force)
         except Exception as error:
             self._failed.append(Event(ticket, ended=True, error=describe(error)))

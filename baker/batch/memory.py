@@ -15,7 +15,7 @@ import numpy as np
 from baker.core.errors import SettingsError
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
-from baker.io.load import load_scene
+from baker.io.load import load_for_bake
 
 # Python, libraries and compiled kernels.
 _BASE = 300 * 2**20
@@ -69,7 +69,7 @@ def estimate_peak(path: Path, settings: BakeSettings) -> int:
     InputError
         If the scene cannot be read.
     """
-    scene = load_scene(path, up=settings.up, scale=settings.scale)
+    scene = load_for_bake(path, settings)
     page = settings.resolution**2
     pixels = page * _pages(scene, settings)
     # As many as the pipeline casts from each patch.

@@ -14,7 +14,7 @@ from baker.core.progress import Progress, silent
 from baker.core.progress import report as tell_progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
-from baker.io.load import load_scene
+from baker.io.load import load_for_bake
 from baker.lint.finding import SEVERITIES, Finding, Found, Place
 from baker.lint.registry import CHECKS, all_checks, run_check
 from baker.lint.subject import Subject
@@ -76,7 +76,7 @@ def check_scene(
     parse_ignore(settings.ignore)
     timings: dict[str, float] = {}
     try:
-        scene = load_scene(path, up=bake_settings.up, scale=bake_settings.scale, lenient=True)
+        scene = load_for_bake(path, bake_settings, lenient=True)
     except IndexRangeError as error:
         found = [_index_range(error)]
     else:

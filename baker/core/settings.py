@@ -17,7 +17,9 @@ from baker.core.limits import BRIGHTEST
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
 # Settings that are lists of names: with commas on the command line.
-_LISTS = {"channels", "encode", "export"}
+_LISTS = {"channels", "encode", "exclude", "export", "include"}
+# Lists that may be given several times.
+REPEATED = frozenset({"exclude", "include"})
 
 
 class BakeSettings(BaseModel):
@@ -61,6 +63,12 @@ class BakeSettings(BaseModel):
     )
     export: tuple[str, ...] = Field(
         (), description="Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
+    )
+    include: tuple[str, ...] = Field(
+        (), description="Bake only objects with these names or paths of nodes (`*` and `?` stand for others)."
+    )
+    exclude: tuple[str, ...] = Field(
+        (), description="Leave out objects and lights with these names or paths of nodes, and what is below."
     )
     up: Literal["y", "z"] = Field("y", description="Up axis of OBJ, PLY, STL and OFF files.")
     scale: float = Field(1.0, gt=0, description="Metres per unit of OBJ, PLY, STL and OFF files.")
@@ -145,6 +153,8 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
             value = str(value)
         if name == "sky" and isinstance(value, list | tuple):
             value = ",".join(str(v) for v in value)
+        if name in REPEATED and isinstance(value, list | tuple):
+            value = ",".join(map(str, value))
         if name in _LISTS and isinstance(value, str):
             value = [part.strip() for part in value.split(",") if part.strip()]
         clean[name] = value

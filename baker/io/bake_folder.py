@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.choose import choose_objects
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.scene import Scene, SceneWarning
@@ -87,6 +88,8 @@ def read_bake(folder: Path | str) -> StoredBake:
     manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
     scene = load_scene(_present(folder, SCENE_NAME))
+    told = manifest.get("settings", {})
+    scene = choose_objects(scene, told.get("include", ()), told.get("exclude", ()))
     try:
         pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
         maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}

@@ -11,9 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from baker.core.choose import choose_objects
 from baker.core.errors import InputError, ResourceError, SettingsError
 from baker.core.registry import Registry
 from baker.core.scene import Scene, check_brightness
+from baker.core.settings import BakeSettings
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,18 @@ def load_scene(
     if not lenient:
         check_brightness(scene)
     return scene
+
+
+def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = False) -> Scene:
+    """Read a scene file as the settings of a bake say: up axis, scale, and which objects take part.
+
+    Raises
+    ------
+    InputError, SettingsError, ResourceError
+        As `load_scene`; also if the patterns leave no object.
+    """
+    scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=lenient)
+    return choose_objects(scene, settings.include, settings.exclude)
 
 
 def read_scene_file(path: Path) -> bytes:

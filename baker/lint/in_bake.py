@@ -29,7 +29,7 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
         for f in invisible(subject)
     ]
     found += [
-        SceneWarning("collision-hull", f"{f.message}; leave it out of the file", f.place.object)
+        SceneWarning("collision-hull", f"{f.message}; leave it out with --exclude", f.place.object)
         for f in collision_hull(subject)
     ]
     if subject.wants_light:

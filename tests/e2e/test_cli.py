@@ -90,6 +90,8 @@ OTHER = {
     "encode": ("hdr,png16", ("hdr", "png16")),
     "rgbm_range": ("8", "8"),
     "export": ("three,unity", ("three", "unity")),
+    "include": ("Wall*,House/*", ("Wall*", "House/*")),
+    "exclude": ("UCX_*", ("UCX_*",)),
     "up": ("z", "z"),
     "scale": ("0.01", 0.01),
     "seed": ("7", 7),
