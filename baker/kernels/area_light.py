@@ -167,9 +167,12 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
     # One emitter in closed form at all points costs as much as some samples.
-    plain = not any_alpha and len(row) * _SAMPLES_AN_EMITTER <= n_samples
-    for m in range(len(row)):
+    plain = len(row) * _SAMPLES_AN_EMITTER <= n_samples
+    for m in range(len(row) if plain else 0):
         plain = plain and row[m, TEXTURED] == _f(0.0)
+        if shading is not None:
+            # Alpha of anything but the emitter is in the way, and found by the looks.
+            plain = plain and (not any_alpha or shading.alpha.slot[triangle[m]] < 0)
     found = _vectors()
     radiance = _rgba()
     # Sums of one point's samples are short: float32; those of all points are not.

@@ -88,6 +88,19 @@ def test_sky_through_black_glass_all_around_has_no_noise():
     np.testing.assert_allclose(found, np.broadcast_to(truth, found.shape), rtol=1e-4)
 
 
+def test_a_pane_elsewhere_leaves_a_free_lamp_its_closed_form():
+    """No pane is between them: the light has no noise, whatever else is made of glass."""
+
+    def baked(*panes):
+        builder, floor = floor_under(light="", texels=24)
+        builder.quad((-0.5, 1, -0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 5.0), (8, 8))
+        for make in panes:
+            builder.quad((-1, 1.5, -1), (2, 0, 0), (0, 0, 2), make(builder), (8, 8))
+        return floor.values(builder.bake(bounces=0, samples=64))
+
+    np.testing.assert_allclose(baked(pane()), baked(), rtol=1e-6)
+
+
 def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
     """Texels on both sides of it hold the light of one side, and not of some points by chance."""
     builder = SceneBuilder(64)
