@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from baker.core.closed_parts import ClosedParts, find_closed_parts
 from baker.core.scene import Scene
-from baker.core.winding import winding_number
+from baker.core.winding import MANY, Enclosure
 
 # Where the inside of a solid is, seen from a triangle.
 NOWHERE, BEHIND, BEFORE = 0, 1, 2
@@ -35,6 +35,8 @@ _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
 _MOST_OF_SCENE = 0.5
 # At most so many parts are examined as holding most of the scene, and so many as being held.
 _LARGEST, _HELD = 32, 64
+# Faces of a part times parts that are asked whether they are in it: a second of work.
+_MOST_WORK = 200_000_000
 
 
 class Surfaces(NamedTuple):
@@ -159,7 +161,7 @@ class _Judge:
             shells = outward[self._boxes_around(int(part), outward)]
             shells = shells[np.argsort(np.prod(parts.high[shells] - parts.low[shells], axis=1))]
             for shell in shells:
-                if self._is_inside(int(part), int(shell)):
+                if self._is_inside(int(part), int(shell), self._surface(int(shell))):
                     self.around[int(part)] = int(shell)
                     break
         largest = self._largest()
@@ -179,8 +181,9 @@ class _Judge:
         cover = parts.lidless & ~self.inward
         for part in np.flatnonzero(cover):
             # Black backs hide what is under them anyway.
+            few = self.start[part + 1] - self.start[part] <= MANY
             cover[part] = (
-                bool(self.two_sided[part])
+                bool(self.two_sided[part] and few)
                 and not self._holds_place(int(part))
                 and not self._holds(int(part), None, mostly=True)
             )
@@ -207,8 +210,8 @@ class _Judge:
         size = np.prod(parts.high[closed] - parts.low[closed], axis=1)
         return set(closed[np.argsort(-size, kind="stable")][:_LARGEST].tolist())
 
-    def _surface(self, part: int) -> NDArray[np.float64]:
-        """Return the corners (F, 3, 3) of a part and its hollows, wound so that a solid counts 1."""
+    def _surface(self, part: int) -> Enclosure:
+        """Return a part and its hollows, wound so that a solid counts 1."""
         corners = []
         for one in (part, *(hollow for hollow, shell in self.around.items() if shell == part)):
             rows = self.order[self.start[one] : self.start[one + 1]]
@@ -218,7 +221,7 @@ class _Judge:
             keep = outward != 0
             turned = np.where((outward < 0)[:, None, None], corner[:, ::-1], corner)
             corners.append(turned[keep])
-        return np.concatenate(corners)
+        return Enclosure(np.concatenate(corners))
 
     def _holds_place(self, part: int) -> bool:
         """Tell whether a lamp or camera is inside."""
@@ -227,7 +230,7 @@ class _Judge:
         if not len(near):
             return False
         surface, inside = self._surface(part), self._inside_from(part)
-        return any(winding_number(surface, place) > inside for place in near)
+        return any(surface.winding(place) > inside for place in near)
 
     def _inside_from(self, part: int) -> float:
         """Return the winding number above which points are inside: 1/2 in the plane of a missing lid."""
@@ -256,7 +259,13 @@ class _Judge:
     def _holds(self, part: int, wanted: NDArray[np.bool_] | None, *, mostly: bool = False) -> bool:
         """Tell whether another part (one of the wanted ones) is inside, at least mostly."""
         held = self._held_boxes(part, wanted, mostly)
-        return any(self._is_inside(int(other), part, mostly=mostly) for other in held)
+        if not len(held):
+            return False
+        most = max(_HELD, _MOST_WORK // int(self.start[part + 1] - self.start[part]))
+        if len(held) > most:
+            held = held[np.linspace(0, len(held) - 1, most).round().astype(np.int64)]
+        surface = self._surface(part)
+        return any(self._is_inside(int(other), part, surface, mostly=mostly) for other in held)
 
     def _holds_most(self, part: int) -> bool:
         """Tell whether most of the other parts' area is inside."""
@@ -274,26 +283,19 @@ class _Judge:
             if found > enough or found + open_ <= enough:
                 break
             open_ -= float(area[other])
-            found += float(area[other]) * self._is_inside(int(other), part, surface=surface)
+            found += float(area[other]) * self._is_inside(int(other), part, surface)
         return found > enough
 
-    def _is_inside(
-        self, part: int, shell: int, *, mostly: bool = False, surface: NDArray[np.float64] | None = None
-    ) -> bool:
-        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does.
-
-        surface : (F, 3, 3), that of the shell if it is known
-        """
+    def _is_inside(self, part: int, shell: int, surface: Enclosure, *, mostly: bool = False) -> bool:
+        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does."""
         rows = self.order[self.start[part] : self.start[part + 1]]
         if mostly and self.glows[part]:
             rows = rows[self.surfaces.glows[rows]]
         chosen = rows[np.linspace(0, len(rows) - 1, min(_WITNESSES, len(rows))).round().astype(int)]
         points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
-        if surface is None:
-            surface = self._surface(shell)
         found, inside = 0, self._inside_from(shell)
         for point in points:
-            number = winding_number(surface, point)
+            number = surface.winding(point)
             if not mostly and number < _OUTSIDE:
                 return False
             found += number > inside

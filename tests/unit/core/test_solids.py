@@ -7,6 +7,7 @@ import pytest
 from scenes import icosphere
 
 from baker.core.solids import BEFORE, BEHIND, NOWHERE, Surfaces, find_solids
+from baker.core.winding import Enclosure, winding_number
 
 BOX = np.array(
     [
@@ -174,3 +175,16 @@ def test_a_sky_sphere_is_no_solid(inward, glows):
 
 def test_nothing_comes_of_nothing():
     assert kinds(judge(np.zeros((0, 3, 3)))) == [[]]
+
+
+def test_winding_numbers_along_a_line_are_those_of_solid_angles():
+    surface = np.concatenate(
+        [ball(1.0, level=4), ball(0.4, inward=True), shifted(ball(0.9, level=2), 1.3, 0.2, 0)]
+    )
+    many = Enclosure(surface)
+    assert many.many
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1.2, 2.3, (60, 3))
+    truth = [winding_number(surface, point) for point in points]
+    np.testing.assert_allclose([many.winding(point) for point in points], truth, atol=1e-6)
+    assert {round(value) for value in truth} == {0, 1, 2}
