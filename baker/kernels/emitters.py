@@ -36,6 +36,8 @@ CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED,
     21,
 )
 ROW_LENGTH = 24
+# Instead of 0 in TEXTURED: the radiance is the row's, but the emitter is always sampled.
+NO_CLOSED_FORM = -1.0
 _three = scratch((3,), np.float64)
 
 

@@ -20,7 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.emitters import AREA, CLUSTER, TEXTURED, Emitters, Lamps, lamps_for, widest_view
+from baker.kernels.emitters import (
+    AREA,
+    CLUSTER,
+    NO_CLOSED_FORM,
+    TEXTURED,
+    Emitters,
+    Lamps,
+    lamps_for,
+    widest_view,
+)
 from baker.kernels.lamp_probe import probe_clusters
 from baker.trace.packets import LANES, Caster
 
@@ -193,8 +202,8 @@ class LampChooser:
         if not hidden.any() or not (lamps.chance[~hidden] > 0).any():
             return Choice(part, lamps, None, lamps, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # What counts as textured has no closed form: a ray that gets there after all is never taken for many.
-        others.row[:, TEXTURED] = 1.0
+        # No closed form for these: a ray that gets there after all is never taken for many.
+        others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = lamps_for(visible, origin), lamps_for(others, origin)
         chance = np.zeros_like(lamps.chance)
         chance[~hidden] = seen.chance / seen.cumulative[-1]

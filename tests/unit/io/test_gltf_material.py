@@ -159,8 +159,17 @@ def test_a_texture_is_found_wherever_it_is_kept(tmp_path, how):
     np.testing.assert_array_equal(texture.image, PIXELS)
     assert texture.image.dtype == np.uint8
     assert texture.wrap == ("clamp", "mirror")
+    assert not texture.nearest
     assert texture.texcoord == 0
     np.testing.assert_array_equal(texture.transform, np.eye(2, 3))
+
+
+@pytest.mark.parametrize(("code", "nearest"), [(9728, True), (9729, False), (None, False)])
+def test_only_magnification_decides_about_nearest_lookups(tmp_path, code, nearest):
+    builder = quad_builder(emissiveFactor=[1, 1, 1], emissiveTexture={"index": 0})
+    builder.json["samplers"] = [{"minFilter": 9728, **({"magFilter": code} if code else {})}]
+    builder.image(encode(PIXELS), sampler=0)
+    assert material_of(tmp_path, builder).emission_texture.nearest == nearest
 
 
 def test_one_image_is_decoded_once_and_shared(tmp_path):
