@@ -8,7 +8,7 @@ Based on: Alias|Wavefront, Advanced Visualizer manual, appendix B.1; `Ke` and `m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ def read_mtl(
     file: str,
     folder: Path,
     read_file: Callable[[Path], bytes],
+    used: Container[str],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
     """Return the materials of one library, in its order.
@@ -55,6 +56,8 @@ def read_mtl(
         Where its image names begin.
     read_file : callable
         Returns the content of a file; raises OSError or ValueError if it cannot.
+    used : container of str
+        Names of the materials that faces have; others may be broken.
     decode : callable
         Makes pixels of an image file's content; see `decode_image`.
 
@@ -99,7 +102,16 @@ def read_mtl(
         pixels = image(material, words, names)
         return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
 
-    return [_material(m, file, texture) for m in materials]
+    out = []
+    for words in materials:
+        name = " ".join(words["name"])
+        try:
+            out.append(_material(words, file, texture))
+        except InputError:
+            if name in used:
+                raise
+            out.append(Material(name=name))
+    return out
 
 
 def _material(

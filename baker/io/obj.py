@@ -106,6 +106,9 @@ def _read_libraries(
         return data
 
     materials: list[Material] = []
+    # The parser takes the first word after usemtl, some exporters mean the rest of the line.
+    named = re.findall(r"^[ \t]*usemtl[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
+    used = {*named, *(name.split()[0] for name in named if name)}
     lines = re.findall(r"^[ \t]*mtllib[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
     for line in dict.fromkeys(lines):
         # The rest of the line is one name with blanks, or several names.
@@ -119,7 +122,12 @@ def _read_libraries(
                 warnings.append(SceneWarning("missing-mtl", message, path.name))
                 continue
             materials += read_mtl(
-                content, file=str(file), folder=file.parent, read_file=read_file, decode=decode
+                content,
+                file=str(file),
+                folder=file.parent,
+                read_file=read_file,
+                used=used,
+                decode=decode,
             )
     return materials
 

@@ -174,6 +174,17 @@ def test_bad_files_are_refused_in_a_sentence(tmp_path, text, words):
         assert word in str(caught.value)
 
 
+@pytest.mark.parametrize("broken", ["Kd 0.5 x 0", "Ke -1 0 0", "map_Kd gone.png", "Kd spectral f.rfl"])
+@pytest.mark.parametrize("name", ["b", "two words"])
+def test_a_broken_material_that_no_face_has_is_no_matter(tmp_path, broken, name):
+    (tmp_path / "m.mtl").write_text(f"newmtl {name}\n{broken}\nnewmtl a\nKd 0.25 0.5 0.75\n")
+    scene = load(tmp_path, "mtllib m.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n")
+    assert [m.name for m in scene.materials] == [name, "a"]
+    assert scene.materials[scene.meshes[0].material[0]].base_colour == (0.25, 0.5, 0.75, 1)
+    with pytest.raises(InputError):
+        load(tmp_path, f"mtllib m.mtl\nusemtl {name}\n" + SQUARE + "f 1 2 3\n")
+
+
 @pytest.mark.parametrize(
     ("mtl", "words"),
     [
