@@ -103,10 +103,10 @@ def read_mtl(
         return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
 
     out = []
-    for words in materials:
-        name = " ".join(words["name"])
+    for lines in materials:
+        name = " ".join(lines["name"])
         try:
-            out.append(_material(words, file, texture))
+            out.append(_material(lines, file, texture))
         except InputError:
             if name in used:
                 raise
