@@ -73,9 +73,9 @@ EDGES = Judgement(
         "edge_colour", "edge_noise", "edge_wrong_share",
     ),
     {
-        "irradiance": "irradiance.edge_median > 0.1, irradiance.edge_bias > 0.05,"
+        "irradiance": "irradiance.edge_median > 0.2, irradiance.edge_bias > 0.05,"
         " irradiance.edge_noise > 0.15, irradiance.edge_wrong_share > 0.05",
-        "ao": "ao.edge_median > 0.1, ao.edge_bias > 0.1, ao.edge_wrong_share > 0.08",
+        "ao": "ao.edge_median > 0.2, ao.edge_bias > 0.1, ao.edge_wrong_share > 0.08",
     },
     judge,
 )  # fmt: skip

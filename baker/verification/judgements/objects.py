@@ -5,10 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.judge.figures import dark_floor, figures
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
+
+# Texels of which surface covers less are the borders of charts.
+_COVERED = 0.5
 
 
 def judge_objects(evidence: Evidence) -> Judged:
@@ -32,7 +36,7 @@ def judge_objects(evidence: Evidence) -> Judged:
         )
         rows.append({"object": instance.name, "node": instance.node, **found})
         name = f"'{instance.name}' (node {instance.node})"
-        members.append((name, chosen[~points.gap[chosen]]))
+        members.append((name, chosen[_whole(evidence)[chosen]]))
     worst, remarks = worst_figures("object", make_groups(evidence, members), evidence.channel)
     return Judged(worst, remarks, rows)
 
@@ -41,7 +45,7 @@ def judge_charts(evidence: Evidence) -> Judged:
     """Return the figures of the worst chart."""
     points, instances = evidence.points, evidence.bake.scene.instances
     size = evidence.bake.atlas.resolution
-    mine = evidence.texels & ~points.gap
+    mine = evidence.texels & _whole(evidence)
     members = []
     for number in np.unique(points.chart[mine]):
         chosen = np.flatnonzero(mine & (points.chart == number))
@@ -53,6 +57,12 @@ def judge_charts(evidence: Evidence) -> Judged:
         members.append((name, chosen))
     worst, remarks = worst_figures("chart", make_groups(evidence, members), evidence.channel)
     return Judged(worst, remarks)
+
+
+def _whole(evidence: Evidence) -> NDArray[np.bool_]:
+    """Return which points (n,) lie in no gap, on texels that surface covers: others are judged as edges."""
+    points = evidence.points
+    return np.asarray(~points.gap & (points.places.area >= _COVERED))
 
 
 OBJECTS = Judgement(
