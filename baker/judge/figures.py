@@ -154,6 +154,6 @@ def energy_ratio(
 def z_scores(
     value: NDArray[np.float64], reference: NDArray[np.float64], standard_error: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the errors (m,) in standard errors of the reference, where that is known and not zero."""
-    known = np.isfinite(standard_error) & (standard_error > 0)
+    """Return the errors (m,) in standard errors of the reference, where that saw any light."""
+    known = np.isfinite(standard_error) & (standard_error > 0) & (reference > 0)
     return np.asarray((value - reference)[known] / standard_error[known], np.float64)

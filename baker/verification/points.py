@@ -131,7 +131,7 @@ def choose_points(
         owner=owner[pixel],
         chart=chart,
         room=around.room,
-        gap=around.gap | around.buried,
+        gap=around.gap,
         stands_for=np.where(kind == TEXEL, texels * around.places.surface, 0.0),
         places=around.places,
     )

@@ -43,8 +43,9 @@ class Surroundings:
     buried : (n,) bool
         All places are.
     gap : (n,) bool
+        In a gap, or buried.
     room : (n,) int32
-        Number of the room; -1 for places that no point in the air sees.
+        Number of the room; -1 in gaps and where no point in the air sees.
     air : (m, 3) float64
         Points in the air that rooms were made of.
     """
@@ -64,15 +65,16 @@ def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroun
     buried = np.zeros(len(places.position), bool)
     if len(suspect):
         places, buried[suspect] = _free_places(reference, places, suspect, random)
+    gap = (near.mean(axis=1) > _GAP) | buried
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
     # Places that none of the first points in the air see get some of their own: small rooms.
     for _ in range(2):
-        left = np.flatnonzero(room < 0)
+        left = np.flatnonzero((room < 0) & ~gap)
         some = air[left[random.permutation(len(left))[:_AIR]]]
-        _add_rooms(reference, places, some, room)
+        _add_rooms(reference, places, some, left, room)
         eyes = np.concatenate([eyes, some])
-    return Surroundings(places, buried, near.mean(axis=1) > _GAP, room, eyes)
+    return Surroundings(places, buried, gap, room, eyes)
 
 
 def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[np.bool_]:
@@ -134,10 +136,13 @@ def _first_look(
 
 
 def _add_rooms(
-    reference: Reference, places: TexelPlaces, air: NDArray[np.float64], room: NDArray[np.int32]
+    reference: Reference,
+    places: TexelPlaces,
+    air: NDArray[np.float64],
+    left: NDArray[np.int64],
+    room: NDArray[np.int32],
 ) -> None:
-    """Make rooms of the places without one, as seen from points in the air (m, 3); `room` is changed."""
-    left = np.flatnonzero(room < 0)
+    """Make rooms of the points `left`, as seen from points in the air (m, 3); `room` is changed."""
     seen = visible(reference, air, places.position[left, 0], places.face_normal[left, 0])
     alone = np.ones(len(left), bool)
     while len(air):

@@ -22,6 +22,7 @@ from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.bake_folder import read_bake
 from baker.judge.texel_area import instance_map, texel_places
+from baker.lights.emissive import build_emitters
 from baker.pipeline import bake
 from baker.verification import VerifySettings, verify
 
@@ -227,3 +228,21 @@ def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene
     found = verify(tampered(sound, tmp_path, pixels), SETTINGS)
     assert {"region_bias", "object_bias"} <= failed(found)
     assert any("room" in problem for problem in found.problems)
+
+
+def test_an_emitter_that_both_finders_forget_is_missed_all_the_same(tmp_path, monkeypatch):
+    """The reference aims at what the bake's code lists as emitters, but light is what its rays meet."""
+    real = build_emitters
+
+    def forgetful(geometry, shading, *rest):
+        emission = shading.emission.copy()
+        emission[emission.max(axis=1) < 1] = 0
+        return real(geometry, shading._replace(emission=emission), *rest)
+
+    for place in ("baker.world", "baker.reference.lamps"):
+        monkeypatch.setattr(f"{place}.build_emitters", forgetful)
+    bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
+    found = verify(tmp_path / "out", replace(SETTINGS, texels=300, spp=256))
+    # Only what rays meet at the lamp itself is left in the dim room of this bake.
+    assert "region_bias" in failed(found)
+    assert not found.passed
