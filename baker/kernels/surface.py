@@ -22,8 +22,8 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
 # Ray origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever
-# is less; but at least by four float32 steps of either, which is what rounding in origins and hits may take.
-OFFSET, ROUNDING = 1.0e-5, 4.8e-7
+# is less; but at least by sixteen float32 steps of either: origins and hits lose one, modellers some.
+OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # They also move so many of these steps towards the middle of their triangle (at most half the way).
 INWARD = 2.0
 # Only points with a barycentric below this lie near the border.

@@ -44,8 +44,8 @@ N_ROWS = 32
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
 # Origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever is
-# less; but at least by four float32 steps of either (as `kernels.surface` has it).
-OFFSET, ROUNDING = 1.0e-5, 4.8e-7
+# less; but at least by sixteen float32 steps of either (as `kernels.surface` has it).
+OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Roulette begins after this many bounces and lets at most this share live on.
 SURE, MOST = 3, 0.98
 
