@@ -24,7 +24,7 @@ from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.form_factor import SPLIT
 from baker.kernels.hits import HitTable
-from baker.kernels.regions import flood_regions, join_linked
+from baker.kernels.regions import join_linked
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
 from baker.kernels.sides import (
@@ -36,6 +36,7 @@ from baker.kernels.sides import (
     point_heights,
 )
 from baker.kernels.surface import N_POINTS, Surface, place_points
+from baker.radiosity.lent_regions import lend_regions
 from baker.radiosity.points import points_of
 from baker.trace.embree import Tracer
 from baker.trace.packets import Caster, new_caster
@@ -387,7 +388,7 @@ def _keep_largest(
     region = np.array(texels.region)
     own = np.isin(region, cut)
     region[own] = int(region.max(initial=0)) + 1 + np.unique(root[:n_front][own], return_inverse=True)[1]
-    _lend_regions(texels, region, mask[:n_front] != 0)
+    lend_regions(texels, surface, region, mask[:n_front])
     return Sides(replace(texels, region=region), surface, mask, groups.owner, member, table, link, rays)
 
 
@@ -475,16 +476,3 @@ def _measure(
     front = member < texels.n_front
     centroid[member[front]] = offset[front]
     return replace(texels, area=area, position=position, normal=normal, centroid=centroid)
-
-
-def _lend_regions(texels: TexelBuffer, region: NDArray[np.int32], valid: NDArray[np.bool_]) -> None:
-    """Give texels inside geometry, whose values are filled in later, the region nearest in their chart."""
-    pixels = texels.resolution**2
-    page_of = texels.pixel[: texels.n_front] // pixels
-    for page in np.unique(page_of[~valid]):
-        own = page_of == page
-        chart = texels.page_image(texels.chart[: texels.n_front], fill=-1, page=int(page))
-        image = texels.page_image(np.where(valid, region, -1), fill=-1, page=int(page))
-        flood_regions(chart, image, np.zeros(pixels, np.int64))
-        grown = image.reshape(-1)[texels.pixel[: texels.n_front][own] - page * pixels]
-        region[own] = np.where(grown >= 0, grown, region[own])

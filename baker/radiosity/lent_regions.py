@@ -1,0 +1,128 @@
+"""Gives texels inside geometry, which are filled from their neighbours, the region that will look them up.
+
+The strip of a ceiling over a wall lies between a dark room and a bright outside. An engine interpolates
+between texel centres: what a lookup from the room takes of a buried texel is lit like the room, or the room
+glows along its ceiling. So each buried texel belongs to the region whose visible points lie within a texel of
+its centre; where no region does, to the nearest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.texels import TexelBuffer
+from baker.kernels.regions import flood_regions
+from baker.kernels.surface import N_POINTS, Surface, place_points
+
+_EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
+_RING = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c]
+
+
+def lend_regions(
+    texels: TexelBuffer, surface: Surface, region: NDArray[np.int32], mask: NDArray[np.uint16]
+) -> None:
+    """Number the regions of texels inside geometry.
+
+    Parameters
+    ----------
+    texels : TexelBuffer
+    surface : Surface
+    region : (n_front,) int32
+        Changed in place where `mask` is 0.
+    mask : (n_front,) uint16
+        Visible points of each texel.
+    """
+    valid = mask != 0
+    pixels = texels.resolution**2
+    page_of = texels.pixel[: texels.n_front] // pixels
+    for page in np.unique(page_of[~valid]):
+        own = page_of == page
+        chart = texels.page_image(texels.chart[: texels.n_front], fill=-1, page=int(page))
+        image = texels.page_image(np.where(valid, region, -1), fill=-1, page=int(page))
+        number = texels.page_image(np.arange(texels.n_front), fill=-1, page=int(page))
+        buried = np.argwhere((chart >= 0) & (image < 0))
+        key, weight = _lookups(buried, chart, image, _visible_points(texels, surface, mask, buried, number))
+        _choose(buried, image, key, weight)
+        flood_regions(chart, image, np.zeros(pixels, np.int64))
+        grown = image.reshape(-1)[texels.pixel[: texels.n_front][own] - page * pixels]
+        region[own] = np.where(grown >= 0, grown, region[own])
+
+
+def _ring_of(buried: NDArray[np.int64], turn: tuple[int, int], size: int) -> tuple[NDArray[np.int64], ...]:
+    """Return row and column of a neighbour of each texel, clipped to the page."""
+    row, column = (np.clip(buried[:, k] + turn[k], 0, size - 1) for k in (0, 1))
+    return row, column
+
+
+def _visible_points(
+    texels: TexelBuffer,
+    surface: Surface,
+    mask: NDArray[np.uint16],
+    buried: NDArray[np.int64],
+    number: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return for the neighbours of buried texels where their points lie.
+
+    Returns
+    -------
+    place : (H, W) int64, row of a texel in what follows, -1 for others
+    point : (m, 16, 2) float64, column and row of its points from its centre, texels
+    seen : (m, 16) bool, visible ones
+    """
+    near = [number[_ring_of(buried, turn, texels.resolution)] for turn in _RING]
+    chosen = np.unique(np.concatenate(near))
+    chosen = chosen[chosen >= 0]
+    chosen = chosen[mask[chosen] != 0]
+    shape = (len(chosen), N_POINTS)
+    point, normal = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
+    triangle, bary = np.zeros(shape, np.int32), np.zeros((*shape, 2), np.float32)
+    every = np.full(len(texels.pixel), 0xFFFF, np.uint16)
+    place_points(surface, every, chosen, _EVERY, point, normal, triangle, bary)
+    weight = np.stack([1.0 - bary.sum(axis=2), bary[..., 0], bary[..., 1]], axis=2)
+    uv = surface.uv[surface.triangle[triangle]].astype(np.float64)
+    where = (weight[..., None] * uv).sum(axis=2) * texels.resolution
+    row, column = np.divmod(texels.pixel[chosen] % texels.resolution**2, texels.resolution)
+    place = np.full(number.shape, -1, np.int64)
+    place[row, column] = np.arange(len(chosen))
+    seen = (mask[chosen, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(bool)
+    return place, where - np.stack([column, row], axis=1)[:, None] - 0.5, seen
+
+
+def _lookups(
+    buried: NDArray[np.int64],
+    chart: NDArray[np.int32],
+    image: NDArray[np.int32],
+    visible: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return (buried texel, region) pairs and how much lookups from the region's points take of the texel."""
+    place, point, seen = visible
+    keys, weights = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    for turn in _RING:
+        row, column = _ring_of(buried, turn, len(chart))
+        beside = place[row, column]
+        same = chart[row, column] == chart[buried[:, 0], buried[:, 1]]
+        use = np.flatnonzero((beside >= 0) & same)
+        away = np.abs(point[beside[use]] + np.array([turn[1], turn[0]]))
+        # What bilinear interpolation takes of a texel at this distance from its centre.
+        tent = np.maximum(1.0 - away, 0.0).prod(axis=2) * seen[beside[use]]
+        keys.append(np.stack([use, image[row[use], column[use]]], axis=1))
+        weights.append(tent.sum(axis=1))
+    pair, index = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
+    total = np.zeros(len(pair))
+    np.add.at(total, index.reshape(-1), np.concatenate(weights))
+    return pair, total
+
+
+def _choose(
+    buried: NDArray[np.int64],
+    image: NDArray[np.int32],
+    pair: NDArray[np.int64],
+    weight: NDArray[np.float64],
+) -> None:
+    """Give each buried texel the region that looks it up most."""
+    order = np.lexsort((pair[:, 1], -weight, pair[:, 0]))
+    order = order[weight[order] > 0]
+    first = np.unique(pair[order, 0], return_index=True)[1]
+    best = pair[order[first]]
+    image[buried[best[:, 0], 0], buried[best[:, 0], 1]] = best[:, 1]
