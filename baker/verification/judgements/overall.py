@@ -29,8 +29,8 @@ OVERALL = Judgement(
     "overall",
     (*FIGURES, "whole_bias", "whole_colour", "whole_noise"),
     {
-        "irradiance": "irradiance.median > 0.08, irradiance.bias > 0.02, irradiance.nrmse > 0.5,"
-        " irradiance.colour_median > 0.1, irradiance.colour_bias > 0.02, irradiance.whole_bias > 0.01,"
+        "irradiance": "irradiance.median > 0.12, irradiance.bias > 0.02, irradiance.nrmse > 0.5,"
+        " irradiance.colour_median > 0.15, irradiance.colour_bias > 0.02, irradiance.whole_bias > 0.01,"
         " irradiance.whole_colour > 0.007, irradiance.whole_noise > 0.08",
         "ao": "ao.median > 0.03, ao.bias > 0.01, ao.rmse > 0.05, ao.whole_bias > 0.005,"
         " ao.whole_noise > 0.05",
