@@ -373,7 +373,7 @@ def _finish(
                     progress=record.progress,
                 )
                 status[page][grown] = TexelStatus.DILATED
-            noisy |= _unconverged(layers)
+            noisy |= _unconverged(layers, texels.chart[:n_front])
             lightmaps[name] = Lightmap(name, channel.unit, value)
             statistics[name] = _statistics(value[chart >= 0], int((~good).sum()))
     flat = status.reshape(-1)
@@ -400,12 +400,17 @@ def _finish(
     )
 
 
-def _unconverged(layers: tuple[Any, ...]) -> NDArray[np.bool_]:
-    """Return the texels whose summed standard error exceeds a share of their value."""
+def _unconverged(layers: tuple[Any, ...], chart: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Return the texels whose summed standard error exceeds a share of their value.
+
+    Dark ones count as a twentieth of the geometric mean of their `chart`, (n_front,) int32.
+    """
     value = sum(layer.value.mean(axis=1) for layer in layers)
     error = np.sqrt(sum(np.square(layer.error) for layer in layers))
     lit = value > 0
-    floor = 0.05 * float(np.median(value[lit])) if lit.any() else 0.0
+    count = np.maximum(np.bincount(chart[lit], minlength=1), 1)
+    middle = np.exp(np.bincount(chart[lit], np.log(value[lit]), len(count)) / count)
+    floor = 0.05 * np.append(middle, 0.0)[np.minimum(chart, len(middle))]
     noisy: NDArray[np.bool_] = error > UNCONVERGED * np.maximum(value, floor)
     noisy &= lit
     return noisy

