@@ -26,6 +26,8 @@ FEWEST = 64
 UNEVEN = 2.5
 # Light below this share of that of the page's brightest chart counts as black.
 BLACK = 1e-10
+# Noise below this share is none.
+QUIET = 0.002
 # Side of such a block, texels.
 BLOCK = 16
 
@@ -94,10 +96,11 @@ def finish_page(
         if not value[plan.valid].any():
             continue
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
-        if denoise and _worth_filtering(plan, error, light):
+        worth = _worth_filtering(plan, error, light) if denoise else None
+        if worth is not None:
             repaired = denoise_page(
                 repaired,
-                plan.covered,
+                plan.covered & worth[plan.chart],
                 plan.chart,
                 standard_error=error,
                 bound=bound,
@@ -145,11 +148,11 @@ def _light(plan: PagePlan, layers: list[PageLayer]) -> _Light:
     return _Light(np.maximum(total, np.maximum(0.1 * mean[group], 1e-30)), group)
 
 
-def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> bool:
-    """Tell whether texels of any brightness are noisy against their own light.
+def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
+    """Return which charts (n_charts,) to filter, None if all are little noisy against their own light.
 
-    The page's mean would say that a dim room beside a sunlit ground has no noise. The filter leaves what has
-    none as it is.
+    The page's mean would say that a dim room beside a sunlit ground has no noise. Charts without any, as that
+    ground, stay out: the filter sets its exposure by all that it sees.
     """
     mean = _mean_of(light.group, light.texel)
     mean = np.maximum(mean, max(BLACK * float(mean.max(initial=0.0)), 1e-30))
@@ -157,7 +160,12 @@ def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) 
     band = np.floor(np.log(mean) / np.log(BAND)).astype(np.int64)
     band = (band - band.min(initial=0))[light.group]
     noise = np.sqrt(_mean_of(band, share * share))
-    return bool((noise[np.bincount(band) >= FEWEST] > NOT_WORTH_FILTERING).any())
+    if not (noise[np.bincount(band) >= FEWEST] > NOT_WORTH_FILTERING).any():
+        return None
+    charts = np.zeros(int(plan.chart.max()) + 1, bool)
+    own = _mean_of(plan.chart[plan.valid].astype(np.int64), share * share)
+    charts[: len(own)] = own > QUIET**2
+    return charts
 
 
 def _mean_of(group: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.float64]:
