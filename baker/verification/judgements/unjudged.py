@@ -52,8 +52,8 @@ UNJUDGED = Judgement(
     ),
     {
         "irradiance": "irradiance.invalid_share > 0.4, irradiance.visible_invalid_share > 0.02,"
-        " irradiance.uncovered_share > 0.1, irradiance.unresolved_share > 0.5, irradiance.gap_share > 0.5",
-        "ao": "ao.unresolved_share > 0.5",
+        " irradiance.uncovered_share > 0.1, irradiance.unresolved_share > 0.75, irradiance.gap_share > 0.5",
+        "ao": "ao.unresolved_share > 0.75",
     },
     judge,
 )  # fmt: skip
