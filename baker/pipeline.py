@@ -309,7 +309,13 @@ def _reflected(
         # Direct light meets the albedo of its own texel; the sky's share is known per patch.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
         solution = solve_radiosity(
-            matrix, source, albedo, patches.area, bounces=settings.bounces, progress=record.progress
+            matrix,
+            source,
+            albedo,
+            patches.area,
+            bounces=settings.bounces,
+            progress=record.progress,
+            threads=thread_count(settings.threads),
         )
         record.solve.update(
             patches=patches.n,

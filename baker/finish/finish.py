@@ -13,6 +13,7 @@ from baker.finish.border import recentre
 from baker.finish.denoise import denoise_page
 from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
+from baker.finish.packing import pack_charts
 
 STAGE = "finish"
 # A layer is left as it was sampled if the noise of all texels of about one brightness is below this share of
@@ -28,6 +29,8 @@ UNEVEN = 2.5
 BLACK = 1e-10
 # Noise below this share is none.
 QUIET = 0.002
+# Where less than one texel in so many is to be filtered, the charts of these are brought together.
+FEW = 3
 # Side of such a block, texels.
 BLOCK = 16
 
@@ -98,21 +101,44 @@ def finish_page(
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
         worth = _worth_filtering(plan, error, light) if denoise else None
         if worth is not None:
-            repaired = denoise_page(
-                repaired,
-                plan.covered & worth[plan.chart],
-                plan.chart,
-                standard_error=error,
-                bound=bound,
-                threads=threads,
-                progress=progress,
-            )
+            # Texels inside geometry have the noise of what they were filled from.
+            error = fill_invalid(error[..., None], plan.chart, plan.valid)[0][..., 0]
+            noisy = PageLayer(repaired, error, bound)
+            repaired = _denoise(noisy, plan.chart, plan.covered & worth[plan.chart], threads, progress)
         centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
         total += np.minimum(centred, _brightest(repaired, plan.valid), out=centred)
     np.clip(total, 0.0, upper, out=total)
     grown_value, grown = dilate(total, plan.covered, plan.chart, dilation, threads=threads)
     np.clip(grown_value, 0.0, np.minimum(_brightest(total, plan.covered), upper), out=grown_value)
     return grown_value, grown
+
+
+def _denoise(
+    layer: PageLayer,
+    chart: NDArray[np.int32],
+    chosen: NDArray[np.bool_],
+    threads: int,
+    progress: Progress,
+) -> NDArray[np.float32]:
+    """Return the page with the chosen texels, whole charts, denoised; a few are brought together first."""
+    value, error = layer.value, layer.error
+    if FEW * np.count_nonzero(chosen) > np.count_nonzero(chart >= 0):
+        return denoise_page(
+            value, chosen, chart, standard_error=error, bound=layer.bound, threads=threads, progress=progress
+        )
+    packed = pack_charts(chart, chosen)
+    filtered = denoise_page(
+        packed.take(value),
+        packed.take(chosen),
+        packed.take(chart, fill=-1),
+        standard_error=packed.take(error),
+        bound=layer.bound,
+        threads=threads,
+        progress=progress,
+    )
+    result = np.array(value)
+    packed.put(filtered, result)
+    return result
 
 
 def _brightest(value: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -160,11 +186,13 @@ def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) 
     band = np.floor(np.log(mean) / np.log(BAND)).astype(np.int64)
     band = (band - band.min(initial=0))[light.group]
     noise = np.sqrt(_mean_of(band, share * share))
-    if not (noise[np.bincount(band) >= FEWEST] > NOT_WORTH_FILTERING).any():
+    worth = ((noise > NOT_WORTH_FILTERING) & (np.bincount(band) >= FEWEST))[band]
+    if not worth.any():
         return None
     charts = np.zeros(int(plan.chart.max()) + 1, bool)
-    own = _mean_of(plan.chart[plan.valid].astype(np.int64), share * share)
-    charts[: len(own)] = own > QUIET**2
+    owner = plan.chart[plan.valid].astype(np.int64)
+    own = _mean_of(owner, share * share)
+    charts[: len(own)] = (own > QUIET**2) & (np.bincount(owner, worth) > 0)
     return charts
 
 

@@ -20,7 +20,10 @@ chapter 12 (iterative refinement).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -35,6 +38,8 @@ STAGE = "solve"
 # Largest error of a patch's light, as a share of that light, at which the solve stops.
 TOLERANCE = 3e-5
 MAX_ITERATIONS = 1000
+# Entries of the matrix that are worth a thread of their own.
+_PART = 250_000
 # Light below this share of a colour's brightest patch is not resolved any further.
 _DARK = 1e-15
 # One run of conjugate gradients reduces a residual by no more than this: their vectors lose their
@@ -81,6 +86,7 @@ def solve_radiosity(
     *,
     bounces: int | None,
     progress: Progress,
+    threads: int = 1,
 ) -> Solution:
     """Solve for the reflected irradiance of patches.
 
@@ -93,6 +99,9 @@ def solve_radiosity(
     bounces : int or None
         Number of reflections; None means until converged. The final gather adds one more bounce from
         these values, so N bounces need N - 1 products here.
+    progress : Progress
+    threads : int
+        Work on the products; each row is one thread's, so the result does not depend on their number.
     """
     report(progress, STAGE, 0.0)
     albedo = np.clip(albedo, MIN_ALBEDO, MAX_ALBEDO)
@@ -100,10 +109,10 @@ def solve_radiosity(
         irradiance = np.zeros_like(source)
         steps = max(bounces - 1, 0)
         for step in range(steps):
-            irradiance = apply(matrix, source + albedo * irradiance)
+            irradiance = apply(matrix, source + albedo * irradiance, threads)
             report(progress, STAGE, (step + 1) / steps)
         return Solution(irradiance, steps, 0.0, 0.0)
-    return _converge(matrix, source, albedo, area[:, None], progress)
+    return _converge(matrix, source, albedo, area[:, None], progress, threads)
 
 
 def _converge(
@@ -112,13 +121,15 @@ def _converge(
     albedo: NDArray[np.float64],
     area: NDArray[np.float64],
     progress: Progress,
+    threads: int,
 ) -> Solution:
     """Solve until every patch has its light; see `solve_radiosity`."""
+    product = partial(apply, matrix, threads=threads)
     exitance = source.copy()
     goal = _Goal(TOLERANCE * (1.0 - albedo), _DARK * source.max(axis=0, initial=0.0))
     iterations = 0
     while True:
-        irradiance = apply(matrix, exitance)
+        irradiance = product(exitance)
         rest = source + albedo * irradiance - exitance
         share = goal.share(rest, exitance)
         if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
@@ -126,7 +137,7 @@ def _converge(
         # What is done counts no more: beside a dim room, even the rounding errors of a bright one are light.
         rest[share <= goal.MARGIN] = 0.0
         before = iterations
-        iterations = _conjugate_gradients(matrix, exitance, rest, albedo, area, goal, progress, before)
+        iterations = _conjugate_gradients(product, exitance, rest, albedo, area, goal, progress, before)
         if iterations == before:
             break
     norms = np.linalg.norm(source, axis=0)
@@ -147,14 +158,26 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
     return [SceneWarning("solve-not-converged", message)]
 
 
-def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
+def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64], threads: int = 1) -> NDArray[np.float64]:
     """Return F exitance, (P, 3) float64: the irradiance that patches of that exitance give each other."""
     irradiance = np.zeros_like(exitance)
-    rows, exitance = (matrix.first, matrix.column, matrix.value), np.ascontiguousarray(exitance)
-    if matrix.tint is None:
-        multiply(*rows, exitance, irradiance)
-    else:
-        multiply_coloured(*rows, matrix.tint, exitance, irradiance)
+    exitance = np.ascontiguousarray(exitance)
+
+    def rows(begin: int, end: int) -> None:
+        first, out = matrix.first[begin : end + 1], irradiance[begin:end]
+        if matrix.tint is None:
+            multiply(first, matrix.column, matrix.value, exitance, out)
+        else:
+            multiply_coloured(first, matrix.column, matrix.value, matrix.tint, exitance, out)
+
+    parts = min(threads, 1 + len(matrix.value) // _PART)
+    if parts == 1:
+        rows(0, len(exitance))
+        return irradiance
+    cut = np.searchsorted(matrix.first, len(matrix.value) * np.arange(1, parts) / parts)
+    cut = np.concatenate([[0], cut, [len(exitance)]])
+    with ThreadPoolExecutor(parts) as pool:
+        list(pool.map(rows, cut[:-1], cut[1:]))
     return irradiance
 
 
@@ -180,7 +203,7 @@ class _Goal:
 
 
 def _conjugate_gradients(
-    matrix: FormFactorMatrix,
+    product: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     exitance: NDArray[np.float64],
     rest: NDArray[np.float64],
     albedo: NDArray[np.float64],
@@ -191,8 +214,8 @@ def _conjugate_gradients(
 ) -> int:
     """Add the solution of (I - rho F) x = rest to `exitance`, both (P, 3), changed in place.
 
-    In the scalar product weighted by A / rho the matrix is symmetric. `iteration` is the number of
-    iterations before, returned is the number after.
+    `product` multiplies by F. In the scalar product weighted by A / rho the matrix is symmetric. `iteration`
+    is the number of iterations before, returned is the number after.
     """
     weight = area / albedo
     direction = rest.copy()
@@ -203,7 +226,7 @@ def _conjugate_gradients(
         done = (goal.share(rest, exitance) <= goal.MARGIN).all(axis=0) | (size <= enough)
         if done.all():
             break
-        image = direction - albedo * apply(matrix, direction)
+        image = direction - albedo * product(direction)
         curvature = (weight * direction * image).sum(axis=0)
         going = ~done & (curvature > 0)
         if not going.any():

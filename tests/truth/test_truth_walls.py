@@ -60,7 +60,7 @@ ROOMS = (
 @pytest.mark.parametrize(("density", "thickness", "double_sided", "sunk"), ROOMS)
 def test_no_light_crosses_the_walls_of_a_closed_room(density, thickness, double_sided, sunk):
     builder, floor, walls, ceiling, beam, shelf = room(density, thickness, double_sided, sunk)
-    result = builder.bake(sky=(SKY, SKY, SKY), samples=32)
+    result = builder.bake(sky=(SKY, SKY, SKY), samples=32, denoise=True)
     dark = DARK * np.pi * SKY
     texel = 1.0 / density
     for quad in (floor, ceiling):

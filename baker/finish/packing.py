@@ -1,0 +1,72 @@
+"""Moves some charts of a page close together, so that a filter works on little more than these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Empty texels between charts: their surroundings are filled by reflection.
+_GAP = 8
+
+
+@dataclass(frozen=True)
+class PackedCharts:
+    """Where the chosen texels of a page lie on a smaller one.
+
+    Attributes
+    ----------
+    source : (n,) int64
+        Row * W + column of each on the page.
+    target : (n,) int64
+        The same on the smaller page.
+    shape : (int, int)
+        Of the smaller page.
+    """
+
+    source: NDArray[np.int64]
+    target: NDArray[np.int64]
+    shape: tuple[int, int]
+
+    def take(self, page: NDArray[Any], fill: float = 0) -> NDArray[Any]:
+        """Return the smaller page (h, w, ...) of a page (H, W, ...), with `fill` between charts."""
+        rest = page.shape[2:]
+        packed = np.full((self.shape[0] * self.shape[1], *rest), fill, page.dtype)
+        packed[self.target] = page.reshape(-1, *rest)[self.source]
+        return packed.reshape(*self.shape, *rest)
+
+    def put(self, packed: NDArray[Any], page: NDArray[Any]) -> None:
+        """Write the smaller page (h, w, ...) back to the chosen texels of `page` (H, W, ...)."""
+        rest = page.shape[2:]
+        page.reshape(-1, *rest)[self.source] = packed.reshape(-1, *rest)[self.target]
+
+
+def pack_charts(chart: NDArray[np.int32], chosen: NDArray[np.bool_]) -> PackedCharts:
+    """Pack the boxes of charts in rows, the tallest first.
+
+    Parameters
+    ----------
+    chart : (H, W) int32
+    chosen : (H, W) bool
+        Texels to pack; those of one chart keep their places to each other.
+    """
+    row, column = np.nonzero(chosen)
+    _, number = np.unique(chart[chosen], return_inverse=True)
+    n = int(number.max()) + 1
+    low, high = np.full((n, 2), max(chart.shape)), np.zeros((n, 2), np.int64)
+    place = np.stack([row, column], axis=1)
+    np.minimum.at(low, number, place)
+    np.maximum.at(high, number, place)
+    size = high - low + 1 + _GAP
+    width = max(int(np.sqrt(1.2 * size.prod(axis=1).sum())), int(size[:, 1].max()))
+    corner = np.zeros((n, 2), np.int64)
+    x = y = shelf = 0
+    for k in np.argsort(-size[:, 0], kind="stable"):
+        if x + size[k, 1] > width:
+            x, y, shelf = 0, y + shelf, 0
+        corner[k] = y, x
+        x, shelf = x + int(size[k, 1]), max(shelf, int(size[k, 0]))
+    moved = place + (corner - low)[number]
+    return PackedCharts(row * chart.shape[1] + column, moved[:, 0] * width + moved[:, 1], (y + shelf, width))
