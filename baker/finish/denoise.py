@@ -31,6 +31,7 @@ from baker.finish.oidn import MEMORY_MB, denoiser_name, filter_lightmap
 from baker.finish.page import check_page
 from baker.finish.slope import noisy_planes
 from baker.finish.tiles import over_rows
+from baker.kernels.page_charts import chart_sums
 from baker.kernels.page_fill import nearest_texel, reflect_outwards
 from baker.kernels.page_guard import hold_to_samples
 
@@ -130,14 +131,20 @@ def _levels(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """Return (H, W, 1) what to divide each chart by; 1 for charts about as bright as the page's median."""
-    own = chart[covered]
-    mean = np.bincount(own, value[covered] @ LUMINANCE) / np.maximum(np.bincount(own), 1)
+    n = int(chart.max(initial=-1)) + 1
+    total, count = np.zeros(n), np.zeros(n, np.int64)
+    chart_sums(value, LUMINANCE, chart, covered, total, count)
+    mean = total / np.maximum(count, 1)
     level = np.ones((*chart.shape, 1), np.float32)
-    lit = mean[own] > 0.0
-    if lit.any():
-        middle = np.median(mean[own][lit])
+    lit = np.flatnonzero(mean > 0.0)
+    if len(lit):
+        # Of the texels, not of the charts.
+        order = lit[np.argsort(mean[lit], kind="stable")]
+        middle = mean[order[np.searchsorted(np.cumsum(count[order]), 0.5 * count[order].sum())]]
         ratio = np.where(mean > 0.0, mean / middle, 1.0)
-        level[covered, 0] = np.where(np.maximum(ratio, 1.0 / ratio) > LEVEL, ratio, 1.0)[own]
+        far = np.maximum(ratio, 1.0 / ratio) > LEVEL
+        if far.any():
+            level[covered, 0] = np.where(far, ratio, 1.0)[chart[covered]]
     return level
 
 

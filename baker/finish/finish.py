@@ -29,8 +29,8 @@ UNEVEN = 2.5
 BLACK = 1e-10
 # Noise below this share is none.
 QUIET = 0.002
-# Where less than one texel in so many is to be filtered, the charts of these are brought together.
-FEW = 3
+# The charts to filter are brought together if that takes less than this share of the charts' area.
+SMALLER = 0.9
 # Side of such a block, texels.
 BLOCK = 16
 
@@ -101,15 +101,15 @@ def finish_page(
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
         worth = _worth_filtering(plan, error, light) if denoise else None
         if worth is not None:
-            # Texels inside geometry have the noise of what they were filled from.
-            error = fill_invalid(error[..., None], plan.chart, plan.valid)[0][..., 0]
+            # The noise of texels inside geometry is none of those around them.
+            error = np.where(plan.valid, error, np.float32(0.0))
             noisy = PageLayer(repaired, error, bound)
             repaired = _denoise(noisy, plan.chart, plan.covered & worth[plan.chart], threads, progress)
         centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
-        total += np.minimum(centred, _brightest(repaired, plan.valid), out=centred)
+        total += np.minimum(centred, _brightest(repaired), out=centred)
     np.clip(total, 0.0, upper, out=total)
     grown_value, grown = dilate(total, plan.covered, plan.chart, dilation, threads=threads)
-    np.clip(grown_value, 0.0, np.minimum(_brightest(total, plan.covered), upper), out=grown_value)
+    np.clip(grown_value, 0.0, np.minimum(_brightest(total), upper), out=grown_value)
     return grown_value, grown
 
 
@@ -122,11 +122,12 @@ def _denoise(
 ) -> NDArray[np.float32]:
     """Return the page with the chosen texels, whole charts, denoised; a few are brought together first."""
     value, error = layer.value, layer.error
-    if FEW * np.count_nonzero(chosen) > np.count_nonzero(chart >= 0):
+    n_chosen, n_all = np.count_nonzero(chosen), np.count_nonzero(chart >= 0)
+    packed = pack_charts(chart, chosen) if n_chosen < n_all else None
+    if packed is None or packed.shape[0] * packed.shape[1] > SMALLER * n_all:
         return denoise_page(
             value, chosen, chart, standard_error=error, bound=layer.bound, threads=threads, progress=progress
         )
-    packed = pack_charts(chart, chosen)
     filtered = denoise_page(
         packed.take(value),
         packed.take(chosen),
@@ -141,9 +142,9 @@ def _denoise(
     return result
 
 
-def _brightest(value: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _brightest(value: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the largest value of each channel (C,): what is moved or continued must not be brighter."""
-    brightest: NDArray[np.float32] = value[where].max(axis=0, initial=0.0)
+    brightest: NDArray[np.float32] = value.reshape(-1, value.shape[2]).max(axis=0, initial=0.0)
     return brightest
 
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.kernels.page_charts import chart_boxes
+
 # Empty texels between charts: their surroundings are filled by reflection.
 _GAP = 8
 
@@ -52,21 +54,20 @@ def pack_charts(chart: NDArray[np.int32], chosen: NDArray[np.bool_]) -> PackedCh
     chosen : (H, W) bool
         Texels to pack; those of one chart keep their places to each other.
     """
-    row, column = np.nonzero(chosen)
-    _, number = np.unique(chart[chosen], return_inverse=True)
-    n = int(number.max()) + 1
-    low, high = np.full((n, 2), max(chart.shape)), np.zeros((n, 2), np.int64)
-    place = np.stack([row, column], axis=1)
-    np.minimum.at(low, number, place)
-    np.maximum.at(high, number, place)
-    size = high - low + 1 + _GAP
+    n = int(chart.max()) + 1
+    low, high = np.full((n, 2), max(chart.shape), np.int64), np.full((n, 2), -1, np.int64)
+    chart_boxes(chart, chosen, low, high)
+    size = np.where(high >= 0, high - low + 1 + _GAP, 0)
     width = max(int(np.sqrt(1.2 * size.prod(axis=1).sum())), int(size[:, 1].max()))
     corner = np.zeros((n, 2), np.int64)
     x = y = shelf = 0
-    for k in np.argsort(-size[:, 0], kind="stable"):
+    for k in np.argsort(-size[:, 0], kind="stable")[: np.count_nonzero(size[:, 0])]:
         if x + size[k, 1] > width:
             x, y, shelf = 0, y + shelf, 0
         corner[k] = y, x
         x, shelf = x + int(size[k, 1]), max(shelf, int(size[k, 0]))
-    moved = place + (corner - low)[number]
-    return PackedCharts(row * chart.shape[1] + column, moved[:, 0] * width + moved[:, 1], (y + shelf, width))
+    source = np.flatnonzero(chosen)
+    row, column = np.divmod(source, chart.shape[1])
+    shift = (corner - low)[chart.reshape(-1)[source]]
+    target = (row + shift[:, 0]) * width + column + shift[:, 1]
+    return PackedCharts(source, target, (y + shelf, width))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels import page_slope
+from baker.kernels.page_charts import chart_maxima
 from baker.kernels.page_slope import N_CHANNEL_COLUMNS, N_COLUMNS, window_sums
 
 RADIUS = 2
@@ -220,7 +221,7 @@ def highest_of_charts(
 ) -> NDArray[np.float32]:
     """Return the largest value of each chart's covered texels, (n_charts, C) float32; -inf if it has none."""
     highest = np.full((int(chart.max(initial=-1)) + 1, value.shape[2]), -np.inf, np.float32)
-    np.maximum.at(highest, chart[covered], value[covered])
+    chart_maxima(value, chart, covered, highest)
     return highest
 
 

@@ -1,0 +1,53 @@
+"""What the charts of a lightmap page hold: largest values, mean light, boxes."""
+
+from __future__ import annotations
+
+from baker.trace.jit import kernel, larger, smaller
+
+
+@kernel
+def chart_maxima(value, chart, covered, highest):  # type: ignore[no-untyped-def]
+    """Raise `highest` (n_charts, C) float32 to the largest value of each chart's covered texels.
+
+    value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
+    """
+    height, width, channels = value.shape
+    for r in range(height):
+        for c in range(width):
+            if covered[r, c]:
+                for j in range(channels):
+                    highest[chart[r, c], j] = larger(highest[chart[r, c], j], value[r, c, j])
+
+
+@kernel
+def chart_sums(value, weight, chart, covered, total, count):  # type: ignore[no-untyped-def]
+    """Add the weighted sum over channels of covered texels to `total`, and 1 to `count`, of their chart.
+
+    value : (H, W, C) float32; weight : (C,) float32; chart : (H, W) int32; covered : (H, W) bool
+    total : (n_charts,) float64; count : (n_charts,) int64
+    """
+    height, width, channels = value.shape
+    for r in range(height):
+        for c in range(width):
+            if covered[r, c]:
+                light = 0.0
+                for j in range(channels):
+                    light += value[r, c, j] * weight[j]
+                total[chart[r, c]] += light
+                count[chart[r, c]] += 1
+
+
+@kernel
+def chart_boxes(chart, chosen, low, high):  # type: ignore[no-untyped-def]
+    """Write the first and last row and column of each chart's chosen texels.
+
+    chart : (H, W) int32; chosen : (H, W) bool
+    low, high : (n_charts, 2) int64, on entry larger than the page, and -1
+    """
+    height, width = chart.shape
+    for r in range(height):
+        for c in range(width):
+            if chosen[r, c]:
+                k = chart[r, c]
+                low[k, 0], high[k, 0] = smaller(low[k, 0], r), larger(high[k, 0], r)
+                low[k, 1], high[k, 1] = smaller(low[k, 1], c), larger(high[k, 1], c)
