@@ -54,3 +54,36 @@ def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
                 region[rr, cc] = region[r, c]
                 queue[end] = rr * width + cc
                 end += 1
+
+
+@kernel
+def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):  # type: ignore[no-untyped-def]
+    """List neighbouring entries of one chart and side; return how many pairs were written.
+
+    pixel (n,) int64, back (n,) bool, chart (n,) int32, lookup (P * H * W,) int32 and back_entry (n_front,)
+    int32: see `TexelBuffer`; size : int, of a page
+    chosen : (n,) bool; both : bool, whether both entries of a pair must be chosen, or one of them
+    pair : (2 n, 2) int32 output
+    """
+    found = 0
+    for i in range(len(pixel)):
+        if both and not chosen[i]:
+            continue
+        rest = pixel[i] % (size * size)
+        for turn in range(2):
+            if (rest % size if turn == 0 else rest // size) == size - 1:
+                continue
+            beside = pixel[i] + (1 if turn == 0 else size)
+            j = lookup[beside]
+            if j < 0 or pixel[j] != beside:
+                continue
+            if back[i]:
+                j = back_entry[j]
+                if j < 0:
+                    continue
+            if chart[j] != chart[i]:
+                continue
+            if (chosen[i] and chosen[j]) if both else (chosen[i] or chosen[j]):
+                pair[found, 0], pair[found, 1] = i, j
+                found += 1
+    return found

@@ -42,8 +42,11 @@ HIGH, LOW = 0.25, 0.02
 _REACH = 0.55
 # Corners of a texel's surface are examined at this share of their distance from its middle.
 _CORNER = 0.98
+# Corners closer than this, in texels, are one.
+_SAME = 1.0e-4
 # Memory of the kernels.
 _points, _heights = scratch((1, LANES, 3), np.float32), scratch((1, LANES), np.float32)
+_places = scratch((LANES, 2), np.float64)
 _frame = scratch((12 * LANES,), np.float32)
 
 
@@ -231,7 +234,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
     pixels, fronts, back = surface.pixel, surface.front, surface.back
     starts, entry, size = surface.first, surface.entry, surface.size
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
-    point, facing, headroom = _points(), _points(), _heights()
+    point, facing, headroom, seen = _points(), _points(), _heights(), _places()
     cast = 0
     for m in range(len(chosen)):
         hidden[m] = 0
@@ -254,6 +257,15 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
                 cy += cut[j, 1] / n
             a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
             for j in range(n):
+                # Corners that pieces share are examined once.
+                known = False
+                for k in range(found):
+                    known = known or (
+                        abs(seen[k, 0] - cut[j, 0]) < _SAME and abs(seen[k, 1] - cut[j, 1]) < _SAME
+                    )
+                if known:
+                    continue
+                seen[found, 0], seen[found, 1] = cut[j, 0], cut[j, 1]
                 x = x0 + cx + _CORNER * (cut[j, 0] - cx)
                 y = y0 + cy + _CORNER * (cut[j, 1] - cy)
                 place(

@@ -24,7 +24,7 @@ from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.form_factor import SPLIT
 from baker.kernels.hits import HitTable
-from baker.kernels.regions import join_linked
+from baker.kernels.regions import join_linked, neighbour_pairs
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
 from baker.kernels.sides import (
@@ -183,7 +183,7 @@ def split_texels(
     groups, rays = _group(surface, mask, suspect[mask[suspect] != 0], side, tracer, threads, progress)
     rays += int(cast.sum())
     entries = _cut(texels, surface, mask, side, groups)
-    pair = _of_sides(neighbours(texels, suspect), groups)
+    pair = _of_sides(neighbours(texels, crossed != 0), groups)
     # A surface between two whole texels is met from both.
     doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
     doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
@@ -195,7 +195,7 @@ def split_texels(
     cut = np.unique(entries.texels.chart[np.concatenate([pair[~connected].reshape(-1), groups.owner])])
     quiet = np.isin(texels.chart, cut) & (crossed == 0)
     seen = pair[connected & np.isin(entries.texels.chart[pair[:, 0]], cut)]
-    link = np.concatenate([seen, neighbours(texels, np.flatnonzero(quiet), crossed == 0)])
+    link = np.concatenate([seen, neighbours(texels, quiet, both=True)])
     backs, more = _back_share(entries, groups, table, tracer, seed)
     return _keep_largest(entries, groups, link, cut, backs, rays + more)
 
@@ -274,45 +274,29 @@ def _cut(
     return _Entries(texels, surface, mask, np.concatenate([side, side[extra]]))
 
 
-def neighbours(
-    texels: TexelBuffer, chosen: NDArray[np.int64], allowed: NDArray[np.bool_] | None = None
-) -> NDArray[np.int32]:
-    """Return pairs of neighbouring entries of one chart and side, of which one at least is chosen.
+def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = False) -> NDArray[np.int32]:
+    """Return pairs of neighbouring entries of one chart and side.
 
     Parameters
     ----------
     texels : TexelBuffer
         Fronts and backs.
-    chosen : (m,) int64
-    allowed : (n,) bool, optional
-        Entries that the chosen ones may be paired with; default all.
+    chosen : (n,) bool
+        Entries of which a pair holds at least one.
+    both : bool
+        Whether it must hold two.
 
     Returns
     -------
     pair : (p, 2) int32
         Each pair once.
     """
-    size = texels.resolution
-    own = np.zeros(texels.n, bool)
-    own[chosen] = True
-    pixel, back, chart = texels.pixel[chosen], texels.back[chosen], texels.chart[chosen]
-    found = [np.zeros((0, 2), np.int32)]
-    for down, right in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-        edge = pixel % size == (size - 1 if right > 0 else 0) if right else np.zeros(len(pixel), bool)
-        if down:
-            edge = pixel // size % size == (size - 1 if down > 0 else 0)
-        beside = np.where(edge, pixel, pixel + down * size + right)
-        other = texels.lookup[beside]
-        inside = ~edge & (other >= 0) & (texels.pixel[other] == beside)
-        other = np.where(back, texels.back_entry[other], other)
-        inside &= (other >= 0) & (texels.chart[other] == chart)
-        if allowed is not None:
-            inside &= allowed[other]
-        if down + right < 0:
-            # The other one, if chosen, has found this pair.
-            inside &= ~own[other]
-        found.append(np.stack([chosen[inside], other[inside]], axis=1).astype(np.int32))
-    return np.concatenate(found)
+    pair = np.empty((2 * texels.n, 2), np.int32)
+    n = neighbour_pairs(
+        texels.pixel, texels.back, texels.chart, texels.lookup, texels.back_entry, texels.resolution,
+        chosen, both, pair,
+    )  # fmt: skip
+    return pair[:n].copy()
 
 
 def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
