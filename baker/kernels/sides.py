@@ -41,21 +41,19 @@ HIGH, LOW = 0.25, 0.02
 # exactly between two texels is met from both.
 _REACH = 0.55
 # Corners of a texel's surface are examined at this share of their distance from its middle.
-_CORNER = 0.98
-# Corners closer than this, in texels, are one.
-_SAME = 1.0e-4
+_CORNER = 0.998
 # Memory of the kernels.
 _points, _heights = scratch((1, LANES, 3), np.float32), scratch((1, LANES), np.float32)
-_places = scratch((LANES, 2), np.float64)
 _frame = scratch((12 * LANES,), np.float32)
 
 
 @kernel
 def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[no-untyped-def]
-    """Find texels that some surface may pass through: a diagonal just above their square is blocked.
+    """Find texels that some surface may pass through: a line just above their square is blocked.
 
     Entries begin to end are examined.
-    crossed : (n,) uint8 output, 1 where one of two diagonals is blocked at one of two heights
+    crossed : (n,) uint8 output, 1 where one of two diagonals is blocked at one of two heights, or one of the
+        four edges at the upper one
     side : (n,) float32 output, metres, root mean square of the two sides of the whole texel
     Returns the number of rays cast.
     """
@@ -97,23 +95,37 @@ def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[
             for axis in range(3):
                 frame[(9 + axis) * LANES + lane] = sign * face[t, axis]
             crossed[group + lane] = 0
-        for turn in range(4):
-            height = _f(HIGH if turn < 2 else LOW)
+        for turn in range(8):
+            # Two diagonals high and low, then four edges.
+            height = _f(LOW if turn == 2 or turn == 3 else HIGH)
             row = 3 + 3 * (turn % 2)
             for lane in range(LANES):
                 on[lane] = 0
             for lane in range(lanes):
+                if crossed[group + lane] != 0:
+                    continue
                 x = frame[lane] + height * frame[9 * LANES + lane]
                 y = frame[LANES + lane] + height * frame[10 * LANES + lane]
                 z = frame[2 * LANES + lane] + height * frame[11 * LANES + lane]
                 ex, ey, ez = (
-                    frame[row * LANES + lane],
-                    frame[(row + 1) * LANES + lane],
+                    frame[row * LANES + lane], frame[(row + 1) * LANES + lane],
                     frame[(row + 2) * LANES + lane],
-                )
-                if crossed[group + lane] == 0:
+                )  # fmt: skip
+                cast += 1
+                if turn < 4:
                     on[lane] = segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
-                    cast += 1
+                    continue
+                # From one end of a diagonal to one of the other.
+                to = 9 - row
+                fx, fy, fz = (
+                    frame[to * LANES + lane], frame[(to + 1) * LANES + lane], frame[(to + 2) * LANES + lane]
+                )  # fmt: skip
+                way = _f(1.0) if turn < 6 else _f(-1.0)
+                back_way = way if row == 3 else -way
+                on[lane] = segment(
+                    rays, lane, x + way * ex, y + way * ey, z + way * ez,
+                    x + back_way * fx, y + back_way * fy, z + back_way * fz,
+                )  # fmt: skip
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
                 if on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0):
@@ -221,9 +233,10 @@ def group_points(origin, normal, height, mask, caster, label):  # type: ignore[n
 
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, hidden):  # type: ignore[no-untyped-def]
-    """Find texels with a corner of their surface that none of their points sees.
+    """Find texels with a corner of their surface that none of their points sees, or with a blocked outline.
 
-    A surface that passes close to a corner leaves no point behind itself, but rays may hit what lies there.
+    A surface that cuts off a corner leaves no point behind itself, but rays may hit what lies there. An edge
+    between two walls may reach into a texel through one side of it: then the way along that side is blocked.
 
     chosen : (m,) int64, texel entries; origin, normal : (m, 16, 3) float32; height : (m, 16) float32
     mask : (m,) uint16, see `group_points`; side : (m,) float32, metres; hidden : (m,) uint8 output
@@ -234,7 +247,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
     pixels, fronts, back = surface.pixel, surface.front, surface.back
     starts, entry, size = surface.first, surface.entry, surface.size
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
-    point, facing, headroom, seen = _points(), _points(), _heights(), _places()
+    point, facing, headroom = _points(), _points(), _heights()
     cast = 0
     for m in range(len(chosen)):
         hidden[m] = 0
@@ -242,7 +255,6 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
         rest = pixels[i] % (size * size)
         x0, y0 = rest % size, rest // size
         front = fronts[i]
-        found = 0
         for e in range(starts[front], starts[front + 1]):
             t = entry[e]
             for j in range(3):
@@ -257,33 +269,17 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
                 cy += cut[j, 1] / n
             a, b, c, d, g, h = inverse_uv(uv, triangle, size, t)
             for j in range(n):
-                # Corners that pieces share are examined once.
-                known = False
-                for k in range(found):
-                    known = known or (
-                        abs(seen[k, 0] - cut[j, 0]) < _SAME and abs(seen[k, 1] - cut[j, 1]) < _SAME
-                    )
-                if known:
-                    continue
-                seen[found, 0], seen[found, 1] = cut[j, 0], cut[j, 1]
                 x = x0 + cx + _CORNER * (cut[j, 0] - cx)
                 y = y0 + cy + _CORNER * (cut[j, 1] - cy)
                 place(
                     position, shading, face, triangle, least, t, a * x + b * y + c, d * x + g * y + h,
-                    back[i], point, facing, 0, found,
+                    back[i], point, facing, 0, j,
                 )  # fmt: skip
-                found += 1
-                if found == LANES:
-                    cast += _look_for_corners(
-                        point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
-                    )
-                    found = 0
+            cast += _look_for_corners(
+                point, facing, headroom, n, m, origin, normal, height, mask, side, caster, hidden
+            )
             if hidden[m] != 0:
                 break
-        if found > 0 and hidden[m] == 0:
-            cast += _look_for_corners(
-                point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
-            )
     return cast
 
 
@@ -304,7 +300,10 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 def _look_for_corners(  # type: ignore[no-untyped-def]
     point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
 ):
-    """Set hidden[m] if one of `found` corners (1, 16, 3) is seen by no point of item m; return rays cast."""
+    """Set hidden[m] if no point of item m sees one of `found` corners (1, 16, 3), or one not the next.
+
+    Returns the number of rays cast.
+    """
     on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
     high = _f(HIGH) * side[m]
     for k in range(LANES):
@@ -320,6 +319,26 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
     )
     for j in range(found):
         headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * LANES + j])
+    for j in range(LANES):
+        on[j] = 0
+    for j in range(found):
+        to = j + 1 if j + 1 < found else 0
+        h = smaller(headroom[0, j], headroom[0, to])
+        on[j] = segment(
+            rays, j,
+            point[0, j, 0] + h * facing[0, j, 0], point[0, j, 1] + h * facing[0, j, 1],
+            point[0, j, 2] + h * facing[0, j, 2],
+            point[0, to, 0] + h * facing[0, to, 0], point[0, to, 1] + h * facing[0, to, 1],
+            point[0, to, 2] + h * facing[0, to, 2],
+        )  # fmt: skip
+    trace_lanes(
+        caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+    )
+    for j in range(found):
+        if on[j] != 0 and rays[TFAR * LANES + j] < _f(0.0):
+            hidden[m] = 1
+    if hidden[m] != 0:
+        return 2 * found
     bits = np.int64(mask[m])
     first = 0
     while first + 1 < N_POINTS and bits != 0 and (bits >> first) & 1 == 0:
@@ -334,7 +353,7 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
     for j in range(found):
         if on[j] == 0 or rays[TFAR * LANES + j] < _f(0.0):
             left |= np.int64(1) << j
-    cast = 2 * found
+    cast = 3 * found
     for j in range(found):
         if (left >> j) & 1 == 0:
             continue

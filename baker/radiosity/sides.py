@@ -291,7 +291,7 @@ def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = F
     pair : (p, 2) int32
         Each pair once.
     """
-    pair = np.empty((2 * texels.n, 2), np.int32)
+    pair = np.zeros((2 * texels.n, 2), np.int32)
     n = neighbour_pairs(
         texels.pixel, texels.back, texels.chart, texels.lookup, texels.back_entry, texels.resolution,
         chosen, both, pair,

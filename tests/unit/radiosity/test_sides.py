@@ -158,3 +158,25 @@ def test_the_same_for_any_number_of_threads():
     for name in ("mask", "owner", "member", "link"):
         assert getattr(one, name).tobytes() == getattr(three, name).tobytes()
     assert one.texels.region.tobytes() == three.texels.region.tobytes()
+
+
+@pytest.mark.parametrize("apex", [(0.31, 0.12), (-0.44, 0.57), (0.02, -0.83)])
+def test_a_corner_of_two_walls_is_found_in_every_texel_that_it_reaches_into(apex):
+    x, z = apex
+    walls = [
+        Quad((x, 0.0, z), edge, (0, 1.0, 0), grey(double_sided=True))
+        for edge in ((3.0, 0, 2.6), (3.0, 0, -2.9))
+    ]
+    world = floor_and(*walls)
+    sides = cut(world)
+    floor = np.flatnonzero((world.texels.instance == 0) & ~world.texels.back)
+    # The floor's texels are squares along x and z around these places, but for those at its border.
+    metres = 4.0 / (SIZE // 2 - 1.6)
+    whole = floor[np.abs(world.texels.position[floor][:, [0, 2]]).max(axis=1) < 1.8]
+    spot = (np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1).reshape(-1, 2) + 0.5) / 40 - 0.5
+    place = world.texels.position[whole][:, None, [0, 2]] + 0.996 * metres * spot
+    dx, dz = place[..., 0] - x, place[..., 1] - z
+    within = (dx > 0) & (dz < dx * 2.6 / 3.0) & (dz > -dx * 2.9 / 3.0)
+    both = within.any(axis=1) & ~within.all(axis=1)
+    assert both.sum() > 15
+    assert set(whole[both]) <= set(sides.owner)
