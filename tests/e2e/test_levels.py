@@ -96,8 +96,7 @@ def test_a_shut_garage_is_dark_whatever_reaches_through_its_walls():
 
 
 def test_rooms_of_a_sunlit_street_have_their_own_light():
-    # Not denoised: each place then tells of its own rays alone.
-    probe, sun = bake("street", 256, denoise=False), 50_000.0
+    probe, sun = bake("street", 256), 50_000.0
     shut = [(-8 + a, 0, -3 + b, UP) for a in (-1.4, 0, 1.4) for b in (-1.4, 0, 1.4)]
     shut += [(-10, 1.2, -3, EAST), (-8, 2.55, -3, DOWN), (-7, 1, -1, NORTH)]
     assert light(probe, shut).max() < AWAY * sun
