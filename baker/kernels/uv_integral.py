@@ -38,8 +38,9 @@ _corner_memory, _totals, _sizes = (scratch(shape, np.float64) for shape in ((3, 
 class RowSums(NamedTuple):
     """Running sums along the rows of one texture's finest level.
 
-    block (H, W // 32 + 1, 4) float64: sums of the texels before each 32nd; weight (3,) float64: factor of
-    each channel in the sum of squares; texture int, number in the pack.
+    block (H, W // 32 + 1, 4) float64: sums of the texels before each 32nd; weight (4,) float64: factor of
+    each channel in the sum of squares, and 1 if the fourth column is the variance inside each texel, else 0;
+    texture int, number in the pack.
     """
 
     block: NDArray[np.float64]
@@ -71,7 +72,7 @@ def fill_row_sums(pixels, offset, weight, block):  # type: ignore[no-untyped-def
 
 @inner
 def _add_texel(pixels, at, weight, sums):  # type: ignore[no-untyped-def]
-    square = 0.0
+    square = weight[3] * np.float64(pixels[at, 3])
     for c in range(3):
         value = np.float64(pixels[at, c])
         sums[c] += value
@@ -142,9 +143,11 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: igno
         for a in range(2):
             share = (x - i if a else 1.0 - (x - i)) * (y - j if b else 1.0 - (y - j))
             _read(pixels, w, weight, _wrapped(j + b, h, wrap[1]), _wrapped(i + a, w, wrap[0]), spare)
+            within = spare[3]
             for c in range(3):
                 out[c] += share * spare[c]
-    out[3] = 0.0
+                within -= weight[c] * spare[c] * spare[c]
+            out[3] += share * weight[3] * within
     for c in range(3):
         out[3] += weight[c] * out[c] * out[c]
 

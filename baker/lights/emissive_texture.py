@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.textures import TexturePack
-from baker.kernels.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums, uv_means
+from baker.kernels.uv_integral import uv_means
+from baker.lights.texture_levels import TextureLevels, fair_limit
 
 # A triangle whose noise is lower is cut no further.
 ENOUGH = 0.05
@@ -26,8 +27,13 @@ ENOUGH = 0.05
 _SMALLEST = 2.0**-14
 # Parts are cut together whose gain is within this factor of the largest.
 _TOGETHER = 0.125
-# Texels that an edge may cross; triangles of more repeats than that are averaged over as many as fit.
-_MOST_CROSSED = 1 << 22
+# Texel lines that the edges of all parts may cross together, about a second. What would cross more is
+# averaged over a smaller version of its texture; parts that cross no more than the second number never are.
+MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
+# A round of cutting may always use this share of what is left of them.
+_ROUND = 0.25
+# Lines that are crossed in one call of the kernel: signals are handled between two.
+_CALL = 2.5e5
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,9 @@ class EmissiveTextures:
         key = np.column_stack([texture, scaled])
         kinds, kind = np.unique(key, axis=0, return_inverse=True)
         self.kind = kind.reshape(-1)
-        self.sums = [row_sums(pack, int(row[0]), row[1:] ** 2) for row in kinds]
+        self.levels = [TextureLevels(pack, int(row[0]), row[1:] ** 2) for row in kinds]
+        # Texel lines that may still be crossed.
+        self.left = MOST_CROSSED
         # Texels that each triangle is wide, the larger of both axes.
         self.texels = np.zeros(len(uv))
         self._bring_near()
@@ -91,46 +99,49 @@ class EmissiveTextures:
         return cls(shading.pack, shading.emission_texture[material], factor, uv.astype(np.float64))
 
     def _bring_near(self) -> None:
-        """Move uv by whole repeats to the first ones, and shrink what has too many of them to count."""
-        for k, sums in enumerate(self.sums):
+        """Move uv by whole repeats to the first ones."""
+        for k, levels in enumerate(self.levels):
             own = np.flatnonzero(self.kind == k)
-            uv, size = self.uv[own], np.array(self.pack.level[sums.texture, 0, 1:])
-            repeats = self.pack.wrap[sums.texture, :2] != 2
+            uv = self.uv[own]
+            repeats = levels.wrap[:2] != 2
             uv -= np.where(repeats, 2.0 * np.floor(0.5 * uv.min(axis=1)), 0.0)[:, None]
-            texels = np.ptp(uv, axis=1) * size
-            self.texels[own] = texels.max(axis=1)
-            crossed = texels * repeats
-            shrink = np.minimum(_MOST_CROSSED / np.maximum(crossed, 1.0), 1.0)
-            self.uv[own] = uv * shrink[:, None]
+            self.texels[own] = (np.ptp(uv, axis=1) * levels.size).max(axis=1)
+            self.uv[own] = uv
 
     def means(
-        self, owner: NDArray[np.int64], inside: NDArray[np.float64]
+        self, owner: NDArray[np.int64], inside: NDArray[np.float64], ahead: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean radiance (m, 3) and spread (m,) of parts; see `Parts`."""
+        """Return mean radiance (m, 3) and spread (m,) of parts, see `Parts`; `ahead` may be asked for yet."""
         corner = self.uv[owner]
         edge = corner[:, 1:] - corner[:, :1]
         first = corner[:, 0] + np.einsum("mk,mka->ma", inside[:, :2], edge)
         size = inside[:, 2, None]
         uv = np.stack([first, first + size * edge[:, 0], first + size * edge[:, 1]], axis=1)
         mean, spread = np.zeros((len(owner), 3)), np.zeros(len(owner))
-        pack = self.pack
-        for k in np.unique(self.kind[owner]):
-            own = np.flatnonzero(self.kind[owner] == k)
-            sums = self.sums[k]
-            offset, w, h = (int(x) for x in pack.level[sums.texture, 0])
-            part, varied = np.zeros((len(own), 3)), np.zeros(len(own))
-            pixels, wrap = pack.pixels[offset : offset + w * h], pack.wrap[sums.texture]
-            uv_means(uv[own], pixels, w, h, wrap, sums.weight, sums.block, part, varied)
-            mean[own], spread[own] = part * self.factor[owner[own]], varied
-        return mean, spread
-
-
-def row_sums(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> RowSums:
-    """Return the running sums of a texture of the pack."""
-    offset, w, h = (int(x) for x in pack.level[texture, 0])
-    block = np.zeros((h, w // BLOCK + 1, N_SUMS))
-    fill_row_sums(pack.pixels[offset : offset + w * h], 0, weight, block)
-    return RowSums(block, weight, texture)
+        kind = self.kind[owner]
+        members = [(self.levels[k], np.flatnonzero(kind == k)) for k in np.unique(kind)]
+        lines = np.zeros((len(owner), 2))
+        for levels, own in members:
+            lines[own] = levels.crossed(uv[own])
+        share = max(_ROUND, len(owner) / max(ahead, len(owner)))
+        most = max(fair_limit(lines.sum(axis=1), share * self.left), FEW_CROSSED)
+        for levels, own in members:
+            halved, crossed = levels.choose(lines[own], most)
+            self.left = max(self.left - float(crossed.sum()), 0.0)
+            call = (np.cumsum(crossed) // _CALL).astype(np.int64)
+            group, number = np.unique(np.column_stack([halved, call]), axis=0, return_inverse=True)
+            order = np.argsort(number.reshape(-1), kind="stable")
+            ends = np.cumsum(np.bincount(number.reshape(-1)))
+            for row, which in zip(group, np.split(order, ends[:-1]), strict=True):
+                level, at = levels.at(int(row[0]), int(row[1])), uv[own[which]]
+                for axis in range(2):
+                    if levels.is_constant(axis, int(row[axis])):
+                        at[:, :, axis] = 0.0
+                part, varied = np.zeros((len(at), 3)), np.zeros(len(at))
+                weight, block = level.sums.weight, level.sums.block
+                uv_means(at, level.pixels, level.w, level.h, levels.wrap, weight, block, part, varied)
+                mean[own[which]], spread[own[which]] = part, varied
+        return mean * self.factor[owner], spread
 
 
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -156,7 +167,7 @@ def cut(
     owner = np.arange(n)
     inside = np.tile([0.0, 0.0, 1.0], (n, 1))
     finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
-    mean, spread = _means_of_parts(textures, owner, inside, finest)
+    mean, spread = _means_of_parts(textures, owner, inside, finest, n + 4 * max(most // 3, 0))
     whole = area * brightness(mean)
     # Half of the parts go where the power is, half to all alike: a dim room has lamps of its own.
     lit = max(int((whole > 0).sum()), 1)
@@ -175,7 +186,7 @@ def cut(
         child[chosen] = len(owner) + 4 * np.arange(len(chosen))
         quarter = _quarters(inside[chosen]).reshape(-1, 3)
         fresh = np.repeat(owner[chosen], 4)
-        quarter_mean, quarter_spread = _means_of_parts(textures, fresh, quarter, finest)
+        quarter_mean, quarter_spread = _means_of_parts(textures, fresh, quarter, finest, 4 * room)
         owner, inside = np.concatenate([owner, fresh]), np.concatenate([inside, quarter])
         mean, spread = np.concatenate([mean, quarter_mean]), np.concatenate([spread, quarter_spread])
         child = np.concatenate([child, np.full(len(fresh), -1)])
@@ -193,8 +204,9 @@ def _means_of_parts(
     owner: NDArray[np.int64],
     inside: NDArray[np.float64],
     finest: NDArray[np.float64],
+    ahead: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    mean, spread = textures.means(owner, inside)
+    mean, spread = textures.means(owner, inside, ahead)
     return mean, np.where(np.abs(inside[:, 2]) <= finest[owner], 0.0, spread)
 
 

@@ -8,7 +8,7 @@ from inner import compiled
 
 from baker.kernels.textures import pack_textures, sample_texture
 from baker.kernels.uv_integral import uv_means
-from baker.lights.emissive_texture import row_sums
+from baker.lights.texture_levels import TextureLevels, row_sums
 
 (sample_texture,) = compiled(sample_texture)
 WRAPS = ("repeat", "mirror", "clamp")
@@ -158,3 +158,31 @@ def test_a_hundred_repeats_cost_and_give_what_they_should():
     mean, spread = means(image, ("repeat", "mirror"), True, square)
     np.testing.assert_allclose(mean.mean(axis=0), 1 / 4096, rtol=1e-9)
     np.testing.assert_allclose(spread, 4095, rtol=0.05)
+
+
+@pytest.mark.parametrize("size", [(16, 24), (7, 13)])
+def test_a_smaller_texture_keeps_mean_and_mean_square(size):
+    image = picture(size, lit=1.0)
+    weight = np.array([1.0, 0.3, 0.7])
+    levels = TextureLevels(pack_textures([(image, ("repeat", "repeat"))], [True]), 0, weight)
+    square = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
+    truth = image[..., :3].astype(float).mean(axis=(0, 1))
+    squares = (image[..., :3].astype(float) ** 2 @ weight).mean()
+    for halved in ((1, 0), (0, 2), (2, 1), (9, 9)):
+        level, mean, spread = levels.at(*halved), np.zeros((2, 3)), np.zeros(2)
+        assert level.w < size[1] or level.h < size[0]
+        uv_means(
+            square,
+            level.pixels,
+            level.w,
+            level.h,
+            levels.wrap,
+            level.sums.weight,
+            level.sums.block,
+            mean,
+            spread,
+        )
+        np.testing.assert_allclose(mean.mean(axis=0), truth, rtol=1e-6)
+        # E[f^2] of each half from its spread and its mean.
+        found = ((1 + spread) * (mean**2 @ weight)).mean()
+        assert found == pytest.approx(squares, rel=1e-5)

@@ -1,0 +1,165 @@
+"""Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
+
+A smaller texture holds the exact means of its texels' areas and, in its fourth column, the variance that was
+averaged away. Both axes are halved independently: a strip of many repeats keeps its resolution across.
+
+Based on: Heckbert, Survey of texture mapping, 1986 (box-filtered levels).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.textures import TexturePack
+from baker.kernels.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
+
+_CLAMP = 2
+# Rows that are averaged together: bounds the memory of what lies between two levels.
+_STRIP = 256
+
+
+class Level(NamedTuple):
+    """A texture at one resolution: pixels (h * w, 4) float32, w and h, and the sums of its rows."""
+
+    pixels: NDArray[np.float32]
+    w: int
+    h: int
+    sums: RowSums
+
+
+class TextureLevels:
+    """One texture of a pack at all resolutions; each is made when it is first asked for."""
+
+    def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
+        """Prepare a texture; weight (3,): factor of each channel in the sum of squares."""
+        offset, w, h = (int(x) for x in pack.level[texture, 0])
+        self.wrap = pack.wrap[texture]
+        self.size = np.array([w, h])
+        self._texture, self._weight = texture, weight
+        finest = Level(pack.pixels[offset : offset + w * h], w, h, row_sums(pack, texture, weight))
+        self._made = {(0, 0): finest}
+        # Widths and heights of the levels down to one texel.
+        self._sizes = [_halvings(w), _halvings(h)]
+
+    def at(self, along_u: int, along_v: int) -> Level:
+        """Return the texture halved so many times along u and v; beyond one texel nothing changes."""
+        key = min(along_u, len(self._sizes[0]) - 1), min(along_v, len(self._sizes[1]) - 1)
+        if key not in self._made:
+            u, v = key
+            before = self.at(u - 1, v) if u > v or v == 0 else self.at(u, v - 1)
+            image = before.pixels.reshape(before.h, before.w, 4)
+            image = _halved(image, 1 if u > v or v == 0 else 0, self._weight, before.sums.weight[3] != 0)
+            h, w = image.shape[:2]
+            pixels = np.ascontiguousarray(image.reshape(-1, 4))
+            self._made[key] = Level(pixels, w, h, _sums(pixels, h, self._weight, 1.0, self._texture))
+        return self._made[key]
+
+    def crossed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the texel lines (n, 2) along u and v that the edges of triangles (n, 3, 2) cross."""
+        lines = np.abs(uv - uv[:, [1, 2, 0]]) * self.size
+        # No lines are met outside of a clamped texture.
+        most = np.where(self.wrap[:2] == _CLAMP, self.size + 2.0, np.inf)
+        total: NDArray[np.float64] = np.minimum(lines, most).sum(axis=1)
+        return total
+
+    def choose(
+        self, lines: NDArray[np.float64], most: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Choose resolutions at which triangles cross at most `most` texel lines each.
+
+        Parameters
+        ----------
+        lines : (n, 2) float64
+            What they cross at the finest one, see `crossed`.
+
+        Returns
+        -------
+        halved : (n, 2) int64
+            Times that the texture is halved along u and v. A number that is too large even for one texel says
+            that the triangle may be projected along that axis: the texture is constant there.
+        crossed : (n,) float64
+            Texel lines that are crossed then.
+        """
+        halved = np.zeros((len(lines), 2), np.int64)
+        # The share of lines that is left at each level; none of them if the axis is projected away.
+        left = [np.append(np.array(sizes) / sizes[0], 0.0) for sizes in self._sizes]
+        now = lines.copy()
+        while len(over := np.flatnonzero(now.sum(axis=1) > most)):
+            axis = now[over].argmax(axis=1)
+            halved[over, axis] += 1
+            for a in range(2):
+                own = over[axis == a]
+                now[own, a] = lines[own, a] * left[a][halved[own, a]]
+        return halved, now.sum(axis=1)
+
+    def is_constant(self, axis: int, halved: int) -> bool:
+        """Say whether triangles with so many halvings are projected along an axis."""
+        return halved >= len(self._sizes[axis])
+
+
+def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
+    """Return the largest limit with which wanted amounts (n,), each cut to it, add up to `total` at most."""
+    ascending = np.sort(wanted)
+    before = np.concatenate([[0.0], np.cumsum(ascending)[:-1]])
+    # If amount k and all larger ones get the same, each gets this.
+    equal = (total - before) / np.arange(len(wanted), 0, -1)
+    short = np.flatnonzero(equal < ascending)
+    return float(equal[short[0]]) if len(short) else np.inf
+
+
+def row_sums(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> RowSums:
+    """Return the running sums of a texture of the pack."""
+    offset, w, h = (int(x) for x in pack.level[texture, 0])
+    return _sums(pack.pixels[offset : offset + w * h], h, weight, 0.0, texture)
+
+
+def _sums(
+    pixels: NDArray[np.float32], h: int, weight: NDArray[np.float64], fourth: float, texture: int
+) -> RowSums:
+    block = np.zeros((h, len(pixels) // h // BLOCK + 1, N_SUMS))
+    weights = np.append(weight, fourth)
+    fill_row_sums(pixels, 0, weights, block)
+    return RowSums(block, weights, texture)
+
+
+def _halvings(n: int) -> list[int]:
+    sizes = [n]
+    while sizes[-1] > 1:
+        sizes.append((sizes[-1] + 1) // 2)
+    return sizes
+
+
+def _halved(
+    image: NDArray[np.float32], axis: int, weight: NDArray[np.float64], has_variance: bool
+) -> NDArray[np.float32]:
+    """Average texels (h, w, 4) along an axis; those of an odd number are shared out among neighbours."""
+    shape = list(image.shape)
+    n = shape[axis]
+    shape[axis] = (n + 1) // 2
+    out = np.zeros(shape, np.float32)
+    wide = n / shape[axis]
+    low = wide * np.arange(shape[axis])
+    first = np.floor(low + 1e-9).astype(np.int64)
+    # A wider texel reaches into three narrow ones at most.
+    which = first[:, None] + np.arange(3)
+    share = np.minimum(which + 1, (low + wide)[:, None]) - np.maximum(which, low[:, None])
+    share = np.where(share > 1e-9, share, 0.0) / wide
+    which = np.minimum(which, n - 1)
+    for start in range(0, shape[1 - axis], _STRIP):
+        strip = slice(start, start + _STRIP)
+        source = (image[:, strip] if axis == 0 else image[strip]).astype(np.float64)
+        span = (-1, 1, 1) if axis == 0 else (1, -1, 1)
+        taken = [
+            (share[:, k].reshape(span), source.take(which[:, k], axis)) for k in range(3) if share[:, k].any()
+        ]
+        mean = sum((s * t for s, t in taken), np.zeros(1))
+        square = sum((s * ((t - mean)[..., :3] ** 2 @ weight)[..., None] for s, t in taken), np.zeros(1))
+        mean[..., 3:] = square + (mean[..., 3:] if has_variance else 0.0)
+        if axis == 0:
+            out[:, strip] = mean
+        else:
+            out[strip] = mean
+    return out
