@@ -89,7 +89,8 @@ def pack_textures(
 
 
 @inner
-def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
+def wrapped(i, n, mode):  # type: ignore[no-untyped-def]
+    """Return the column or row 0 to n - 1 that texel i is read from; mode 0: repeat, 1: mirror, 2: clamp."""
     if mode == 0:
         return i % n
     if mode == 1:
@@ -108,9 +109,9 @@ def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
     y0 = np.int64(math.floor(y))
     fx = x - x0
     fy = y - y0
-    left, right = _wrapped(x0, w, wrap[k, 0]), _wrapped(x0 + 1, w, wrap[k, 0])
-    upper = offset + _wrapped(y0, h, wrap[k, 1]) * w
-    lower = offset + _wrapped(y0 + 1, h, wrap[k, 1]) * w
+    left, right = wrapped(x0, w, wrap[k, 0]), wrapped(x0 + 1, w, wrap[k, 0])
+    upper = offset + wrapped(y0, h, wrap[k, 1]) * w
+    lower = offset + wrapped(y0 + 1, h, wrap[k, 1]) * w
     above = (1.0 - fx) * pixels[upper + left, 3] + fx * pixels[upper + right, 3]
     below = (1.0 - fx) * pixels[lower + left, 3] + fx * pixels[lower + right, 3]
     return (1.0 - fy) * above + fy * below
@@ -141,6 +142,6 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
     for j in range(2):
         for i in range(2):
             weight = (fx if i else 1.0 - fx) * (fy if j else 1.0 - fy)
-            at = offset + _wrapped(y0 + j, h, pack.wrap[k, 1]) * w + _wrapped(x0 + i, w, pack.wrap[k, 0])
+            at = offset + wrapped(y0 + j, h, pack.wrap[k, 1]) * w + wrapped(x0 + i, w, pack.wrap[k, 0])
             for c in range(4):
                 out[c] += weight * pack.pixels[at, c]

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.kernels.textures import wrapped
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Running sums are kept for every so many texels of a row; the rest is added up when it is asked for.
@@ -91,16 +92,6 @@ def _sum_before(pixels, w, weight, block, j, i, out):  # type: ignore[no-untyped
 
 
 @inner
-def _wrapped(i, n, mode):  # type: ignore[no-untyped-def]
-    if mode == 0:
-        return i % n
-    if mode == 1:
-        j = i % (2 * n)
-        return j if j < n else 2 * n - 1 - j
-    return smaller(larger(i, 0), n - 1)
-
-
-@inner
 def _read(pixels, w, weight, j, i, out):  # type: ignore[no-untyped-def]
     for c in range(4):
         out[c] = 0.0
@@ -135,14 +126,14 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: igno
     """Write the filtered texel at lattice coordinates, and the weighted sum of its squares."""
     i, j = np.int64(math.floor(x)), np.int64(math.floor(y))
     if nearest:
-        _read(pixels, w, weight, _wrapped(j, h, wrap[1]), _wrapped(i, w, wrap[0]), out)
+        _read(pixels, w, weight, wrapped(j, h, wrap[1]), wrapped(i, w, wrap[0]), out)
         return
     for c in range(4):
         out[c] = 0.0
     for b in range(2):
         for a in range(2):
             share = (x - i if a else 1.0 - (x - i)) * (y - j if b else 1.0 - (y - j))
-            _read(pixels, w, weight, _wrapped(j + b, h, wrap[1]), _wrapped(i + a, w, wrap[0]), spare)
+            _read(pixels, w, weight, wrapped(j + b, h, wrap[1]), wrapped(i + a, w, wrap[0]), spare)
             within = spare[3]
             for c in range(3):
                 out[c] += share * spare[c]
@@ -156,22 +147,22 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: igno
 def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):  # type: ignore[no-untyped-def]
     """Write what F is made of in cell (i, j), of two rows: sums since column `first`, both texels."""
     for r in range(1 if nearest else 2):
-        line = _wrapped(j + r, h, wrap[1])
+        line = wrapped(j + r, h, wrap[1])
         _running(pixels, w, weight, block, wrap[0], line, i, a, b)
         for c in range(4):
             terms[r, 0, c] = a[c]
         _running(pixels, w, weight, block, wrap[0], line, first, a, b)
         for c in range(4):
             terms[r, 0, c] -= a[c]
-        _read(pixels, w, weight, line, _wrapped(i, w, wrap[0]), a)
+        _read(pixels, w, weight, line, wrapped(i, w, wrap[0]), a)
         for c in range(4):
             terms[r, 1, c] = terms[r, 2, c] = a[c]
         if not nearest:
             # The integral of lines between texels: half of the first one and of the last one is missing.
-            _read(pixels, w, weight, line, _wrapped(first, w, wrap[0]), b)
+            _read(pixels, w, weight, line, wrapped(first, w, wrap[0]), b)
             for c in range(4):
                 terms[r, 0, c] += 0.5 * (a[c] - b[c])
-            _read(pixels, w, weight, line, _wrapped(i + 1, w, wrap[0]), a)
+            _read(pixels, w, weight, line, wrapped(i + 1, w, wrap[0]), a)
             for c in range(4):
                 terms[r, 2, c] = a[c]
 
