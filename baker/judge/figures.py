@@ -135,6 +135,11 @@ def _colour_figures(
     }
 
 
+def beyond_noise(error: float, noise: float) -> float:
+    """Return what an error holds beside independent noise: sqrt(error^2 - noise^2), at least 0."""
+    return math.sqrt(max(error**2 - noise**2, 0.0))
+
+
 def energy_ratio(
     value: NDArray[np.float64], reference: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[float | None, float | None]:

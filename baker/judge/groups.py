@@ -13,11 +13,15 @@ than `z_needed(n)` standard errors from 0. The error is that of the jackknife: h
 place is left out. So it holds the noise of the bake and of the reference, and where one bright place decides
 it is large. A shift of colour is nearly free of noise, as a path's colours rise and fall together.
 
+A typical error is believed to exceed the reference's noise if the lower bound of the one median lies above
+the upper bound of the other. The bounds are order statistics, which hold for any distribution: in a group of
+bright places and dark ones, whose errors differ by a factor of ten, a median may be anywhere between both.
+
 Where the reference finds no light (less than three of its standard errors) differences are held against
 a thousandth of the scene's bright light, and the error counts one unseen path that brings that light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
-resampling plans, 1982.
+resampling plans, 1982; David and Nagaraja, Order statistics, 2003, section 7.1 (bounds of a median).
 """
 
 from __future__ import annotations
@@ -35,8 +39,9 @@ from baker.judge.figures import dark_floor
 LEAST = 8
 _Z, _FEW = 4.0, 16.0
 _LEAST_SHARE = 0.3
-# Relative standard error of the ratio of two medians of |x| of n normal numbers, times sqrt(n).
-_MEDIAN_SE = 1.65
+# Half the width of a median's bounds, in standard errors of its rank: both medians have bounds, so that
+# for two like normal distributions they part at `_Z` standard errors of the ratio of the medians.
+_RANKS = _Z / math.sqrt(2.0)
 # Light of which this share may be found where there is none, before it is an error of its own size.
 _BLACK = 1.0e-3
 _LIT = 3.0
@@ -71,6 +76,8 @@ class GroupFigures:
     bias, bias_se : float
     colour, colour_se : (C,) float64
     typical, typical_noise : float
+    typical_least, typical_noise_most : float
+        Lower bound of the one median, upper bound of the other.
     """
 
     texels: int
@@ -81,6 +88,8 @@ class GroupFigures:
     colour_se: NDArray[np.float64]
     typical: float
     typical_noise: float
+    typical_least: float
+    typical_noise_most: float
 
     @property
     def sure_bias(self) -> float:
@@ -96,8 +105,7 @@ class GroupFigures:
     @property
     def sure_noise(self) -> float:
         """Return the typical error beyond what the reference's noise shows, 0 if it may be chance."""
-        chance = math.exp(_Z * _MEDIAN_SE / math.sqrt(self.texels))
-        if self.typical <= self.typical_noise * chance:
+        if self.typical_least <= self.typical_noise_most:
             return 0.0
         return math.sqrt(self.typical**2 - self.typical_noise**2)
 
@@ -112,6 +120,8 @@ class GroupFigures:
             "colour_se": self.colour_se.tolist(),
             "typical": self.typical,
             "typical_noise": self.typical_noise,
+            "typical_least": self.typical_least,
+            "typical_noise_most": self.typical_noise_most,
         }
 
 
@@ -150,7 +160,8 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
     colour, colour_se = _colour_shift(places)
     lowest = max(dark_floor(places.reference), least)
     scale = np.maximum(r, lowest) if lowest > 0 else np.full(n, total / n)
-    apart = 0.5 * np.abs((places.halves[0] - places.halves[1]).mean(axis=1))
+    apart = 0.5 * np.abs((places.halves[0] - places.halves[1]).mean(axis=1)) / scale
+    error = np.abs(v - r) / scale
     return GroupFigures(
         texels=n,
         light=float(r.mean()),
@@ -158,9 +169,18 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
         bias_se=max(spread, own / total),
         colour=colour,
         colour_se=colour_se,
-        typical=float(np.median(np.abs(v - r) / scale)),
-        typical_noise=float(np.median(apart / scale)),
+        typical=float(np.median(error)),
+        typical_noise=float(np.median(apart)),
+        typical_least=median_bounds(error)[0],
+        typical_noise_most=median_bounds(apart)[1],
     )
+
+
+def median_bounds(sample: NDArray[np.float64]) -> tuple[float, float]:
+    """Return between which values the median of the distribution lies that n numbers were drawn from."""
+    half = 0.5 * _RANKS / math.sqrt(len(sample))
+    low, high = np.quantile(sample, [max(0.5 - half, 0.0), min(0.5 + half, 1.0)])
+    return float(low), float(high)
 
 
 def _colour_shift(places: Compared) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

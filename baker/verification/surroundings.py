@@ -27,6 +27,8 @@ from baker.reference.view import Reference
 _NEAR, _GAP, _CONTACT = 2.0, 0.5, 0.1
 # Points in the air that rooms are made of; places that a room must have.
 _AIR, _LEAST_ROOM = 160, 8
+# Rays that tell whether a point in the air lies in a solid.
+_AROUND = 32
 # A ray that meets nothing is taken to be this long, as a share of the scene's radius.
 _OUT = 0.25
 _TOUCH = 1.0e-3
@@ -71,10 +73,22 @@ def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroun
     # Places that none of the first points in the air see get some of their own: small rooms.
     for _ in range(2):
         left = np.flatnonzero((room < 0) & ~gap)
-        some = air[left[random.permutation(len(left))[:_AIR]]]
+        some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)
         _add_rooms(reference, places, some, left, room)
         eyes = np.concatenate([eyes, some])
     return Surroundings(places, buried, gap, room, eyes)
+
+
+def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    """Return the points (m, 3) in the air that lie in no solid: nobody looks around from inside of one.
+
+    A ray from a buried place of a texel that is partly free has its middle in a solid where it meets the
+    front of another solid within.
+    """
+    random = np.random.Generator(np.random.PCG64([seed, 14]))
+    # Without a normal directions are even over the sphere.
+    views = cast_around(reference, air, np.zeros_like(air), _AROUND, random)
+    return air[~is_buried(views)]
 
 
 def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[np.bool_]:

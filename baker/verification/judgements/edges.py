@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.figures import dark_floor
+from baker.judge.figures import beyond_noise, dark_floor
 from baker.judge.texel_area import look_up
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
@@ -39,6 +39,7 @@ def judge(evidence: Evidence) -> Judged:
     figures["edge_median"], figures["edge_p95"] = (float(np.percentile(error, q)) for q in (50, 95))
     apart = 0.5 * np.abs((places.halves[0] - places.halves[1]).mean(axis=1))
     figures["edge_noise_floor"] = float(np.median(apart / np.maximum(r, np.maximum(floor, 1e-12))))
+    figures["edge_excess"] = beyond_noise(figures["edge_median"], figures["edge_noise_floor"])
     figures["edge_wrong_share"] = float(wrong.mean())
     chosen, filled = np.flatnonzero(mine), filled_share(evidence) > _FILLED
     members = [
@@ -69,13 +70,13 @@ def filled_share(evidence: Evidence) -> NDArray[np.float64]:
 EDGES = Judgement(
     "edges",
     (
-        "edge_points", "edge_median", "edge_p95", "edge_noise_floor", "edge_bias",
+        "edge_points", "edge_median", "edge_p95", "edge_noise_floor", "edge_excess", "edge_bias",
         "edge_colour", "edge_noise", "edge_wrong_share",
     ),
     {
-        "irradiance": "irradiance.edge_median > 0.2, irradiance.edge_bias > 0.05,"
+        "irradiance": "irradiance.edge_excess > 0.1, irradiance.edge_bias > 0.05,"
         " irradiance.edge_noise > 0.15, irradiance.edge_wrong_share > 0.05",
-        "ao": "ao.edge_median > 0.2, ao.edge_bias > 0.1, ao.edge_wrong_share > 0.08",
+        "ao": "ao.edge_excess > 0.1, ao.edge_bias > 0.1, ao.edge_wrong_share > 0.08",
     },
     judge,
 )  # fmt: skip

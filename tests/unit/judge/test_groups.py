@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from baker.judge.groups import Compared, bright_light, compare_group, z_needed
+from baker.judge.groups import Compared, bright_light, compare_group, median_bounds, z_needed
 
 
 def places(value, reference, noise=0.0, samples=256):
@@ -88,3 +90,50 @@ def test_noise_of_a_map_is_more_than_that_of_the_reference():
 def test_few_places_need_more():
     assert z_needed(8) > z_needed(100) > 4
     assert bright_light(np.linspace(0, 1, 101)[:, None]) == pytest.approx(0.95)
+
+
+def halved(rng, light, noise):
+    """Return two halves of a reference of `light` (n,), each with sqrt(2) times the noise of their mean."""
+    return tuple(
+        light[:, None] * (1 + math.sqrt(2) * noise[:, None] * rng.standard_normal((len(light), 1)))
+        for _ in range(2)
+    )
+
+
+def test_bright_and_dark_places_in_one_group_are_no_noise_of_the_map():
+    rng = np.random.default_rng(3)
+    light, noise = np.repeat([2.0, 200.0], [12, 11]), np.repeat([0.5, 0.001], [12, 11])
+    sure = apart = 0
+    for _ in range(300):
+        halves = halved(rng, light, noise)
+        reference = 0.5 * (halves[0] + halves[1])
+        found = compare_group(
+            Compared(light[:, None], reference, noise[:, None] * reference, halves, np.full(23, 256)), 1000.0
+        )
+        sure += found.sure_noise > 0
+        apart += found.typical > 4 * found.typical_noise
+    # The medians are often far apart, though the map is exact: that of either may be the least dark error.
+    assert apart > 30
+    assert sure == 0
+
+
+def test_noise_of_a_map_among_bright_and_dark_places_is_told():
+    rng = np.random.default_rng(4)
+    light, noise = np.repeat([2.0, 200.0], 50), np.full(100, 0.05)
+    halves = halved(rng, light, noise)
+    reference = 0.5 * (halves[0] + halves[1])
+    map_ = (light * (1 + 0.5 * rng.standard_normal(100)))[:, None]
+    found = compare_group(
+        Compared(map_, reference, noise[:, None] * reference, halves, np.full(100, 256)), 1000.0
+    )
+    assert found.sure_noise > 0.15
+
+
+@pytest.mark.parametrize("n", [16, 25, 100, 400])
+def test_bounds_of_a_median_hold_for_any_distribution(n):
+    rng = np.random.default_rng(n)
+    for draw in (rng.standard_normal, rng.standard_cauchy, rng.standard_exponential):
+        true = {rng.standard_exponential: math.log(2)}.get(draw, 0.0)
+        bounds = [median_bounds(draw(n)) for _ in range(400)]
+        # 2.83 standard errors: 0.5 % lie outside.
+        assert np.mean([low <= true <= high for low, high in bounds]) > 0.97

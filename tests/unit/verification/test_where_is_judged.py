@@ -70,6 +70,23 @@ def test_a_gap_is_no_room():
     assert not near[np.abs(places.position[:, 0, :2] - 0.5).max(axis=1) > 0.45].all()
 
 
+def test_nobody_looks_around_from_inside_of_solids():
+    floor = Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    corners = [((-0.8, -0.5, -0.3), (0.4, 0.6, 0.9)), ((-0.2, -0.7, -0.4), (0.9, 0.3, 0.7))]
+    corners.append(((-0.5, -0.1, -0.2), (0.6, 0.8, 0.6)))
+    quads = [quad for low, high in corners for quad in box_quads(low, high, inward=False)]
+    geometry, owner, reference = surface([floor, *quads])
+    with reference:
+        _, places = judged(geometry, owner)
+        found = look_around(reference, places, 0)
+    inside = [
+        ((found.air > np.add(low, 1e-3)) & (found.air < np.subtract(high, 1e-3))).all(axis=1)
+        for low, high in corners
+    ]
+    assert len(found.air) > 100
+    assert not np.any(inside)
+
+
 def test_what_is_seen_from_a_point():
     _, _, reference = surface(two_rooms())
     place = np.array([[0.5, 0.5, 0.0], [1.0, 0.5, 0.5], [1.5, 0.5, 0.0]])
