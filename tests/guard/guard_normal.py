@@ -13,7 +13,7 @@ from typing import Any
 REMOVED_KEYS = frozenset(
     {
         # How long something took, and when.
-        "timings", "created", "seconds", "startTimeUtc", "endTimeUtc",
+        "timings", "created", "seconds", "compile_seconds", "startTimeUtc", "endTimeUtc",
         # What it was run with.
         "versions", "machine", "memory", "peak_memory", "source",
     }
