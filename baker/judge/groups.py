@@ -4,24 +4,26 @@ For the places of a group with values v_c and reference r_c (v, r: means over co
 
     bias       B = sum v / sum r - 1
     colour     S_c = (V_c / V - R_c / R) / max(R_c / R, 0.3)     V, R: sums of v, r; V_c, R_c: of one colour
+    own error  b of `spread`: the spread of the values about the truth, relative, beside the reference's noise
     typical    median of |v - r| / max(r, floor), floor as in `figures` but of the group; beside it what two
                halves of the reference, compared, show of it
 
 A single place is known to some percent; a mean over a hundred of them to a tenth of that. So a deviation
-of a whole object, colour or room is seen far below the noise of its texels. It is believed if it lies more
-than `z_needed(n)` standard errors from 0. The error is that of the jackknife: how the figure changes if one
-place is left out. So it holds the noise of the bake and of the reference, and where one bright place decides
-it is large. A shift of colour is nearly free of noise, as a path's colours rise and fall together.
-
-A typical error is believed to exceed the reference's noise if the lower bound of the one median lies above
-the upper bound of the other. The bounds are order statistics, which hold for any distribution: in a group of
-bright places and dark ones, whose errors differ by a factor of ten, a median may be anywhere between both.
+of a whole object, colour or room is seen far below the noise of its texels. How much of it is sure is what is
+left when `z_needed(m)` standard errors are taken off: a deviation is never reported larger than it is by
+chance. m is the number of places that bring the light, (sum w)^2 / sum w^2 with w = v + r; where it is below
+`LEAST` nothing is sure. The error is the largest of three: that of the jackknife (how the figure changes if one place is left
+out: it holds the noise of the bake and of the reference, and where one bright place decides it is large), that
+of the reference alone, and half the difference between the figures of two halves of the reference.
+A group whose reference is off by more than `_UNKNOWN` of its mean light (rms over its places) has no own error
+that is sure: light that rare paths bring is missing at most of its places, and too much at some.
+A shift of colour is nearly free of noise where a path's colours rise and fall together.
 
 Where the reference finds no light (less than three of its standard errors) differences are held against
 a thousandth of the scene's bright light, and the error counts one unseen path that brings that light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
-resampling plans, 1982; David and Nagaraja, Order statistics, 2003, section 7.1 (bounds of a median).
+resampling plans, 1982.
 """
 
 from __future__ import annotations
@@ -34,34 +36,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.judge.figures import dark_floor
+from baker.judge.spread import Spread, own_error
 
 # Fewer places are not judged as a group.
 LEAST = 8
-_Z, _FEW = 4.0, 16.0
+_Z, _FEW = 3.0, 32.0
 _LEAST_SHARE = 0.3
-# Half the width of a median's bounds, in standard errors of its rank: both medians have bounds, so that
-# for two like normal distributions they part at `_Z` standard errors of the ratio of the medians.
-_RANKS = _Z / math.sqrt(2.0)
 # Light of which this share may be found where there is none, before it is an error of its own size.
 _BLACK = 1.0e-3
 _LIT = 3.0
+_UNKNOWN = 0.4
+# Own errors are relative to at least these shares of a group's mean light and of the scene's bright light.
+_FAINT, _FAINTEST = 0.01, 1.0e-4
 
 
 class Compared(NamedTuple):
-    """Values (n, C) beside a reference, its standard error, two halves of it, and its samples (n,)."""
+    """Values (n, C) beside a reference.
+
+    value, reference : (n, C); standard_error : (n, C), of the reference, with what it may not have seen;
+    halves : two (n, C), independent halves of it; samples : (n,); spread : (n, C), standard error that its
+    passes show.
+    """
 
     value: NDArray[np.float64]
     reference: NDArray[np.float64]
     standard_error: NDArray[np.float64]
     halves: tuple[NDArray[np.float64], NDArray[np.float64]]
     samples: NDArray[np.int64]
+    spread: NDArray[np.float64]
 
     def of(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Compared:
         """Return some of the places."""
         halves = self.halves[0][which], self.halves[1][which]
         return Compared(
-            self.value[which], self.reference[which], self.standard_error[which], halves, self.samples[which]
-        )
+            self.value[which], self.reference[which], self.standard_error[which], halves,
+            self.samples[which], self.spread[which],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -71,16 +81,19 @@ class GroupFigures:
     Attributes
     ----------
     texels : int
+    effective : float
+        How many places bring the light.
     light : float
         Mean of the reference.
     bias, bias_se : float
     colour, colour_se : (C,) float64
     typical, typical_noise : float
-    typical_least, typical_noise_most : float
-        Lower bound of the one median, upper bound of the other.
+    spread : Spread
+        Own error, and its bounds `z_needed(n)` standard errors from it.
     """
 
     texels: int
+    effective: float
     light: float
     bias: float
     bias_se: float
@@ -88,31 +101,36 @@ class GroupFigures:
     colour_se: NDArray[np.float64]
     typical: float
     typical_noise: float
-    typical_least: float
-    typical_noise_most: float
+    spread: Spread
 
     @property
     def sure_bias(self) -> float:
-        """Return the bias, 0 if it may be chance."""
-        return self.bias if abs(self.bias) > z_needed(self.texels) * self.bias_se else 0.0
+        """Return by how much the group is off at least, 0 if that may be chance."""
+        return float(self._sure(np.array(self.bias), np.array(self.bias_se)))
 
     @property
     def sure_colour(self) -> float:
-        """Return the largest shift of a colour that is not chance, 0 if none."""
-        sure = np.where(np.abs(self.colour) > z_needed(self.texels) * self.colour_se, self.colour, 0.0)
+        """Return by how much a colour is shifted at least, of the colour where that is most."""
+        sure = self._sure(self.colour, self.colour_se)
         return float(sure[np.argmax(np.abs(sure))])
 
     @property
     def sure_noise(self) -> float:
-        """Return the typical error beyond what the reference's noise shows, 0 if it may be chance."""
-        if self.typical_least <= self.typical_noise_most:
-            return 0.0
-        return math.sqrt(self.typical**2 - self.typical_noise**2)
+        """Return the own error that the group has at least."""
+        return self.spread.least
+
+    def _sure(self, figure: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return figures with what may be chance taken off their size."""
+        if self.effective < LEAST:
+            return np.zeros_like(figure)
+        left = np.maximum(np.abs(figure) - z_needed(self.effective) * error, 0.0)
+        return np.asarray(np.sign(figure) * left, np.float64)
 
     def as_json(self) -> dict[str, float | int | list[float]]:
         """Return plain values."""
         return {
             "texels": self.texels,
+            "effective": self.effective,
             "light": self.light,
             "bias": self.bias,
             "bias_se": self.bias_se,
@@ -120,13 +138,14 @@ class GroupFigures:
             "colour_se": self.colour_se.tolist(),
             "typical": self.typical,
             "typical_noise": self.typical_noise,
-            "typical_least": self.typical_least,
-            "typical_noise_most": self.typical_noise_most,
+            "own_error": self.spread.own,
+            "own_error_least": self.spread.least,
+            "own_error_most": self.spread.most,
         }
 
 
-def z_needed(n: int) -> float:
-    """Return how many standard errors make a deviation sure: more where few places tell the error itself."""
+def z_needed(n: float) -> float:
+    """Return how many standard errors a figure may be off: more where few places tell the error itself."""
     return _Z + _FEW / max(n, 1)
 
 
@@ -160,42 +179,43 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
     colour, colour_se = _colour_shift(places)
     lowest = max(dark_floor(places.reference), least)
     scale = np.maximum(r, lowest) if lowest > 0 else np.full(n, total / n)
-    apart = 0.5 * np.abs((places.halves[0] - places.halves[1]).mean(axis=1)) / scale
-    error = np.abs(v - r) / scale
+    apart = 0.5 * (places.halves[0] - places.halves[1]).mean(axis=1)
+    shown = np.where(np.isfinite(places.spread), places.spread, 0.0).mean(axis=1)
+    known = own_error(
+        v, r, shown, apart, max(lowest, total / n * _FAINT, bright * _FAINTEST), z_needed(n)
+    )
+    if math.sqrt(float((shown**2).mean())) * n > _UNKNOWN * total:
+        known = known._replace(least=0.0)
     return GroupFigures(
         texels=n,
+        effective=float((v + r).sum()) ** 2 / max(float(((v + r) ** 2).sum()), 1e-30),
         light=float(r.mean()),
         bias=bias,
-        bias_se=max(spread, own / total),
+        bias_se=max(spread, own / total, abs(float(apart.sum())) / total),
         colour=colour,
         colour_se=colour_se,
-        typical=float(np.median(error)),
-        typical_noise=float(np.median(apart)),
-        typical_least=median_bounds(error)[0],
-        typical_noise_most=median_bounds(apart)[1],
+        typical=float(np.median(np.abs(v - r) / scale)),
+        typical_noise=float(np.median(np.abs(apart) / scale)),
+        spread=known,
     )
-
-
-def median_bounds(sample: NDArray[np.float64]) -> tuple[float, float]:
-    """Return between which values the median of the distribution lies that n numbers were drawn from."""
-    half = 0.5 * _RANKS / math.sqrt(len(sample))
-    low, high = np.quantile(sample, [max(0.5 - half, 0.0), min(0.5 + half, 1.0)])
-    return float(low), float(high)
 
 
 def _colour_shift(places: Compared) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return how far each colour's share of the light is off, (C,), and the standard errors."""
     v, r = places.value.mean(axis=1), places.reference.mean(axis=1)
-    sums = [a.sum(axis=0) for a in (places.value, places.reference)]
-    if places.value.shape[1] == 1 or not all(a.mean() > 0 for a in sums):
+    all_sums = [a.sum(axis=0) for a in (places.value, places.reference, *places.halves)]
+    if places.value.shape[1] == 1 or not all(a.mean() > 0 for a in all_sums):
         return np.zeros(places.value.shape[1]), np.zeros(places.value.shape[1])
-    share_v, share_r = (a / a.mean() for a in sums)
+    share_v, share_r, one, other = (a / a.mean() for a in all_sums)
     scale = np.maximum(share_r, _LEAST_SHARE)
     left = [
         (total - each) / np.maximum(total.mean() - mean, 1e-9 * total.mean())[:, None]
-        for total, each, mean in zip(sums, (places.value, places.reference), (v, r), strict=True)
+        for total, each, mean in zip(
+            all_sums[:2], (places.value, places.reference), (v, r), strict=True
+        )
     ]
-    return (share_v - share_r) / scale, _jackknife((left[0] - left[1]) / scale)
+    error = np.maximum(_jackknife((left[0] - left[1]) / scale), 0.5 * np.abs(one - other) / scale)
+    return (share_v - share_r) / scale, error
 
 
 def _jackknife(left_out: NDArray[np.float64]) -> NDArray[np.float64]:

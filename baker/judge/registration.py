@@ -17,8 +17,9 @@ _BETTER = 0.9
 # By so many standard errors, too.
 _SURE = 4.0
 _ENOUGH = 32
-# Squares of relative errors count up to this: a few texels of large error must not decide.
-_CLIP = 0.01
+# What a sound map may be off, relative; errors are told in this and the noise of the truth, their squares up
+# to a limit: a few texels of large error must not decide, nor those of large noise.
+_OFF, _CLIP = 0.03, 9.0
 # Powers that are tried, 1 in the middle; a texel further from all is no further than this (log scale).
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
 _FAR = 0.1
@@ -30,6 +31,7 @@ def best_shift(
     pixel: NDArray[np.int64],
     truth: NDArray[np.float64],
     noise: NDArray[np.float64] | None = None,
+    better: float = _BETTER,
 ) -> tuple[int, int]:
     """Return the shift (rows, columns) by which the map would fit the truth better, (0, 0) if none does.
 
@@ -42,6 +44,8 @@ def best_shift(
     truth : (n,) float64, their path-traced values
     noise : (n,) float64, optional
         Standard errors of these: what they add to the misfit says nothing about a shift.
+    better : float
+        A shifted map is believed if its misfit is less than this share of what it is without.
     """
     misfit = _misfits(page, covered, pixel, truth, noise)
     if misfit is None:
@@ -51,7 +55,7 @@ def best_shift(
     gain = error[0] - error[best]
     # Where a map is even every shift fits alike but for noise.
     sure = gain.mean() > _SURE * gain.std() / np.sqrt(len(gain))
-    return _STEPS[best] if excess[best] < _BETTER * excess[0] and sure else (0, 0)
+    return _STEPS[best] if excess[best] < better * excess[0] and sure else (0, 0)
 
 
 def is_blurred(
@@ -96,7 +100,7 @@ def _misfits(
     truth: NDArray[np.float64],
     noise: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return squared relative errors (k, m) of the map shifted by each of `_STEPS`, and their means.
+    """Return squared errors (k, m) of the map shifted by each of `_STEPS`, in variances, and their means.
 
     From the means (k,) the reference's noise is taken off. None if too few texels tell.
     """
@@ -112,11 +116,10 @@ def _misfits(
     number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
     scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
     found = [page[number, row + down, column + right] for down, right in _STEPS]
-    error = np.array([np.minimum(((value - truth) / scale) ** 2, _CLIP) for value in found])
-    mean = error.mean(axis=1)
-    if noise is not None:
-        mean = mean - np.minimum((noise[inside] / scale) ** 2, _CLIP).mean()
-    return error, mean
+    own = np.zeros(len(truth)) if noise is None else (noise[inside] / scale) ** 2
+    variance = own + _OFF**2
+    error = np.array([np.minimum(((value - truth) / scale) ** 2 / variance, _CLIP) for value in found])
+    return error, error.mean(axis=1) - (own / variance).mean()
 
 
 def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:

@@ -19,6 +19,8 @@ from baker.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 # Less of a texel's square than this is no surface to be judged.
 _LEAST = 1.0e-3
 _WHOLE = 0.98
+# A vertex whose normal leans further from the face than this (cosine) belongs to a hard edge: nothing is lifted.
+_HARD = 0.7
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,9 @@ class TexelPlaces:
     Attributes
     ----------
     position, normal, face_normal : (n, k, 3) float64
-        World; `normal` is the shading normal, both on the triangle's front.
+        World; `normal` is the shading normal, both on the triangle's front. Places lie on the curved surface
+        that the shading normals suggest, as those of the bake do: on a facet itself, half of what a curved
+        surface sees would be behind the next facet.
     area : (n,) float64
         Share of the texel's square that surface covers.
     surface : (n,) float64
@@ -79,9 +83,35 @@ def texel_places(
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
     # Off large triangles by some of their float32 steps: whoever starts rays here does not know their size.
     edge = geometry.position[corner[..., 1:]].astype(np.float64) - geometry.position[corner[..., :1]]
+    position += lift(geometry, corner, weight, position, face)
     position += ROUNDING * np.abs(edge).max(axis=(2, 3))[..., None] * face
     surface = covered * square_metres(geometry, found, resolution).mean(axis=1)
     return TexelPlaces(position, normal, face, covered, surface, middle)
+
+
+def lift(
+    geometry: Geometry,
+    corner: NDArray[np.int32],
+    weight: NDArray[np.float64],
+    position: NDArray[np.float64],
+    face: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return by what vectors (n, k, 3) places lie below the curved surface that the shading normals suggest.
+
+    That surface is the weighted mean of a place's projections onto the tangent planes of the three corners, of
+    those planes that it lies below.
+
+    Parameters
+    ----------
+    corner : (n, k, 3), vertices; weight : (n, k, 3), of these; position, face : (n, k, 3)
+    """
+    result = np.zeros_like(position)
+    for i in range(3):
+        normal = geometry.normal[corner[..., i]].astype(np.float64)
+        below = ((position - geometry.position[corner[..., i]]) * normal).sum(axis=2)
+        soft = (normal * face).sum(axis=2) > _HARD
+        result += (weight[..., i] * np.where(soft, np.maximum(-below, 0.0), 0.0))[..., None] * normal
+    return result
 
 
 def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:

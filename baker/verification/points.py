@@ -1,4 +1,5 @@
-"""Which points of a bake are judged: texels at their middles, texels that stand out, points at edges."""
+"""Which points of a bake are judged: texels at their middles, texels that stand out, points at edges,
+texels of light levels that have few."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from baker.core.errors import InputError
 from baker.core.geometry import Geometry
 from baker.core.lightmap import TexelStatus
 from baker.io.bake_folder import StoredBake
-from baker.judge.choice import choose_texels
+from baker.judge.choice import choose_texels, scarce_texels
 from baker.judge.suspects import steep_texels, suspect_texels
 from baker.judge.texel_area import TexelPlaces, instance_map, texel_places, texel_points
 from baker.reference.view import Reference
@@ -21,11 +22,13 @@ from baker.verification.edges import edge_points
 from baker.verification.settings import VerifySettings
 from baker.verification.surroundings import look_around
 
-TEXEL, SUSPECT, STEEP, EDGE = 0, 1, 2, 3
+TEXEL, SUSPECT, STEEP, EDGE, SCARCE = 0, 1, 2, 3, 4
 PLACES = 64
 # Points at edges, texels that stand out, and steep ones, in each channel, for each judged texel.
 _EDGES, _SUSPECTS, _STEEP = 0.35, 0.05, 0.1
 _LEAST_EDGES = 500
+# Texels that each light level should have, for each judged texel.
+_SCARCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -35,13 +38,16 @@ class Points:
     Attributes
     ----------
     kind : (n,) int8
-        TEXEL (chosen by chance), SUSPECT (it stands out), STEEP (light changes there) or EDGE; texels first.
+        TEXEL (chosen by chance), SUSPECT (it stands out), STEEP (light changes there), EDGE or
+        SCARCE (its light level has few texels); texels first.
     pixel : (n,) int64
         (page * H + row) * W + column.
     owner, chart, room : (n,) int32
         Object; piece of its lightmap uv; room (-1: none), see `surroundings`.
     gap : (n,) bool
         In a narrow gap.
+    free : (n,) float64
+        Share of its places that lie in no solid.
     stands_for : (n,) float64, m2
         Surface of its object that a texel stands for; 0 for other kinds.
     places : TexelPlaces
@@ -54,6 +60,7 @@ class Points:
     chart: NDArray[np.int32]
     room: NDArray[np.int32]
     gap: NDArray[np.bool_]
+    free: NDArray[np.float64]
     stands_for: NDArray[np.float64]
     places: TexelPlaces
 
@@ -113,12 +120,16 @@ def choose_points(
     brightness = bake.maps[names[0]].mean(axis=3, dtype=np.float64).reshape(-1)
     texel = choose_texels(owner, covered, brightness, settings.texels, seed)
     suspect, steep = _telling_texels(bake, pages, names, settings.texels)
+    wanted = int(_SCARCE * settings.texels)
+    scarce = scarce_texels(covered & (owner >= 0), brightness, texel, wanted, seed)
     count = max(int(_EDGES * settings.texels), _LEAST_EDGES)
     edge = edge_points(reference, geometry, pages.owner, pages.covered, count, PLACES, seed)
     parts = texel, suspect, steep
-    pixel = np.concatenate([*parts, edge.pixel])
-    kind = np.repeat([TEXEL, SUSPECT, STEEP, EDGE], [*map(len, parts), len(edge.pixel)]).astype(np.int8)
-    places = joined([*(texel_places(geometry, part, size, PLACES, seed) for part in parts), edge.places])
+    pixel = np.concatenate([*parts, edge.pixel, scarce])
+    kinds = [TEXEL, SUSPECT, STEEP, EDGE, SCARCE]
+    kind = np.repeat(kinds, [*map(len, parts), len(edge.pixel), len(scarce)]).astype(np.int8)
+    spread = [texel_places(geometry, part, size, PLACES, seed) for part in (*parts, scarce)]
+    places = joined([*spread[:-1], edge.places, spread[-1]])
     around = look_around(reference, places, seed)
     each, back = np.unique(pixel, return_inverse=True)
     chart = chart_numbers(geometry)[texel_points(geometry, each, size, seed)[0]][back]
@@ -132,6 +143,7 @@ def choose_points(
         chart=chart,
         room=around.room,
         gap=around.gap,
+        free=around.free,
         stands_for=np.where(kind == TEXEL, texels * around.places.surface, 0.0),
         places=around.places,
     )

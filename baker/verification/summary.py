@@ -24,6 +24,7 @@ def verification_json(found: Verification) -> dict[str, Any]:
             for name, check in found.channels.items()
         },
         "objects": found.objects,
+        "levels": found.levels,
         "regions": found.regions,
         "worst": found.worst,
         "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in found.verdicts],

@@ -44,6 +44,8 @@ class Surroundings:
         Those of texels with free places, without the buried ones.
     buried : (n,) bool
         All places are.
+    free : (n,) float64
+        Share of a point's places that are not buried.
     gap : (n,) bool
         In a gap, or buried.
     room : (n,) int32
@@ -54,6 +56,7 @@ class Surroundings:
 
     places: TexelPlaces
     buried: NDArray[np.bool_]
+    free: NDArray[np.float64]
     gap: NDArray[np.bool_]
     room: NDArray[np.int32]
     air: NDArray[np.float64]
@@ -64,9 +67,10 @@ def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroun
     random = np.random.Generator(np.random.PCG64([seed, 9]))
     black, near, air = _first_look(reference, places, random)
     suspect = np.flatnonzero(black.any(axis=1))
-    buried = np.zeros(len(places.position), bool)
+    free = np.ones(len(places.position))
     if len(suspect):
-        places, buried[suspect] = _free_places(reference, places, suspect, random)
+        places, free[suspect] = _free_places(reference, places, suspect, random)
+    buried = free == 0
     gap = (near.mean(axis=1) > _GAP) | buried
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
@@ -76,7 +80,7 @@ def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroun
         some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)
         _add_rooms(reference, places, some, left, room)
         eyes = np.concatenate([eyes, some])
-    return Surroundings(places, buried, gap, room, eyes)
+    return Surroundings(places, buried, free, gap, room, eyes)
 
 
 def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
@@ -100,8 +104,8 @@ def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[
 
 def _free_places(
     reference: Reference, places: TexelPlaces, suspect: NDArray[np.int64], random: np.random.Generator
-) -> tuple[TexelPlaces, NDArray[np.bool_]]:
-    """Return places, the buried ones replaced by free ones of the same texel, and which texels have none."""
+) -> tuple[TexelPlaces, NDArray[np.float64]]:
+    """Return places, the buried ones replaced by free ones of the same texel, and the share of free ones."""
     position, normal = places.position[suspect], places.normal[suspect]
     free = ~buried_places(reference, position, normal, places.face_normal[suspect], random)
     count = free.sum(axis=1, keepdims=True)
@@ -113,7 +117,7 @@ def _free_places(
     for array in changed:
         array[suspect] = np.take_along_axis(array[suspect], pick[..., None], axis=1)
     free_ones = replace(places, position=changed[0], normal=changed[1], face_normal=changed[2])
-    return free_ones, count[:, 0] == 0
+    return free_ones, count[:, 0] / free.shape[1]
 
 
 def buried_places(

@@ -97,7 +97,7 @@ class Verification:
     owner : (n,) int32, their objects
     position : (n, 3) float64, world
     channels : dict of name to ChannelCheck
-    objects, regions, worst : list of dict, as in the JSON
+    objects, levels, regions, worst : list of dict, as in the JSON
     verdicts : list of Verdict
     problems : list of str, what the limits that failed mean
     invalid : int, covered texels that the bake filled from neighbours (not judged)
@@ -114,6 +114,7 @@ class Verification:
     position: NDArray[np.float64]
     channels: dict[str, ChannelCheck]
     objects: list[dict[str, Any]]
+    levels: list[dict[str, Any]]
     regions: list[dict[str, Any]]
     worst: list[dict[str, Any]]
     verdicts: list[Verdict]
@@ -192,6 +193,7 @@ def verify(
         position=position,
         channels=channels,
         objects=_objects({name: rows[name]["objects"] for name in names}),
+        levels=[row for name in names for row in rows[name]["levels"]],
         regions=sorted((row for name in names for row in rows[name]["regions"]), key=_badness),
         worst=worst,
         verdicts=verdicts,
@@ -249,7 +251,7 @@ def _evidence(
         noisy = error.max(axis=1) > NOISY
     else:
         noisy = relative_standard_error(estimate, points.room) > max(settings.target_se, NOISY)
-    compared = Compared(value, estimate.mean, error, halves, samples)
+    compared = Compared(value, estimate.mean, error, halves, samples, estimate.standard_error)
     return Evidence(name, bake, geometry, pages, points, compared, traced.unjudged, noisy)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_erosion, gaussian_filter
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter, uniform_filter
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 
 from baker.core.geometry import world_geometry
@@ -28,7 +28,7 @@ from baker.verification import VerifySettings, verify
 
 # The module, which the function of the same name hides.
 module = importlib.import_module("baker.verification.verify")
-SETTINGS = VerifySettings(texels=700, spp=1024, time_limit=None)
+SETTINGS = VerifySettings(texels=2400, spp=4096, time_limit=None)
 BAKED = {"resolution": 128, "samples": 256, "ao_distance": "0.5"}
 DIM, SIZE = 1e-3, 128
 
@@ -123,6 +123,48 @@ def noise_in_the_dark(pixels, surface):
     return pixels
 
 
+def noise_of_15(pixels, where, block=1):
+    """Noise of 15 % in some texels, the same for squares of `block` texels."""
+    noise = np.random.default_rng(0).standard_normal((SIZE // block, SIZE // block))
+    pixels[where] *= (1 + 0.15 * noise.repeat(block, 0).repeat(block, 1))[where][:, None].clip(0)
+    return pixels
+
+
+def darkest_tenth(pixels, surface):
+    light = pixels.mean(axis=2)
+    on = covered(surface)
+    return on & (light < np.percentile(light[on], 10))
+
+
+def below_a_thirtieth(pixels, surface):
+    # The median is that of the bright room, as the dim one is smaller.
+    light = pixels.mean(axis=2)
+    on = covered(surface)
+    return on & (light < np.median(light[on & (surface[1][..., 0] < 2.5)]) / 30)
+
+
+def one_chart_shifted(pixels, surface):
+    """An object's texels, and what is filled around them, one column further."""
+    mine = binary_dilation(surface[0] == 3, np.ones((3, 3)))
+    pixels[mine] = np.roll(pixels, 1, axis=1)[mine]
+    return pixels
+
+
+def box_blurred(pixels, surface):
+    on = covered(surface)
+    count = uniform_filter(on.astype(float), 3)[..., None]
+    soft = uniform_filter(pixels * on[..., None], (3, 3, 1)) / np.maximum(count, 1e-9)
+    return np.where(on[..., None], soft, pixels).astype(np.float32)
+
+
+def eight_bits(pixels, surface):
+    """The dim room in steps of 1/255 of the page's largest value."""
+    dim = surface[1][..., 0] > 2.5
+    step = pixels.max() / 255
+    pixels[dim] = np.round(pixels[dim] / step) * step
+    return pixels
+
+
 def black_border(pixels, surface):
     on = covered(surface)
     pixels[on & ~binary_erosion(on)] = 0
@@ -170,6 +212,17 @@ TAMPERING = {
     "the dim room 30 % darker": (dim_room_darker, "region_bias"),
     "two objects exchanged": (exchanged, "object_colour"),
     "noise in the dark": (noise_in_the_dark, "region_noise"),
+    "15 % of noise in the darkest tenth": (lambda p, s: noise_of_15(p, darkest_tenth(p, s)), "level_noise"),
+    "15 % in blocks in the darkest tenth": (lambda p, s: noise_of_15(p, darkest_tenth(p, s), 4), "level_noise"),
+    "15 % of noise below a thirtieth": (lambda p, s: noise_of_15(p, below_a_thirtieth(p, s)), "level_noise"),
+    "15 % in blocks below a thirtieth": (
+        lambda p, s: noise_of_15(p, below_a_thirtieth(p, s), 4),
+        "level_noise",
+    ),
+    "an object 3 % red": (one(4, np.float32([1.03, 1, 1])), "object_colour"),
+    "a chart shifted by a texel": (one_chart_shifted, "shifted_charts"),
+    "3 x 3 texels averaged": (box_blurred, "blurred"),
+    "the dim room in 8 bits": (eight_bits, "region_bias"),
     "border texels black": (black_border, "edge_wrong_share"),
     "light leaks in at the foot of walls": (leak, "edge_bias"),
     "rounded to 8 bits": (rounded, "few_levels"),
@@ -219,6 +272,7 @@ def test_single_wrong_texels_are_found(sound, surface, tmp_path):
     [
         pytest.param(rooms(), {"bounces": 1}, id="the solver stopped early"),
         pytest.param(rooms(dim_lamp=0.0), {}, id="a lamp was lost"),
+        pytest.param(rooms(dim_lamp=1.8 * DIM), {}, id="a lamp of 90 %"),
     ],
 )
 def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene, settings):

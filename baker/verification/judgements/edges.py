@@ -74,9 +74,9 @@ EDGES = Judgement(
         "edge_colour", "edge_noise", "edge_wrong_share",
     ),
     {
-        "irradiance": "irradiance.edge_excess > 0.1, irradiance.edge_bias > 0.05,"
-        " irradiance.edge_noise > 0.15, irradiance.edge_wrong_share > 0.05",
-        "ao": "ao.edge_excess > 0.1, ao.edge_bias > 0.1, ao.edge_wrong_share > 0.08",
+        "irradiance": "irradiance.edge_excess > 0.12, irradiance.edge_bias > 0.03,"
+        " irradiance.edge_noise > 0.1, irradiance.edge_wrong_share > 0.08",
+        "ao": "ao.edge_excess > 0.06, ao.edge_bias > 0.03, ao.edge_wrong_share > 0.05",
     },
     judge,
 )  # fmt: skip

@@ -13,7 +13,7 @@ from baker.verification.judgements.judgement import Evidence
 # Differences are held against at least this much light: no one sees a percent of the AO of a corner.
 LEAST_LIGHT = {"irradiance": 0.0, "ao": 0.2}
 # A group whose typical error comes from so few places is not told from chance.
-LEAST_NOISE = 16
+LEAST_NOISE = 40
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry
 from baker.io.bake_folder import StoredBake
 from baker.judge.groups import Compared
-from baker.verification.points import EDGE, STEEP, SUSPECT, TEXEL, Pages, Points
+from baker.verification.points import EDGE, SCARCE, STEEP, SUSPECT, TEXEL, Pages, Points
 from baker.verification.unjudged import Unjudged
+
+
+# Texels of which surface covers less, or less lies in the open, are borders.
+_COVERED = 0.75
+# More of the light around a point than this comes from below the facet, above the horizon of its shading normal.
+_TILTED = 0.005
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,27 @@ class Evidence:
         return np.asarray(self.points.kind == TEXEL)
 
     @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Return which points lie in no gap, on texels that open surface covers, and are not tilted.
+
+        The rest counts as edges.
+        """
+        points = self.points
+        covered = points.places.area * points.free >= _COVERED
+        return np.asarray(~points.gap & covered & ~self.tilted)
+
+    @property
+    def tilted(self) -> NDArray[np.bool_]:
+        """Return where the shading normal leans from the facet so far that the two see different light.
+
+        The reference lets no light arrive from below a facet; the bake lets it, as a curved surface would. Of a
+        cosine-weighted hemisphere around a normal that leans by t this is (1 - cos t) / 2.
+        """
+        places = self.points.places
+        lean = (places.normal * places.face_normal).sum(axis=2).mean(axis=1)
+        return np.asarray(0.5 * (1.0 - lean) > _TILTED)
+
+    @property
     def edges(self) -> NDArray[np.bool_]:
         """Return which points lie at edges."""
         return np.asarray(self.points.kind == EDGE)
@@ -62,6 +89,11 @@ class Evidence:
     def steep(self) -> NDArray[np.bool_]:
         """Return which points are texels where light changes most."""
         return np.asarray(self.points.kind == STEEP)
+
+    @property
+    def scarce(self) -> NDArray[np.bool_]:
+        """Return which points are texels of light levels that have few."""
+        return np.asarray(self.points.kind == SCARCE)
 
     @property
     def stored(self) -> NDArray[np.float32]:

@@ -11,9 +11,6 @@ from baker.judge.figures import dark_floor, figures
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 
-# Texels of which surface covers less are the borders of charts.
-_COVERED = 0.5
-
 
 def judge_objects(evidence: Evidence) -> Judged:
     """Return the figures of each object that was judged, in the order of the scene, and of the worst."""
@@ -36,7 +33,7 @@ def judge_objects(evidence: Evidence) -> Judged:
         )
         rows.append({"object": instance.name, "node": instance.node, **found})
         name = f"'{instance.name}' (node {instance.node})"
-        members.append((name, chosen[_whole(evidence)[chosen]]))
+        members.append((name, chosen[evidence.whole[chosen]]))
     worst, remarks = worst_figures("object", make_groups(evidence, members), evidence.channel)
     return Judged(worst, remarks, rows)
 
@@ -45,7 +42,7 @@ def judge_charts(evidence: Evidence) -> Judged:
     """Return the figures of the worst chart."""
     points, instances = evidence.points, evidence.bake.scene.instances
     size = evidence.bake.atlas.resolution
-    mine = evidence.texels & _whole(evidence)
+    mine = evidence.texels & evidence.whole
     members = []
     for number in np.unique(points.chart[mine]):
         chosen = np.flatnonzero(mine & (points.chart == number))
@@ -59,19 +56,13 @@ def judge_charts(evidence: Evidence) -> Judged:
     return Judged(worst, remarks)
 
 
-def _whole(evidence: Evidence) -> NDArray[np.bool_]:
-    """Return which points (n,) lie in no gap, on texels that surface covers: others are judged as edges."""
-    points = evidence.points
-    return np.asarray(~points.gap & (points.places.area >= _COVERED))
-
-
 OBJECTS = Judgement(
     "objects",
     ("object_bias", "object_colour", "object_noise"),
     {
-        "irradiance": "irradiance.object_bias > 0.03, irradiance.object_colour > 0.015,"
-        " irradiance.object_noise > 0.15",
-        "ao": "ao.object_bias > 0.03, ao.object_noise > 0.15",
+        "irradiance": "irradiance.object_bias > 0.025, irradiance.object_colour > 0.01,"
+        " irradiance.object_noise > 0.1",
+        "ao": "ao.object_bias > 0.02, ao.object_noise > 0.06",
     },
     judge_objects,
 )
@@ -79,9 +70,9 @@ CHARTS = Judgement(
     "charts",
     ("chart_bias", "chart_colour", "chart_noise"),
     {
-        "irradiance": "irradiance.chart_bias > 0.03, irradiance.chart_colour > 0.015,"
-        " irradiance.chart_noise > 0.15",
-        "ao": "ao.chart_bias > 0.03, ao.chart_noise > 0.15",
+        "irradiance": "irradiance.chart_bias > 0.025, irradiance.chart_colour > 0.01,"
+        " irradiance.chart_noise > 0.1",
+        "ao": "ao.chart_bias > 0.02, ao.chart_noise > 0.06",
     },
     judge_charts,
 )

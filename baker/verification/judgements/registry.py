@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from baker.verification.judgements.distortion import DISTORTION
 from baker.verification.judgements.edges import EDGES
 from baker.verification.judgements.judgement import Judgement
+from baker.verification.judgements.levels import LIGHT_LEVELS
 from baker.verification.judgements.objects import CHARTS, OBJECTS
 from baker.verification.judgements.overall import OVERALL
 from baker.verification.judgements.regions import REGIONS
@@ -14,7 +15,7 @@ from baker.verification.judgements.suspects import SUSPECTS
 from baker.verification.judgements.unjudged import UNJUDGED
 
 JUDGEMENTS: tuple[Judgement, ...] = (
-    OVERALL, REGIONS, OBJECTS, CHARTS, EDGES, SUSPECTS, DISTORTION, UNJUDGED,
+    OVERALL, LIGHT_LEVELS, REGIONS, OBJECTS, CHARTS, EDGES, SUSPECTS, DISTORTION, UNJUDGED,
 )  # fmt: skip
 FIGURE_NAMES = tuple(name for judgement in JUDGEMENTS for name in judgement.figures)
 

@@ -19,6 +19,7 @@ def judge(evidence: Evidence) -> Judged:
     judged = float(stands_for.sum())
     noisy = float(stands_for[evidence.noisy[mine]].sum())
     gap = float(stands_for[points.gap[mine]].sum())
+    tilted = float(stands_for[evidence.tilted[mine]].sum())
     figures = {
         "area": total,
         "invalid_area": area.invalid,
@@ -30,6 +31,8 @@ def judge(evidence: Evidence) -> Judged:
         "unresolved_share": noisy / max(judged, 1e-30),
         "gap_area": gap,
         "gap_share": gap / max(judged, 1e-30),
+        "tilted_area": tilted,
+        "tilted_share": tilted / max(judged, 1e-30),
     }
     remarks = {
         "gap_share": f"{gap:.3g} m2 of {judged:.3g} lie in gaps of two texels, or inside of solids",
@@ -49,11 +52,12 @@ UNJUDGED = Judgement(
     (
         "area", "invalid_area", "invalid_share", "visible_invalid_share", "uncovered_area", "uncovered_share",
         "unresolved_area", "unresolved_share", "gap_area", "gap_share",
+        "tilted_area", "tilted_share",
     ),
     {
-        "irradiance": "irradiance.invalid_share > 0.4, irradiance.visible_invalid_share > 0.02,"
-        " irradiance.uncovered_share > 0.1, irradiance.unresolved_share > 0.75, irradiance.gap_share > 0.5",
-        "ao": "ao.unresolved_share > 0.75",
+        "irradiance": "irradiance.invalid_share > 0.25, irradiance.visible_invalid_share > 0.01,"
+        " irradiance.uncovered_share > 0.02, irradiance.unresolved_share > 0.6, irradiance.gap_share > 0.3",
+        "ao": "ao.unresolved_share > 0.2",
     },
     judge,
 )  # fmt: skip

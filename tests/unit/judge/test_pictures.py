@@ -49,7 +49,7 @@ def test_a_map_that_is_cut_off():
     truth = page.reshape(-1, 3)[pixel].astype(np.float64)
 
     def found(maps):
-        return cut_off(maps, ALL, Compared(truth, truth, 0 * truth, (truth, truth), pixel), pixel)
+        return cut_off(maps, ALL, Compared(truth, truth, 0 * truth, (truth, truth), pixel, 0 * truth), pixel)
 
     assert found(page) == 0
     limit = np.float32(np.percentile(page, 95))
