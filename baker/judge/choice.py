@@ -1,4 +1,4 @@
-"""Which texels are judged: all objects, all brightnesses, evenly by area; more where a light level has few."""
+"""Which texels are judged: all objects and brightnesses, evenly by area; more where a light level has few."""
 
 from __future__ import annotations
 

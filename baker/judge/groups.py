@@ -12,11 +12,11 @@ A single place is known to some percent; a mean over a hundred of them to a tent
 of a whole object, colour or room is seen far below the noise of its texels. How much of it is sure is what is
 left when `z_needed(m)` standard errors are taken off: a deviation is never reported larger than it is by
 chance. m is the number of places that bring the light, (sum w)^2 / sum w^2 with w = v + r; where it is below
-`LEAST` nothing is sure. The error is the largest of three: that of the jackknife (how the figure changes if one place is left
-out: it holds the noise of the bake and of the reference, and where one bright place decides it is large), that
-of the reference alone, and half the difference between the figures of two halves of the reference.
-A group whose reference is off by more than `_UNKNOWN` of its mean light (rms over its places) has no own error
-that is sure: light that rare paths bring is missing at most of its places, and too much at some.
+`LEAST` nothing is sure. The error is the largest of three: that of the jackknife (how the figure changes if
+one place is left out: it holds the noise of the bake and of the reference, and where one bright place decides
+it is large), that of the reference alone, and half the difference between the figures of two halves of the
+reference. A group whose reference is off by more than `_UNKNOWN` of its mean light (rms over its places) has
+no own error that is sure: light that rare paths bring is missing at most of its places, and too much at some.
 A shift of colour is nearly free of noise where a path's colours rise and fall together.
 
 Where the reference finds no light (less than three of its standard errors) differences are held against
@@ -181,9 +181,7 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
     scale = np.maximum(r, lowest) if lowest > 0 else np.full(n, total / n)
     apart = 0.5 * (places.halves[0] - places.halves[1]).mean(axis=1)
     shown = np.where(np.isfinite(places.spread), places.spread, 0.0).mean(axis=1)
-    known = own_error(
-        v, r, shown, apart, max(lowest, total / n * _FAINT, bright * _FAINTEST), z_needed(n)
-    )
+    known = own_error(v, r, shown, apart, max(lowest, total / n * _FAINT, bright * _FAINTEST), z_needed(n))
     if math.sqrt(float((shown**2).mean())) * n > _UNKNOWN * total:
         known = known._replace(least=0.0)
     return GroupFigures(
@@ -210,9 +208,7 @@ def _colour_shift(places: Compared) -> tuple[NDArray[np.float64], NDArray[np.flo
     scale = np.maximum(share_r, _LEAST_SHARE)
     left = [
         (total - each) / np.maximum(total.mean() - mean, 1e-9 * total.mean())[:, None]
-        for total, each, mean in zip(
-            all_sums[:2], (places.value, places.reference), (v, r), strict=True
-        )
+        for total, each, mean in zip(all_sums[:2], (places.value, places.reference), (v, r), strict=True)
     ]
     error = np.maximum(_jackknife((left[0] - left[1]) / scale), 0.5 * np.abs(one - other) / scale)
     return (share_v - share_r) / scale, error

@@ -1,13 +1,13 @@
-"""The error that values have of their own, beside the known noise of the reference that they are held against.
+"""The error that values have of their own, beside the known noise of the reference they are held against.
 
-For a group of n places with values v, reference r and its standard error s let c = max((v + r) / 2, floor) and
-a the median of (v - r) / c, weighed by 1 / max(s / c, 0.02). The own error b, relative, solves
+For a group of n places with values v, reference r and its standard error s let c = max((v + r) / 2, floor),
+and a the median of (v - r) / c, weighed by 1 / max(s / c, 0.02). The own error b, relative, solves
 
-    mean psi(((v - r - a c) / f)^2 / (b^2 c^2 + s^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
+    mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
 
-so that b^2 is the variance of the values about the truth if both errors are normal: places of much noise count
-less than those of little, and a few places that are far off (shadow edges, mouths of gaps) count as being two
-standard deviations off. b is 0 where the noise of the reference explains all.
+so that b^2 is the variance of the values about the truth if both errors are normal: places of much noise
+count less than those of little, and a few places that are far off (shadow edges, mouths of gaps) count as
+being two standard deviations off. b is 0 where the noise of the reference explains all.
 
 A shift a that all places have in common is not part of b. It is judged as bias; and in a group that light
 reaches by rare paths the places that saw none of them are all off by what these bring, in one direction.
@@ -87,9 +87,7 @@ def _median(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
     return float(value[order[np.searchsorted(below, 0.5 * below[-1])]])
 
 
-def _root(
-    error: NDArray[np.float64], known: NDArray[np.float64], z: float, *, factor: bool = False
-) -> float:
+def _root(error: NDArray[np.float64], known: NDArray[np.float64], z: float, *, factor: bool = False) -> float:
     """Return for which b the mean of psi is as expected, z standard errors of it less.
 
     With `factor` b multiplies the known errors (n,), else its square is added to theirs.

@@ -19,7 +19,7 @@ from baker.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 # Less of a texel's square than this is no surface to be judged.
 _LEAST = 1.0e-3
 _WHOLE = 0.98
-# A vertex whose normal leans further from the face than this (cosine) belongs to a hard edge: nothing is lifted.
+# A vertex whose normal leans further from the face than this (cosine) belongs to a hard edge: no lift.
 _HARD = 0.7
 
 
@@ -98,8 +98,8 @@ def lift(
 ) -> NDArray[np.float64]:
     """Return by what vectors (n, k, 3) places lie below the curved surface that the shading normals suggest.
 
-    That surface is the weighted mean of a place's projections onto the tangent planes of the three corners, of
-    those planes that it lies below.
+    That surface is the weighted mean of a place's projections onto the tangent planes of the three corners,
+    of those planes that it lies below.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
 """Which points of a bake are judged: texels at their middles, texels that stand out, points at edges,
-texels of light levels that have few."""
+texels of light levels that have few.
+"""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ DISTORTION = Judgement(
     {
         "irradiance": "irradiance.shifted > 0, irradiance.shifted_charts > 0,"
         " irradiance.exponent_error > 0.05, irradiance.blurred > 0,"
-        " irradiance.few_levels > 0, irradiance.cut_off > 0.02, irradiance.misfilled_share > 0.03",
+        " irradiance.few_levels > 0, irradiance.cut_off > 0.02, irradiance.misfilled_share > 0.05",
         "ao": "ao.shifted > 0, ao.shifted_charts > 0, ao.blurred > 0, ao.few_levels > 0",
     },
     judge,

@@ -15,10 +15,9 @@ from baker.judge.groups import Compared
 from baker.verification.points import EDGE, SCARCE, STEEP, SUSPECT, TEXEL, Pages, Points
 from baker.verification.unjudged import Unjudged
 
-
 # Texels of which surface covers less, or less lies in the open, are borders.
 _COVERED = 0.75
-# More of the light around a point than this comes from below the facet, above the horizon of its shading normal.
+# Tilted: more of the light around a point than this comes from below its facet.
 _TILTED = 0.005
 
 
@@ -68,8 +67,8 @@ class Evidence:
     def tilted(self) -> NDArray[np.bool_]:
         """Return where the shading normal leans from the facet so far that the two see different light.
 
-        The reference lets no light arrive from below a facet; the bake lets it, as a curved surface would. Of a
-        cosine-weighted hemisphere around a normal that leans by t this is (1 - cos t) / 2.
+        The reference lets no light arrive from below a facet; the bake does, as a curved surface would. Of
+        a cosine-weighted hemisphere around a normal that leans by t this is (1 - cos t) / 2.
         """
         places = self.points.places
         lean = (places.normal * places.face_normal).sum(axis=2).mean(axis=1)

@@ -1,8 +1,9 @@
-"""Light levels of the whole scene: how far are values spread about the truth at each, in the dark as in the light.
+"""Light levels of the whole scene: how far values are spread about the truth, in the dark as in the light.
 
-Texels of all rooms are taken by half powers of ten of their light; and the darkest of them once more, by share:
-what is wrong in the darkest tenth of a scene alone must not hide among texels that are brighter. Narrower levels
-than that would be no use: whoever is sorted by values that are wrong is found among those that are wrong alike.
+Texels of all rooms are taken by half powers of ten of their light; and the darkest of them once more, by
+share: what is wrong in the darkest tenth of a scene alone must not hide among texels that are brighter.
+Narrower levels than that would be no use: whoever is sorted by values that are wrong is found among those
+that are wrong alike.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 
 _DARKEST = (0.05, 0.1, 0.2)
-# A reference whose relative standard error is this is as good for telling a texel's level as the map.
+# A reference with this relative standard error tells a texel's level as well as a map that is to be caught.
 KNOWN = 0.15
 
 
 def level_light(compared: Compared, known: float) -> NDArray[np.float64]:
     """Return by what light (n,) places are ordered.
 
-    That of the reference where it is known well, of the map where it is not: whichever is taken, places that its
-    error brings over the end of a level gather at one side of the truth. A map is as likely to be wrong as
-    `known`, the relative standard error at which both count alike.
+    That of the reference where it is known well, of the map where it is not: whichever is taken, places that
+    its error brings over the end of a level gather at one side of the truth. Both count alike where the
+    relative standard error of the reference is `known`, about what the map may be wrong by.
     """
     value, reference = compared.value.mean(axis=1), compared.reference.mean(axis=1)
     noise = np.where(np.isfinite(compared.spread), compared.spread, 0.0).mean(axis=1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baker.judge.figures import dark_floor, figures
 from baker.verification.judgements.groups import make_groups, worst_figures

@@ -22,7 +22,9 @@ def judge(evidence: Evidence) -> Judged:
     )
     median, noise = found["median"], found["noise_floor"]
     excess = None if median is None or noise is None else beyond_noise(median, noise)
-    groups = make_groups(evidence, [("all texels", np.flatnonzero(mine & ~evidence.points.gap & ~evidence.tilted))])
+    groups = make_groups(
+        evidence, [("all texels", np.flatnonzero(mine & ~evidence.points.gap & ~evidence.tilted))]
+    )
     whole, remarks = worst_figures("whole", groups, evidence.channel)
     return Judged({**found, **whole, "median_excess": excess}, remarks)
 

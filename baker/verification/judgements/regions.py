@@ -10,7 +10,7 @@ from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 from baker.verification.judgements.levels import level_light
 
-# As of `levels.level_light`: a bias is told from the error of single texels of a sound map, not from noise put in.
+# Of `level_light`: what single texels of a sound map are off by, as a bias is looked for here, not noise.
 _KNOWN = 0.03
 _NAMED = 3
 

@@ -133,7 +133,15 @@ def test_bright_and_dark_places_in_one_group_are_no_noise_of_the_map():
         halves = halved(rng, light, noise)
         reference = 0.5 * (halves[0] + halves[1])
         found = compare_group(
-            Compared(light[:, None], reference, noise[:, None] * reference, halves, np.full(23, 256), noise[:, None] * reference), 1000.0
+            Compared(
+                light[:, None],
+                reference,
+                noise[:, None] * reference,
+                halves,
+                np.full(23, 256),
+                noise[:, None] * reference,
+            ),
+            1000.0,
         )
         sure += found.sure_noise > 0
         apart += found.typical > 4 * found.typical_noise
@@ -149,6 +157,9 @@ def test_noise_of_a_map_among_bright_and_dark_places_is_told():
     reference = 0.5 * (halves[0] + halves[1])
     map_ = (light * (1 + 0.5 * rng.standard_normal(100)))[:, None]
     found = compare_group(
-        Compared(map_, reference, noise[:, None] * reference, halves, np.full(100, 256), noise[:, None] * reference), 1000.0
+        Compared(
+            map_, reference, noise[:, None] * reference, halves, np.full(100, 256), noise[:, None] * reference
+        ),
+        1000.0,
     )
     assert found.sure_noise > 0.15

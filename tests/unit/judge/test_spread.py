@@ -11,7 +11,7 @@ from baker.judge.spread import own_error
 
 
 def drawn(rng, n, own, noise, light=None):
-    """Return a map of an error, a reference of another, its standard errors, and half its halves' difference."""
+    """Return a map, a reference, its standard errors, and half of what its halves differ."""
     light = np.ones(n) if light is None else light
     noise = np.broadcast_to(noise, n) * light
     halves = [light + math.sqrt(2) * noise * rng.standard_normal(n) for _ in range(2)]
