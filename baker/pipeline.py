@@ -34,7 +34,7 @@ from baker.radiosity.crevices import gap_depth
 from baker.radiosity.direct import DirectLight, direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
-from baker.radiosity.patches import build_patches
+from baker.radiosity.patches import NARROW, build_patches
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.trapped import light_warnings
 from baker.unwrap.unwrap import unwrap_scene
@@ -168,9 +168,21 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
         run = farm.runner("direct light", {"inside": world.inside})
         direct = light_directly(scene, world, settings, record.progress, run)
         record.rays["direct light"] = direct.rays
+    with record.stage("form factors"):
+        depth, cast = gap_depth(
+            texels,
+            world.surface,
+            world.mask,
+            world.rays.tracer,
+            seed=settings.seed,
+            threads=thread_count(settings.threads),
+            progress=record.progress,
+            kept=world.kept,
+        )
+        record.rays["form factors"] = cast
     exitance = np.zeros((texels.n, 4), np.float32)
     if settings.bounces != 0:
-        exitance[:, :3] = _reflected(world, direct.complete, sky, settings, record, farm)
+        exitance[:, :3] = _reflected(world, direct.complete, depth, settings, record, farm)
     # It has done its part.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
@@ -181,7 +193,7 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
         del exitance
         gathered = gather_light(world, (seen, direct.exact), settings, record.progress, run)
         record.rays["final gather"] = gathered.rays
-    return Transport(direct=direct, gathered=gathered)
+    return Transport(direct=direct, gathered=gathered, gap=depth[: texels.n_front] >= NARROW)
 
 
 def light_directly(
@@ -267,24 +279,18 @@ def patch_rays(settings: BakeSettings) -> int:
 def _reflected(
     world: World,
     complete: NDArray[np.float32],
-    sky: NDArray[np.float64],
+    depth: NDArray[np.uint8],
     settings: BakeSettings,
     record: Record,
     farm: Farm,
 ) -> NDArray[np.float32]:
-    """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own."""
+    """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own.
+
+    depth : (n,) uint8, of each entry in gaps, see `gap_depth`
+    """
     texels = world.texels
+    sky: NDArray[np.float64] = np.array(settings.sky_radiance, np.float64)
     with record.stage("form factors"):
-        depth, cast = gap_depth(
-            texels,
-            world.surface,
-            world.mask,
-            world.rays.tracer,
-            seed=settings.seed,
-            threads=thread_count(settings.threads),
-            progress=record.progress,
-            kept=world.kept,
-        )
         patches = build_patches(texels, depth, link=world.sides.link)
         matrix = build_form_factors(
             patches,
@@ -300,7 +306,7 @@ def _reflected(
             kept=world.kept,
             run=farm.runner("form factors", {"inside": world.inside, "depth": depth}),
         )
-        record.rays["form factors"] = matrix.rays + cast
+        record.rays["form factors"] += matrix.rays
     with record.stage("solve"):
         weight = np.maximum(texels.area, 1e-12)
         albedo = patches.mean(texels.albedo, weight)
@@ -365,6 +371,7 @@ def _finish(
                         texels.page_image(part.value, page=page),
                         texels.page_image(part.error, page=page),
                         part.bound,
+                        None if part.kept is None else texels.page_image(part.kept, fill=False, page=page),
                     )
                     for part in layers
                 ]

@@ -25,12 +25,15 @@ class Transport:
         Cosine-weighted share of the hemisphere that is open within the AO distance.
     ao_samples : int
         Rays behind each value of `open`.
+    gap : (n_front,) bool or None
+        Whether a texel lies in a gap about a texel wide.
     """
 
     direct: DirectLight | None = None
     gathered: Gathered | None = None
     open: NDArray[np.float32] | None = None
     ao_samples: int = 0
+    gap: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,14 @@ class Layer:
         Standard error of the mean of the C values.
     bound : bool
         Whether that is an upper bound, perhaps a loose one.
+    kept : (n_front,) bool or None
+        Texels that are not denoised.
     """
 
     value: NDArray[np.float32]
     error: NDArray[np.float32]
     bound: bool = False
+    kept: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)

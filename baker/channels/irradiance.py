@@ -11,14 +11,20 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 
 
 def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
-    """Return sampled lights and gathered light as two layers: sharp shadows apart from soft light."""
+    """Return sampled lights and gathered light as two layers: sharp shadows apart from soft light.
+
+    In gaps about a texel wide both stay as they were sampled. Light falls to a hundredth from one texel to
+    the next there, and a filter smears it. *Measured* at 256 with 64 rays on such texels with and without the
+    filter, mean and median error: +78 and 33 %, +1 and 3 % (hall, 10 to 32 lx); +35 and 17 %, +3 and 12 %
+    (interior, 3 to 10 lx).
+    """
     direct, gathered = transport.direct, transport.gathered
     if direct is None or gathered is None:
         raise ValueError("the irradiance channel needs direct and gathered light")
     n_front = len(gathered.indirect)
     return (
-        Layer(direct.weighted[:n_front], np.sqrt(direct.variance[:n_front])),
-        Layer(gathered.indirect + gathered.direct, np.sqrt(gathered.variance)),
+        Layer(direct.weighted[:n_front], np.sqrt(direct.variance[:n_front]), kept=transport.gap),
+        Layer(gathered.indirect + gathered.direct, np.sqrt(gathered.variance), kept=transport.gap),
     )
 
 

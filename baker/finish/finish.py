@@ -13,6 +13,7 @@ from baker.finish.border import recentre
 from baker.finish.denoise import denoise_page
 from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
+from baker.finish.keep_light import keep_light
 from baker.finish.packing import pack_charts
 
 STAGE = "finish"
@@ -60,12 +61,14 @@ class PagePlan:
 class PageLayer(NamedTuple):
     """A part of a page that is denoised by itself.
 
-    value (H, W, C) float32; error (H, W) float32, standard error; bound: whether that is an upper bound.
+    value (H, W, C) float32; error (H, W) float32, standard error; bound: whether that is an upper bound;
+    kept (H, W) bool or None: texels that stay as they were sampled.
     """
 
     value: NDArray[np.float32]
     error: NDArray[np.float32]
     bound: bool = False
+    kept: NDArray[np.bool_] | None = None
 
 
 def finish_page(
@@ -95,7 +98,7 @@ def finish_page(
     """
     total = np.zeros_like(layers[0].value)
     light = _light(plan, layers)
-    for value, error, bound in layers:
+    for value, error, bound, kept in layers:
         if not value[plan.valid].any():
             continue
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
@@ -104,7 +107,12 @@ def finish_page(
             # The noise of texels inside geometry is none of those around them.
             error = np.where(plan.valid, error, np.float32(0.0))
             noisy = PageLayer(repaired, error, bound)
-            repaired = _denoise(noisy, plan.chart, plan.covered & worth[plan.chart], threads, progress)
+            chosen = plan.covered & worth[plan.chart]
+            filtered = _denoise(noisy, plan.chart, chosen, threads, progress)
+            if kept is not None:
+                chosen &= ~kept
+                filtered = np.where(kept[..., None], repaired, filtered)
+            repaired = keep_light(repaired, filtered, plan.chart, chosen)
         centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
         total += np.minimum(centred, _brightest(repaired), out=centred)
     np.clip(total, 0.0, upper, out=total)

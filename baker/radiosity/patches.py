@@ -22,7 +22,7 @@ from baker.kernels.regions import join_linked
 # The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
 MAX_PATCHES = 32768
 # Depth in gaps (`crevices`) from which blocks are as small as can be.
-_NARROW = 2
+NARROW = 2
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def build_patches(
     """
     depth = np.zeros(len(texels.pixel), np.uint8) if depth is None else depth
     block = _smallest_block(texels, depth, np.arange(len(depth)), max_patches)
-    narrow = np.flatnonzero(depth >= _NARROW)
+    narrow = np.flatnonzero(depth >= NARROW)
     side = np.full(len(depth), block, np.int64)
     side[narrow] = min(_smallest_block(texels, depth, narrow, max_patches), block)
     number, n_patches = _blocks(texels, depth, side, link)

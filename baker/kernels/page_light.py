@@ -1,0 +1,138 @@
+"""Kernels that give a filtered page the light of its samples, by sums over blocks of texels of one chart."""
+
+from __future__ import annotations
+
+from baker.trace.jit import inner, kernel, larger, smaller
+
+# Side of a block, texels; half window of blocks around one, with weights that fall off to its edge.
+BLOCK, REACH = 8, 2
+# A window of so many texels gets half of what it lacks.
+HALF = 30.0
+# No texel is made darker or brighter by more than these shares.
+LEAST, MOST = -0.5, 1.0
+
+
+@kernel
+def group_blocks(chart, chosen, label, first, owner):  # type: ignore[no-untyped-def]
+    """Number the groups: chosen texels of one chart in one block. Returns how many there are.
+
+    chart : (H, W) int32; chosen : (H, W) bool
+    label : (H, W) int32, receives the group of each texel, -1 for none
+    first : (blocks + 1,) int64, receives where the groups of each block begin
+    owner : (n,) int32 for n chosen texels, receives the chart of each group
+    """
+    height, width = chart.shape
+    across, n = (width + BLOCK - 1) // BLOCK, 0
+    for block in range(len(first) - 1):
+        first[block] = n
+        top, left = block // across * BLOCK, block % across * BLOCK
+        for r in range(top, smaller(top + BLOCK, height)):
+            for c in range(left, smaller(left + BLOCK, width)):
+                label[r, c] = -1
+                if not chosen[r, c]:
+                    continue
+                group = _group_of(first[block], n, owner, chart[r, c])
+                if group < 0:
+                    group = n
+                    owner[n] = chart[r, c]
+                    n += 1
+                label[r, c] = group
+    first[len(first) - 1] = n
+    return n
+
+
+@inner
+def _group_of(begin, end, owner, chart):  # type: ignore[no-untyped-def]
+    """Return the group of a chart among the groups begin to end, or -1."""
+    for group in range(begin, end):
+        if owner[group] == chart:
+            return group
+    return -1
+
+
+@kernel
+def sum_groups(noisy, filtered, label, light, sums):  # type: ignore[no-untyped-def]
+    """Add up what the filter took and what it left, relative to the mean light of each group.
+
+    noisy, filtered : (H, W, C) float32; label : (H, W) int32
+    light : (G, 2) float64 zeros, receives the filtered light of each group's texels and their number
+    sums : (G, 2 C + 1) float64 zeros, receives the sums of (noisy - filtered) / light and filtered / light of
+        each channel, and the number of texels
+    """
+    height, width, channels = noisy.shape
+    for r in range(height):
+        for c in range(width):
+            group = label[r, c]
+            if group >= 0:
+                light[group, 1] += 1.0
+                for j in range(channels):
+                    light[group, 0] += filtered[r, c, j]
+    for r in range(height):
+        for c in range(width):
+            group = label[r, c]
+            if group < 0 or light[group, 0] <= 0.0:
+                continue
+            weight = light[group, 1] / light[group, 0]
+            for j in range(channels):
+                sums[group, j] += weight * (float(noisy[r, c, j]) - float(filtered[r, c, j]))
+                sums[group, channels + j] += weight * float(filtered[r, c, j])
+            sums[group, 2 * channels] += 1.0
+
+
+@kernel
+def missing_shares(first, owner, across, sums, share):  # type: ignore[no-untyped-def]
+    """Write the share (G, C) float64 of light that windows around groups lack, as far as it is believed.
+
+    across : int, blocks in a row; others as above
+    """
+    channels = share.shape[1]
+    blocks = len(first) - 1
+    for block in range(blocks):
+        row, column = block // across, block % across
+        for group in range(first[block], first[block + 1]):
+            for j in range(channels):
+                taken = left = n = 0.0
+                for y in range(larger(row - REACH, 0), smaller(row + REACH + 1, blocks // across)):
+                    for x in range(larger(column - REACH, 0), smaller(column + REACH + 1, across)):
+                        b = y * across + x
+                        other = _group_of(first[b], first[b + 1], owner, owner[group])
+                        if other < 0:
+                            continue
+                        w = (REACH + 1.0 - abs(y - row)) * (REACH + 1.0 - abs(x - column))
+                        w /= (REACH + 1.0) * (REACH + 1.0)
+                        taken += w * sums[other, j]
+                        left += w * sums[other, channels + j]
+                        n += w * sums[other, 2 * channels]
+                if left > 0.0:
+                    share[group, j] = smaller(larger(taken / left * n / (n + HALF), LEAST), MOST)
+
+
+@kernel
+def add_shares(label, first, owner, across, share, page):  # type: ignore[no-untyped-def]
+    """Multiply a page (H, W, C) float32 by 1 + share, interpolated between the middles of blocks."""
+    height, width, channels = page.shape
+    down = (len(first) - 1) // across
+    for r in range(height):
+        for c in range(width):
+            group = label[r, c]
+            if group < 0:
+                continue
+            row, column = r // BLOCK, c // BLOCK
+            v, u = (r % BLOCK + 0.5) / BLOCK - 0.5, (c % BLOCK + 0.5) / BLOCK - 0.5
+            y = smaller(larger(row + (1 if v > 0.0 else -1), 0), down - 1)
+            x = smaller(larger(column + (1 if u > 0.0 else -1), 0), across - 1)
+            v, u = abs(v), abs(u)
+            chart = owner[group]
+            beside = _group_or(row * across + x, first, owner, chart, group)
+            below = _group_or(y * across + column, first, owner, chart, group)
+            corner = _group_or(y * across + x, first, owner, chart, group)
+            for j in range(channels):
+                own = (1.0 - v) * ((1.0 - u) * share[group, j] + u * share[beside, j])
+                page[r, c, j] *= 1.0 + own + v * ((1.0 - u) * share[below, j] + u * share[corner, j])
+
+
+@inner
+def _group_or(block, first, owner, chart, otherwise):  # type: ignore[no-untyped-def]
+    """Return a chart's group in a block, or another one."""
+    group = _group_of(first[block], first[block + 1], owner, chart)
+    return group if group >= 0 else otherwise
