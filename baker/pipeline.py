@@ -27,6 +27,7 @@ from baker.core.scene import Scene, SceneWarning, check_brightness
 from baker.core.settings import BakeSettings
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
+from baker.finish.oidn import LightmapDenoiser
 from baker.io.load import load_for_bake
 from baker.kernels.side_table import SeenLight
 from baker.lint.in_bake import bake_warnings
@@ -359,13 +360,14 @@ def _finish(
     noisy = np.zeros(n_front, bool)
     lightmaps: dict[str, Lightmap] = {}
     statistics: dict[str, dict[str, Any]] = {}
-    with record.stage("finish"):
-        for name, channel in channels.items():
-            layers = channel.layers(transport)
-            value = np.zeros(
-                (atlas.n_pages, atlas.resolution, atlas.resolution, channel.components), np.float32
-            )
-            for page in range(atlas.n_pages):
+    shape = (atlas.n_pages, atlas.resolution, atlas.resolution)
+    layers = {name: channel.layers(transport) for name, channel in channels.items()}
+    value = {name: np.zeros((*shape, channel.components), np.float32) for name, channel in channels.items()}
+    threads = thread_count(settings.threads)
+    with record.stage("finish"), LightmapDenoiser(threads) as lightmap_denoiser:
+        for page in range(atlas.n_pages):
+            plan = PagePlan(region[page], valid[page], centroid[page])
+            for name, channel in channels.items():
                 images = [
                     PageLayer(
                         texels.page_image(part.value, page=page),
@@ -373,22 +375,22 @@ def _finish(
                         part.bound,
                         None if part.kept is None else texels.page_image(part.kept, fill=False, page=page),
                     )
-                    for part in layers
+                    for part in layers[name]
                 ]
-                plan = PagePlan(region[page], valid[page], centroid[page])
-                value[page], grown = finish_page(
+                value[name][page], grown = finish_page(
                     plan,
                     images,
                     upper=channel.upper,
-                    denoise=settings.denoise,
+                    denoiser=lightmap_denoiser if settings.denoise else None,
                     dilation=max(2 * settings.padding, 8),
-                    threads=thread_count(settings.threads),
+                    threads=threads,
                     progress=record.progress,
                 )
                 status[page][grown] = TexelStatus.DILATED
-            noisy |= _unconverged(layers, texels.chart[:n_front])
-            lightmaps[name] = Lightmap(name, channel.unit, value)
-            statistics[name] = _statistics(value[chart >= 0], int((~good).sum()))
+        for name, channel in channels.items():
+            noisy |= _unconverged(layers[name], texels.chart[:n_front])
+            lightmaps[name] = Lightmap(name, channel.unit, value[name])
+            statistics[name] = _statistics(value[name][chart >= 0], int((~good).sum()))
     flat = status.reshape(-1)
     flat[texels.pixel[:n_front][noisy & good]] = TexelStatus.UNCONVERGED
     flat[texels.pixel[:n_front][~good]] = TexelStatus.INVALID

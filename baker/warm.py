@@ -166,6 +166,7 @@ def cast_rays(kind: str = "") -> None:
 def finish_pages() -> None:
     """Finish a page of two charts, one of them with a buried texel."""
     from baker.finish.finish import PageLayer, PagePlan, finish_page
+    from baker.finish.oidn import LightmapDenoiser
 
     chart = np.full((_PAGE, _PAGE), -1, np.int32)
     chart[4:20, 4:40] = 0
@@ -177,7 +178,7 @@ def finish_pages() -> None:
     value = noise.random((_PAGE, _PAGE, 3), np.float32)
     error = np.full((_PAGE, _PAGE), 0.3, np.float32)
     layers = [PageLayer(value, error, bound=True)]
-    finish_page(plan, layers, upper=1.0, denoise=True, dilation=4, threads=1, progress=silent)
+    finish_page(plan, layers, upper=1.0, denoiser=LightmapDenoiser(1), dilation=4, threads=1, progress=silent)
 
 
 if __name__ == "__main__":

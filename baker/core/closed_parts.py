@@ -94,7 +94,7 @@ def find_closed_parts(
     part, outward = np.full(n, -1, np.int32), np.zeros(n, np.int8)
     rows = np.flatnonzero(used)
     vertex = _weld(position, triangle[rows], instance[rows])
-    distinct = (vertex != np.roll(vertex, 1, axis=1)).all(axis=1)
+    distinct = _distinct(vertex)
     rows, vertex = rows[distinct], vertex[distinct]
     if not len(rows):
         none = np.zeros((0, 3))
@@ -119,10 +119,26 @@ def find_closed_parts(
     closed &= ~lidless
     order = np.argsort(pieces.piece, kind="stable")
     start = np.searchsorted(pieces.piece[order], np.arange(n_parts))
-    low = np.minimum.reduceat(corner.min(axis=1)[order], start, axis=0)
-    high = np.maximum.reduceat(corner.max(axis=1)[order], start, axis=0)
+    a, b, c = (corner[order, k] for k in range(3))
+    low = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), start, axis=0)
+    high = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), start, axis=0)
     exact = closed & (pieces.holes <= NO_HOLES * pieces.area)
     return ClosedParts(part, outward, closed, exact, lidless, pieces.area, low, high)
+
+
+def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the areas (F,) of triangles, corners (F, 3, 3)."""
+    (ux, uy, uz), (vx, vy, vz) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    area: NDArray[np.float64] = 0.5 * np.sqrt(x * x + y * y + z * z)
+    return area
+
+
+def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return (F,) bool: the three corners of a face (F, 3) differ."""
+    a, b, c = vertex.T
+    distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
+    return distinct
 
 
 def _weld(
@@ -142,7 +158,9 @@ def _weld(
 
 def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
     """Return (F,) the first face with the same three corners, and 1 if that is wound alike, else -1."""
-    ordered = np.sort(vertex, axis=1)
+    a, b, c = vertex.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    ordered = np.stack([low, a + b + c - low - high, high], axis=1)
     n = int(ordered.max(initial=0)) + 1
     # One number for three would overflow: the hash of all is enough to find candidates.
     key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
@@ -189,8 +207,7 @@ def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
     begin = vertex[edges.face, edges.corner]
     way = np.where(begin == edges.low[half], 1, -1) * turn[edges.face]
     net = np.add.reduceat(way, edges.first)
-    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    total = np.bincount(piece, area, minlength=n_pieces).astype(np.float64)
+    total = np.bincount(piece, face_areas(corner), minlength=n_pieces).astype(np.float64)
     bad = np.flatnonzero(net != 0)
     holes, flat = np.zeros(n_pieces), np.zeros(n_pieces, bool)
     if len(bad):
@@ -282,7 +299,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     renamed = np.arange(base)
     renamed[np.concatenate([vertex[face, c], vertex[face, (c + 1) % 3]])] = base + place
     shared = renamed[vertex[chosen]]
-    distinct = (shared != np.roll(shared, 1, axis=1)).all(axis=1)
+    distinct = _distinct(shared)
     chosen, shared = chosen[distinct], shared[distinct]
     again = _pieces(shared, corner[chosen])
     good = again.holes <= SMALL_HOLES * again.area

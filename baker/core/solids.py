@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.closed_parts import ClosedParts, find_closed_parts
+from baker.core.closed_parts import ClosedParts, face_areas, find_closed_parts
 from baker.core.scene import Scene
 from baker.core.winding import MANY, Enclosure
 
@@ -144,8 +144,7 @@ class _Judge:
 
     def _areas(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
-        cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        return np.asarray(0.5 * np.linalg.norm(cross, axis=1))
+        return face_areas(corner)
 
     def hollows(self) -> NDArray[np.int64]:
         """Return the parts that are hollows of solids, known after `rooms`."""

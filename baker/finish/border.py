@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.finish.page import check_page
-from baker.finish.slope import highest_of_charts, match_lookups, move_to_centre
+from baker.finish.page import check_page, highest_of_charts
 from baker.finish.tiles import over_rows
+from baker.kernels.page_slope import match_lookups, move_to_centre
 
 # Sub-positions place a fully covered texel's centroid only so well; below this nothing is gained.
 SMALLEST_OFFSET = 0.02

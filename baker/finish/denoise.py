@@ -22,18 +22,20 @@ the filter does at gaps.
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, silent
 from baker.finish.noise import estimate_error
-from baker.finish.oidn import MEMORY_MB, denoiser_name, filter_lightmap
+from baker.finish.oidn import LightmapDenoiser, denoiser_name
 from baker.finish.page import check_page
-from baker.finish.slope import noisy_planes
 from baker.finish.tiles import over_rows
 from baker.kernels.page_charts import chart_sums
 from baker.kernels.page_fill import nearest_texel, reflect_outwards
 from baker.kernels.page_guard import hold_to_samples
+from baker.kernels.page_slope import NO_OFFSET, noisy_planes
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
@@ -62,7 +64,7 @@ def denoise_page(
     standard_error: NDArray[np.float32] | None = None,
     bound: bool = False,
     threads: int = 1,
-    memory_mb: int = MEMORY_MB,
+    denoiser: LightmapDenoiser | None = None,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
     """Remove Monte Carlo noise from the covered texels of a page.
@@ -79,8 +81,8 @@ def denoise_page(
     bound : bool
         Whether that is an upper bound: it is lowered to `FITTED` of the noise that the page shows.
     threads : int
-    memory_mb : int
-        Limit of the filter's scratch memory.
+    denoiser : LightmapDenoiser, optional
+        Keeps the filter's memory for further pages; without one it is taken and released here.
     progress : Progress
 
     Returns
@@ -114,7 +116,8 @@ def denoise_page(
     level = _levels(noisy, charts, inside)
     picture = surround_charts(noisy / level, inside, charts, threads=threads)
     wide = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
-    wide = filter_lightmap(wide, threads=threads, memory_mb=memory_mb, progress=progress)
+    with contextlib.ExitStack() as stack:
+        wide = (denoiser or stack.enter_context(LightmapDenoiser(threads))).filter(wide, progress)
     filtered = np.ascontiguousarray(wide[MARGIN:-MARGIN, MARGIN:-MARGIN] * level)
     error = _error_within(window, noisy, charts, inside, standard_error, bound, threads)
     held = np.array(filtered)
@@ -191,11 +194,14 @@ def surround_charts(
     """
     nearest = np.zeros(covered.shape, np.int32)
     nearest_texel(covered, nearest)
-    border = np.unique(nearest[~covered]).astype(np.int64)
+    wanted = np.zeros(covered.size, np.bool_)
+    wanted[nearest[~covered]] = True
+    border = np.flatnonzero(wanted)
     plane = np.zeros((len(border), 3, value.shape[2]), np.float32)
 
     def fit(begin: int, end: int) -> None:
-        plane[begin:end] = noisy_planes(value, chart, covered, border[begin:end], SLOPE_RADIUS)
+        own = border[begin:end]
+        noisy_planes(value, chart, covered, NO_OFFSET, own, SLOPE_RADIUS, plane[begin:end])
 
     over_rows(fit, len(border), threads, _BORDER_TEXELS)
     plane_row = np.zeros(covered.shape, np.int32)

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.finish.page import check_page
-from baker.finish.slope import extrapolate_outwards, highest_of_charts
+from baker.finish.page import check_page, highest_of_charts
 from baker.finish.tiles import over_rows
 from baker.kernels.page_fill import nearest_texel
+from baker.kernels.page_slope import NO_OFFSET, extrapolate_outwards
 
 
 def dilate(
@@ -23,6 +23,7 @@ def dilate(
     chart: NDArray[np.int32],
     pixels: int,
     *,
+    nearest: NDArray[np.int32] | None = None,
     threads: int = 1,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Give the empty texels within `pixels` of a chart the continued value of the nearest chart.
@@ -35,6 +36,8 @@ def dilate(
         Chart of each covered texel.
     pixels : int
         Rings of 8-neighbours to grow; 0 = none.
+    nearest : (H, W) int32, optional
+        From `nearest_texel`, if known.
     threads : int
 
     Returns
@@ -56,12 +59,13 @@ def dilate(
     out = np.where(covered[..., None], value, np.float32(0.0))
     if pixels == 0 or not covered.any():
         return out, grown
-    nearest = np.zeros(covered.shape, np.int32)
-    nearest_texel(covered, nearest)
+    if nearest is None:
+        nearest = np.zeros(covered.shape, np.int32)
+        nearest_texel(covered, nearest)
     highest = highest_of_charts(value, chart, covered)
     over_rows(
         lambda first, end: extrapolate_outwards(
-            out, chart, covered, nearest, highest, pixels, grown, first, end
+            out, chart, covered, nearest, NO_OFFSET, highest, pixels, grown, first, end
         ),
         len(out),
         threads,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,9 @@ from baker.finish.denoise import denoise_page
 from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
 from baker.finish.keep_light import keep_light
+from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
+from baker.kernels.page_fill import nearest_texel
 
 STAGE = "finish"
 # A layer is left as it was sampled if the noise of all texels of about one brightness is below this share of
@@ -57,6 +60,13 @@ class PagePlan:
         covered: NDArray[np.bool_] = self.chart >= 0
         return covered
 
+    @cached_property
+    def nearest(self) -> NDArray[np.int32]:
+        """Return the number of the covered texel nearest to each texel, (H, W) int32."""
+        nearest = np.zeros(self.chart.shape, np.int32)
+        nearest_texel(self.covered, nearest)
+        return nearest
+
 
 class PageLayer(NamedTuple):
     """A part of a page that is denoised by itself.
@@ -76,7 +86,7 @@ def finish_page(
     layers: list[PageLayer],
     *,
     upper: float,
-    denoise: bool,
+    denoiser: LightmapDenoiser | None,
     dilation: int,
     threads: int,
     progress: Progress,
@@ -88,6 +98,8 @@ def finish_page(
     layers : list of PageLayer
     upper : float
         Largest possible value of the sum.
+    denoiser : LightmapDenoiser or None
+        None: layers stay as they were sampled.
     dilation : int
         Texels by which charts grow into the gaps.
 
@@ -102,13 +114,13 @@ def finish_page(
         if not value[plan.valid].any():
             continue
         repaired, _ = fill_invalid(value, plan.chart, plan.valid)
-        worth = _worth_filtering(plan, error, light) if denoise else None
-        if worth is not None:
+        worth = _worth_filtering(plan, error, light) if denoiser else None
+        if denoiser and worth is not None:
             # The noise of texels inside geometry is none of those around them.
             error = np.where(plan.valid, error, np.float32(0.0))
             noisy = PageLayer(repaired, error, bound)
             chosen = plan.covered & worth[plan.chart]
-            filtered = _denoise(noisy, plan.chart, chosen, threads, progress)
+            filtered = _denoise(noisy, plan.chart, chosen, denoiser, threads, progress)
             if kept is not None:
                 chosen &= ~kept
                 filtered = np.where(kept[..., None], repaired, filtered)
@@ -116,7 +128,9 @@ def finish_page(
         centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
         total += np.minimum(centred, _brightest(repaired), out=centred)
     np.clip(total, 0.0, upper, out=total)
-    grown_value, grown = dilate(total, plan.covered, plan.chart, dilation, threads=threads)
+    grown_value, grown = dilate(
+        total, plan.covered, plan.chart, dilation, nearest=plan.nearest, threads=threads
+    )
     np.clip(grown_value, 0.0, np.minimum(_brightest(total), upper), out=grown_value)
     return grown_value, grown
 
@@ -125,28 +139,31 @@ def _denoise(
     layer: PageLayer,
     chart: NDArray[np.int32],
     chosen: NDArray[np.bool_],
+    denoiser: LightmapDenoiser,
     threads: int,
     progress: Progress,
 ) -> NDArray[np.float32]:
     """Return the page with the chosen texels, whole charts, denoised; a few are brought together first."""
     value, error = layer.value, layer.error
+
+    def filtered(
+        value: NDArray[np.float32],
+        chosen: NDArray[np.bool_],
+        chart: NDArray[np.int32],
+        error: NDArray[np.float32],
+    ) -> NDArray[np.float32]:
+        return denoise_page(
+            value, chosen, chart,
+            standard_error=error, bound=layer.bound, threads=threads, denoiser=denoiser, progress=progress,
+        )  # fmt: skip
+
     n_chosen, n_all = np.count_nonzero(chosen), np.count_nonzero(chart >= 0)
     packed = pack_charts(chart, chosen) if n_chosen < n_all else None
     if packed is None or packed.shape[0] * packed.shape[1] > SMALLER * n_all:
-        return denoise_page(
-            value, chosen, chart, standard_error=error, bound=layer.bound, threads=threads, progress=progress
-        )
-    filtered = denoise_page(
-        packed.take(value),
-        packed.take(chosen),
-        packed.take(chart, fill=-1),
-        standard_error=packed.take(error),
-        bound=layer.bound,
-        threads=threads,
-        progress=progress,
-    )
+        return filtered(value, chosen, chart, error)
+    part = filtered(packed.take(value), packed.take(chosen), packed.take(chart, fill=-1), packed.take(error))
     result = np.array(value)
-    packed.put(filtered, result)
+    packed.put(part, result)
     return result
 
 

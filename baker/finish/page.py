@@ -1,4 +1,4 @@
-"""Checks of the page arrays that every finishing stage takes."""
+"""What every finishing stage asks of page arrays: do they fit together, how bright are their charts."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from baker.kernels.page_charts import chart_maxima
 
 
 def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: NDArray[Any]) -> None:
@@ -29,3 +31,12 @@ def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: ND
     for name, mask in masks.items():
         if mask.shape[:2] != value.shape[:2]:
             raise ValueError(f"{name} must cover {value.shape[:2]} texels, it covers {mask.shape[:2]}")
+
+
+def highest_of_charts(
+    value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return the largest value of each chart's covered texels, (n_charts, C) float32; -inf if it has none."""
+    highest = np.full((int(chart.max(initial=-1)) + 1, value.shape[2]), -np.inf, np.float32)
+    chart_maxima(value, chart, covered, highest)
+    return highest

@@ -1,75 +1,345 @@
-"""Sums over windows of a lightmap page, from which planes are fitted (`baker.finish.slope`).
+"""Planes fitted to windows of a lightmap page, and values moved or continued along them.
 
-A window holds the texels of one chart around one of its texels, each placed at the centroid of its covered
-part.
+The plane at a texel is the weighted least-squares plane through the covered texels of its own chart in a
+window around it, each placed at the centroid of its covered part.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from baker.trace.jit import kernel, larger, smaller
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Columns of a row of sums: of the weights w, w x, w y, w x x, w x y, w y y, and the number of texels; then
-# for each channel those of w v, w x v, w y v, w v v, and the smallest and the largest value v.
+# Half window, texels.
+RADIUS = 2
+# A ridge in the normal equations: where the texels lie on one line, the slope across it comes out 0.
+RIDGE = 1e-3
+# How far a result may leave the range of the window's values, as a share of that range, and in units of the
+# steps between the three texels behind it: the last step and, times CURVED, the one before.
+HEADROOM = 0.5
+STEEP, CURVED = 2.0, 3.0
+# A plane must explain this share of the spread in a window before a value may leave the range of its chart.
+STRAIGHT = 0.95
+# Extrapolation stops growing this many texels outside the chart.
+MAX_STEP = 2.0
+# A value taken from a few texels must differ by this share to be believed instead of a plane's.
+NOISY = 0.03
+# A noisy slope counts by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
+DOUBT = 3.0
+# Added to squared distances, texels: the weight of a texel is 1 / (FLAT + distance^2). Wide windows of noisy
+# pages weigh more evenly.
+FLAT, NOISY_FLAT = 1.0, 4.0
+
+# Sums over a window: of the weights w, w x, w y, w x x, w x y, w y y, and the number of texels; then for each
+# channel those of w v, w x v, w y v, w v v, and the smallest and the largest value v.
 W, WX, WY, WXX, WXY, WYY, COUNT = range(7)
 WV, WXV, WYV, WVV, LOW, HIGH = range(6)
 N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
+# Columns of a plane, per channel: value at the texel, slope per column and per row, smallest and largest
+# value in the window, weighted sum of squares about the mean, and what of it the plane explains.
+CENTRE, ACROSS, DOWN, LOWEST, HIGHEST, SPREAD, EXPLAINED = range(7)
+N_PLANE = 7
+# How much further values may rise and fall; see `_trend`.
+RISE, FALL = range(2)
+
+MAX_CHANNELS = 16
+# Planes that are kept while neighbouring texels continue the same ones.
+_SLOTS = 64
+
+_sums = scratch((N_COLUMNS + N_CHANNEL_COLUMNS * MAX_CHANNELS,), np.float64)
+_planes = scratch((1, MAX_CHANNELS, N_PLANE), np.float64)
+_kept_planes = scratch((_SLOTS, MAX_CHANNELS, N_PLANE), np.float64)
+_kept_sources = scratch((_SLOTS,), np.int64)
+_trends = scratch((MAX_CHANNELS, 2), np.float64)
+# Offsets of a page whose values all lie at their texels' centres.
+NO_OFFSET = np.zeros((0, 0, 2), np.float32)
+
+
+@inner
+def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):  # type: ignore[no-untyped-def]
+    """Sum over the texels of one chart around texel (r, c), weighted by 1 / (flat + distance^2).
+
+    offset : (H, W, 2) float32, column and row offset of each value's place from its texel centre, texels;
+        (0, 0, 2) where all are zero
+    sums : output, see the column names; x and y are counted from the place of texel (r, c)
+    """
+    height, width, channels = value.shape
+    placed = offset.shape[0] > 0
+    own = chart[r, c]
+    for j in range(N_COLUMNS + N_CHANNEL_COLUMNS * channels):
+        sums[j] = 0.0
+    for j in range(channels):
+        sums[N_COLUMNS + N_CHANNEL_COLUMNS * j + LOW] = np.inf
+        sums[N_COLUMNS + N_CHANNEL_COLUMNS * j + HIGH] = -np.inf
+    for rr in range(larger(r - radius, 0), smaller(r + radius + 1, height)):
+        for cc in range(larger(c - radius, 0), smaller(c + radius + 1, width)):
+            if not covered[rr, cc] or chart[rr, cc] != own:
+                continue
+            x = float(cc - c)
+            y = float(rr - r)
+            if placed:
+                x += float(offset[rr, cc, 0]) - float(offset[r, c, 0])
+                y += float(offset[rr, cc, 1]) - float(offset[r, c, 1])
+            w = 1.0 / (flat + x * x + y * y)
+            sums[W] += w
+            sums[WX] += w * x
+            sums[WY] += w * y
+            sums[WXX] += w * x * x
+            sums[WXY] += w * x * y
+            sums[WYY] += w * y * y
+            sums[COUNT] += 1.0
+            for j in range(channels):
+                v = float(value[rr, cc, j])
+                at = N_COLUMNS + N_CHANNEL_COLUMNS * j
+                sums[at + WV] += w * v
+                sums[at + WXV] += w * x * v
+                sums[at + WYV] += w * y * v
+                sums[at + WVV] += w * v * v
+                sums[at + LOW] = smaller(sums[at + LOW], v)
+                sums[at + HIGH] = larger(sums[at + HIGH], v)
+
+
+@inner
+def fit_plane(  # type: ignore[no-untyped-def]
+    value, chart, covered, offset, r, c, radius, flat, sums, planes, slot
+):
+    """Fit a plane per channel to the texels of one chart around texel (r, c); written to planes[slot]."""
+    _sum_window(value, chart, covered, offset, r, c, radius, flat, sums)
+    weight = sums[W]
+    mx, my = sums[WX] / weight, sums[WY] / weight
+    cxx = sums[WXX] - sums[WX] * mx + RIDGE * weight
+    cyy = sums[WYY] - sums[WY] * my + RIDGE * weight
+    cxy = sums[WXY] - sums[WX] * my
+    determinant = cxx * cyy - cxy * cxy
+    for j in range(value.shape[2]):
+        at = N_COLUMNS + N_CHANNEL_COLUMNS * j
+        mean = sums[at + WV] / weight
+        bx, by = sums[at + WXV] - sums[WX] * mean, sums[at + WYV] - sums[WY] * mean
+        across, down = (cyy * bx - cxy * by) / determinant, (cxx * by - cxy * bx) / determinant
+        spread = larger(sums[at + WVV] - mean * sums[at + WV], 0.0)
+        planes[slot, j, CENTRE] = mean - across * mx - down * my
+        planes[slot, j, ACROSS] = across
+        planes[slot, j, DOWN] = down
+        planes[slot, j, LOWEST] = sums[at + LOW]
+        planes[slot, j, HIGHEST] = sums[at + HIGH]
+        planes[slot, j, SPREAD] = spread
+        planes[slot, j, EXPLAINED] = smaller(larger(across * bx + down * by, 0.0), spread)
+
+
+@inner
+def _step(along, reach):  # type: ignore[no-untyped-def]
+    """Return the nearest of -1, 0, 1 to along / reach."""
+    return 1 if along > 0.5 * reach else (-1 if along < -0.5 * reach else 0)
+
+
+@inner
+def _trend(value, chart, covered, r, c, x, y, trend):  # type: ignore[no-untyped-def]
+    """Write how much further values may rise and fall from texel (r, c) along (x, y) texels, both >= 0.
+
+    The two steps between a texel and those behind it must go the same way: then the value goes on as it
+    came. At the edge of a shadow, between faces that differ and in noise they do not.
+
+    trend : (C, 2) float64 output
+    """
+    height, width, channels = value.shape
+    reach = larger(abs(x), abs(y))
+    down, across = _step(y, reach), _step(x, reach)
+    r2, c2 = r - 2 * down, c - 2 * across
+    known = 0 <= r2 < height and 0 <= c2 < width
+    if known:
+        own = chart[r, c]
+        known = (
+            covered[r - down, c - across] and chart[r - down, c - across] == own
+            and covered[r2, c2] and chart[r2, c2] == own
+        )  # fmt: skip
+    for j in range(channels):
+        trend[j, RISE] = trend[j, FALL] = 0.0
+        if known:
+            one = float(value[r - down, c - across, j])
+            last, before = float(value[r, c, j]) - one, CURVED * (one - float(value[r2, c2, j]))
+            trend[j, RISE] = STEEP * reach * larger(smaller(last, before), 0.0)
+            trend[j, FALL] = STEEP * reach * larger(smaller(-last, -before), 0.0)
+
+
+@inner
+def _limited(planes, slot, j, estimate, trend, highest):  # type: ignore[no-untyped-def]
+    """Return an estimate cut to the window's range, and a little more where there is a trend.
+
+    Light never turns negative, and is brighter than the brightest texel of its chart, `highest`, only where
+    it rises as evenly as a plane.
+    """
+    low, high = planes[slot, j, LOWEST], planes[slot, j, HIGHEST]
+    room = HEADROOM * (high - low)
+    floor = low - smaller(room, trend[j, FALL])
+    if low >= 0.0 and floor < 0.0:
+        floor = 0.0
+    limited = smaller(larger(estimate, floor), high + smaller(room, trend[j, RISE]))
+    spread = planes[slot, j, SPREAD]
+    explained = planes[slot, j, EXPLAINED] / spread if spread > 0.0 else 0.0
+    even = larger(explained - STRAIGHT, 0.0) / (1.0 - STRAIGHT)
+    return limited - (1.0 - even) * larger(limited - highest, 0.0)
+
+
+@inner
+def _off_centre(covered, offset, smallest, r, c):  # type: ignore[no-untyped-def]
+    """Return whether texel (r, c) is covered and its centroid further than `smallest` from its centre."""
+    return covered[r, c] and larger(abs(offset[r, c, 0]), abs(offset[r, c, 1])) >= smallest
 
 
 @kernel
-def window_sums(value, chart, covered, offset, texel, radius, flat, sums):  # type: ignore[no-untyped-def]
-    """Sum over the texels of each chosen texel's chart around it, weighted by 1 / (flat + distance^2).
+def move_to_centre(  # type: ignore[no-untyped-def]
+    value, chart, covered, offset, smallest, highest, out, first_row, end_row
+):
+    """Move each texel's value from the centroid of its covered part to the texel centre.
 
     Parameters
     ----------
     value : (H, W, C) float32
     chart : (H, W) int32
     covered : (H, W) bool
-    offset : (H, W, 2) float32 or (0, 0, 2)
-        Column and row offset of each value's place from its texel centre, texels; empty = all zero.
+    offset : (H, W, 2) float32
+        Centroid minus texel centre (column, row), texels.
+    smallest : float
+        Offsets below this are left alone, texels.
+    highest : (n_charts, C) float32
+        Largest value of each chart.
+    out : (H, W, C) float32, changed in rows first_row to end_row - 1
+    """
+    sums, planes, trend = _sums(), _planes(), _trends()
+    for r in range(first_row, end_row):
+        for c in range(value.shape[1]):
+            if not _off_centre(covered, offset, smallest, r, c):
+                continue
+            x, y = -float(offset[r, c, 0]), -float(offset[r, c, 1])
+            fit_plane(value, chart, covered, offset, r, c, RADIUS, FLAT, sums, planes, 0)
+            _trend(value, chart, covered, r, c, x, y, trend)
+            for j in range(value.shape[2]):
+                estimate = float(value[r, c, j]) + planes[0, j, ACROSS] * x + planes[0, j, DOWN] * y
+                bound = float(highest[chart[r, c], j])
+                out[r, c, j] = np.float32(_limited(planes, 0, j, estimate, trend, bound))
+
+
+@kernel
+def match_lookups(  # type: ignore[no-untyped-def]
+    value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row
+):
+    """Set each partly covered texel so that a bilinear lookup at its centroid finds what was measured there.
+
+    Only where all texels of that lookup are covered and of one chart. What differs from `move_to_centre` by
+    some per cent is left to that: a plane through many texels is less noisy.
+
+    Parameters
+    ----------
+    value, chart, covered, offset, smallest, highest : see `move_to_centre`
+    moved : (H, W, C) float32, from `move_to_centre`
+    out : (H, W, C) float32, changed in rows first_row to end_row - 1
+    """
+    height, width, channels = value.shape
+    sums, planes, trend = _sums(), _planes(), _trends()
+    for r in range(first_row, end_row):
+        for c in range(width):
+            if not _off_centre(covered, offset, smallest, r, c):
+                continue
+            ox, oy = float(offset[r, c, 0]), float(offset[r, c, 1])
+            x, y = abs(ox), abs(oy)
+            # Row and column of the other texels of the lookup.
+            rr = smaller(larger(r + (1 if oy > 0.0 else -1), 0), height - 1)
+            cc = smaller(larger(c + (1 if ox > 0.0 else -1), 0), width - 1)
+            own = chart[r, c]
+            known = x < smallest or (covered[r, cc] and chart[r, cc] == own)
+            known = known and (y < smallest or (covered[rr, c] and chart[rr, c] == own))
+            both = smaller(x, y) < smallest or (covered[rr, cc] and chart[rr, cc] == own)
+            if not known or not both:
+                continue
+            fit_plane(value, chart, covered, offset, r, c, RADIUS, FLAT, sums, planes, 0)
+            _trend(value, chart, covered, r, c, -ox, -oy, trend)
+            for j in range(channels):
+                measured, plain = float(value[r, c, j]), float(moved[r, c, j])
+                others = x * (1.0 - y) * float(moved[r, cc, j]) + (1.0 - x) * y * float(moved[rr, c, j])
+                others += x * y * float(moved[rr, cc, j])
+                estimate = (measured - others) / ((1.0 - x) * (1.0 - y))
+                way = _limited(planes, 0, j, estimate, trend, float(highest[own, j])) - plain
+                excess = larger(abs(way) - NOISY * abs(measured), 0.0)
+                out[r, c, j] = np.float32(plain + (excess if way > 0.0 else -excess))
+
+
+@kernel
+def extrapolate_outwards(  # type: ignore[no-untyped-def]
+    value, chart, covered, nearest, offset, highest, pixels, grown, first_row, end_row
+):
+    """Continue each chart by its own slope into the empty texels near it, in place.
+
+    Parameters
+    ----------
+    value : (H, W, C) float32, changed at grown texels in rows first_row to end_row - 1
+    chart : (H, W) int32
+    covered : (H, W) bool
+    nearest : (H, W) int32, from `nearest_texel` of `covered`
+    offset : (0, 0, 2) float32, `NO_OFFSET`
+    highest : (n_charts, C) float32
+        Largest value of each chart.
+    pixels : int
+        How many rings of 8-neighbours a chart grows.
+    grown : (H, W) bool, set at the texels that got a value
+    """
+    width, channels = value.shape[1], value.shape[2]
+    sums, trend = _sums(), _trends()
+    # Many texels continue the same one: slot s keeps the plane of texel source[s] - 1.
+    planes, source = _kept_planes(), _kept_sources()
+    for r in range(first_row, end_row):
+        for c in range(width):
+            at = np.int64(nearest[r, c])
+            if covered[r, c] or at < 0:
+                continue
+            row, column = at // width, at % width
+            down, across = r - row, c - column
+            ring = larger(abs(down), abs(across))
+            if ring > pixels:
+                continue
+            slot = at % _SLOTS
+            if source[slot] != at + 1:
+                fit_plane(value, chart, covered, offset, row, column, RADIUS, FLAT, sums, planes, slot)
+                source[slot] = at + 1
+            shrink = smaller(1.0, MAX_STEP / ring)
+            x, y = across * shrink, down * shrink
+            _trend(value, chart, covered, row, column, x, y, trend)
+            for j in range(channels):
+                estimate = planes[slot, j, CENTRE] + planes[slot, j, ACROSS] * x + planes[slot, j, DOWN] * y
+                bound = float(highest[chart[row, column], j])
+                value[r, c, j] = np.float32(_limited(planes, slot, j, estimate, trend, bound))
+            grown[r, c] = True
+
+
+@kernel
+def noisy_planes(value, chart, covered, offset, texel, radius, out):  # type: ignore[no-untyped-def]
+    """Fit a plane per channel around chosen texels of a noisy page, slopes shrunk by how sure they are.
+
+    Parameters
+    ----------
+    value, chart, covered : see `move_to_centre`
+    offset : (0, 0, 2) float32, `NO_OFFSET`
     texel : (n,) int64
         Row * W + column of covered texels.
     radius : int
-        Half window, texels.
-    flat : float
-        Large values weigh all alike.
-    sums : (n, 7 + 6 C) float64
-        Out, see the column names; x and y are counted from the place of the chosen texel.
+        Half window, texels; wider than for clean pages, since a slope has to rise above the noise.
+    out : (n, 3, C) float32 output
+        Value, slope per column and slope per row.
     """
-    height, width, channels = value.shape
-    placed = offset.shape[0] > 0
+    width = value.shape[1]
+    sums, planes = _sums(), _planes()
     for k in range(len(texel)):
         r, c = texel[k] // width, texel[k] % width
-        own = chart[r, c]
-        for j in range(N_COLUMNS + N_CHANNEL_COLUMNS * channels):
-            sums[k, j] = 0.0
-        for j in range(channels):
-            sums[k, N_COLUMNS + N_CHANNEL_COLUMNS * j + LOW] = np.inf
-            sums[k, N_COLUMNS + N_CHANNEL_COLUMNS * j + HIGH] = -np.inf
-        for rr in range(larger(r - radius, 0), smaller(r + radius + 1, height)):
-            for cc in range(larger(c - radius, 0), smaller(c + radius + 1, width)):
-                if not covered[rr, cc] or chart[rr, cc] != own:
-                    continue
-                x = float(cc - c)
-                y = float(rr - r)
-                if placed:
-                    x += float(offset[rr, cc, 0]) - float(offset[r, c, 0])
-                    y += float(offset[rr, cc, 1]) - float(offset[r, c, 1])
-                w = 1.0 / (flat + x * x + y * y)
-                sums[k, W] += w
-                sums[k, WX] += w * x
-                sums[k, WY] += w * y
-                sums[k, WXX] += w * x * x
-                sums[k, WXY] += w * x * y
-                sums[k, WYY] += w * y * y
-                sums[k, COUNT] += 1.0
-                for j in range(channels):
-                    v = float(value[rr, cc, j])
-                    at = N_COLUMNS + N_CHANNEL_COLUMNS * j
-                    sums[k, at + WV] += w * v
-                    sums[k, at + WXV] += w * x * v
-                    sums[k, at + WYV] += w * y * v
-                    sums[k, at + WVV] += w * v * v
-                    sums[k, at + LOW] = smaller(sums[k, at + LOW], v)
-                    sums[k, at + HIGH] = larger(sums[k, at + HIGH], v)
+        fit_plane(value, chart, covered, offset, r, c, radius, NOISY_FLAT, sums, planes, 0)
+        for j in range(value.shape[2]):
+            # Explained against unexplained spread, per degree of freedom: the F ratio of the slope.
+            explained, spread = planes[0, j, EXPLAINED], planes[0, j, SPREAD]
+            trust = 0.0
+            if sums[COUNT] > 3.0 and explained > 0.0:
+                left = (spread - explained) / (sums[COUNT] - 3.0)
+                trust = larger(1.0 - DOUBT * left / (explained / 2.0), 0.0)
+            across, down = trust * planes[0, j, ACROSS], trust * planes[0, j, DOWN]
+            mean = sums[N_COLUMNS + N_CHANNEL_COLUMNS * j + WV] / sums[W]
+            centre = mean - (across * sums[WX] + down * sums[WY]) / sums[W]
+            out[k, 0, j] = np.float32(centre)
+            out[k, 1, j] = np.float32(across)
+            out[k, 2, j] = np.float32(down)

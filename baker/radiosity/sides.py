@@ -219,9 +219,13 @@ def _group(
         caster, label = new_caster(tracer, solid=True), np.zeros(point.shape[:2], np.int8)
         height = _with_heights(point, normal, side[own], caster)[2].reshape(label.shape)
         cast = group_points(point, normal, height, mask[own], caster, label)
-        hidden = np.zeros(len(own), np.uint8)
-        cast += hidden_corners(surface, own, point, normal, height, mask[own], side[own], caster, hidden)
-        several = (label.max(axis=1, initial=0) > 0) | (hidden != 0)
+        several = label.max(axis=1, initial=0) > 0
+        whole = np.flatnonzero(~several)
+        one, hidden = own[whole], np.zeros(len(whole), np.uint8)
+        cast += hidden_corners(
+            surface, one, point[whole], normal[whole], height[whole], mask[one], side[one], caster, hidden
+        )
+        several[whole] = hidden != 0
         found = _Groups(
             own[several].astype(np.int32), label[several], point[several], normal[several], height[several], n
         )

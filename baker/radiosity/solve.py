@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
 from baker.core.scene import SceneWarning
+from baker.kernels.conjugate_gradients import conjugate_step
 from baker.kernels.form_factor import multiply, multiply_coloured
 from baker.radiosity.form_factors import FormFactorMatrix
 
@@ -221,21 +222,17 @@ def _conjugate_gradients(
     direction = rest.copy()
     size = (weight * rest * rest).sum(axis=0)
     enough = _REDUCTION**2 * size
+    worst = goal.share(rest, exitance).max(axis=0, initial=0.0)
+    active = np.ones(3, np.uint8)
     while iteration < MAX_ITERATIONS:
         report(progress, STAGE, min(iteration / 50, 0.99))
-        done = (goal.share(rest, exitance) <= goal.MARGIN).all(axis=0) | (size <= enough)
-        if done.all():
+        active[(worst <= goal.MARGIN) | (size <= enough)] = 0
+        if not active.any():
             break
-        image = direction - albedo * product(direction)
-        curvature = (weight * direction * image).sum(axis=0)
-        going = ~done & (curvature > 0)
-        if not going.any():
-            break
-        step = np.where(going, size / np.where(going, curvature, 1.0), 0.0)
-        exitance += step * direction
-        rest -= step * image
-        before, size = size, (weight * rest * rest).sum(axis=0)
-        direction = rest + np.where(before > 0, size / np.where(before > 0, before, 1.0), 0.0) * direction
+        image = product(direction)
+        conjugate_step(
+            image, albedo, weight, direction, exitance, rest, goal.tolerance, goal.dark, active, size, worst
+        )
         iteration += 1
     return iteration
 

@@ -6,8 +6,9 @@ import pytest
 
 from baker.finish.border import recentre
 from baker.finish.dilate import dilate
-from baker.finish.slope import fit_planes
+from baker.kernels import page_slope
 from baker.kernels.page_fill import nearest_texel
+from baker.trace.jit import kernel
 
 
 @pytest.mark.parametrize("density", [0.0, 0.002, 0.05, 0.5, 1.0])
@@ -27,12 +28,21 @@ def test_nearest_texel_is_exactly_nearest(density):
         )
 
 
+@kernel
+def planes_of(value, chart, covered, offset, texel, sums, planes):
+    """Write the planes (n, C, 7) at chosen texels."""
+    for k in range(len(texel)):
+        r, c = texel[k] // value.shape[1], texel[k] % value.shape[1]
+        page_slope.fit_plane(value, chart, covered, offset, r, c, 2, 1.0, sums, planes, k)
+
+
 def test_planes_agree_with_a_dense_solve():
     value, chart, offset = pages.make_page(pages.contact)
     covered = chart >= 0
     some = np.flatnonzero(covered)[::37]
-    plane = fit_planes(value, chart, covered, some, offset)
-    fitted = np.concatenate([plane.centre, plane.across, plane.down], axis=1)
+    planes = np.zeros((len(some), 1, page_slope.N_PLANE))
+    planes_of(value, chart, covered, offset, some, np.zeros(13), planes)
+    fitted = planes[:, 0, [page_slope.CENTRE, page_slope.ACROSS, page_slope.DOWN]]
     for ours, (r, c) in zip(fitted, np.argwhere(covered)[::37], strict=True):
         slow = pages.slow_plane(value[..., 0].astype(float), chart, covered, offset.astype(float), r, c)
         np.testing.assert_allclose(ours, slow, rtol=1e-6, atol=1e-7)

@@ -13,6 +13,7 @@ from baker.finish import oidn
 from baker.finish.denoise import FITTED, denoise_page, denoiser_name, surround_charts
 from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.finish.noise import estimate_error
+from baker.finish.oidn import LightmapDenoiser
 from baker.kernels import page_guard
 from baker.kernels.page_guard import hold_to_samples
 
@@ -108,7 +109,7 @@ def test_same_bytes_for_any_threads_memory_and_run(lit):
     noisy = with_noise(truth, 0.2)
     first = denoise_page(noisy, chart >= 0, chart, threads=1).tobytes()
     assert denoise_page(noisy, chart >= 0, chart, threads=2).tobytes() == first
-    assert denoise_page(noisy, chart >= 0, chart, threads=2, memory_mb=64).tobytes() == first
+    assert denoise_page(noisy, chart >= 0, chart, denoiser=LightmapDenoiser(2, 64)).tobytes() == first
 
 
 def test_surroundings_continue_a_chart_by_its_slope_and_leave_charts_alone():
@@ -260,7 +261,7 @@ def test_what_is_worth_filtering_is_judged_by_its_own_light(lit, dim):
     plan = PagePlan(chart, chart >= 0, np.zeros((*chart.shape, 2), np.float32))
     page, _ = finish_page(
         plan, [PageLayer(noisy.astype(np.float32), error)],
-        upper=np.inf, denoise=True, dilation=2, threads=1, progress=silent,
+        upper=np.inf, denoiser=LightmapDenoiser(1), dilation=2, threads=1, progress=silent,
     )  # fmt: skip
     clean = page / scale[..., None]
     assert wrong(clean, truth, own) < 0.3 * wrong(noisy / scale[..., None], truth, own)
