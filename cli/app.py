@@ -6,6 +6,7 @@ the settings) is imported only when it is the one that was asked for.
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import sys
@@ -30,6 +31,8 @@ COMMANDS = {
 def main() -> None:
     """Run the command line of this process; never returns."""
     argv = sys.argv[1:]
+    # Imports make many objects and no cycles: searching for some takes 5 % of the start.
+    gc.set_threshold(100_000, 20, 100)
     for stream in (sys.stdout, sys.stderr):
         # A name that the terminal's encoding cannot show is no reason to fail.
         if isinstance(stream, io.TextIOWrapper):

@@ -97,7 +97,8 @@ def _lookups(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return (buried texel, region) pairs and how much lookups from the region's points take of the texel."""
     place, point, seen = visible
-    keys, weights = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
+    n_regions = int(image.max(initial=0)) + 1
+    keys, weights = [np.zeros(0, np.int64)], [np.zeros(0)]
     for turn in _RING:
         row, column = _ring_of(buried, turn, len(chart))
         beside = place[row, column]
@@ -106,11 +107,11 @@ def _lookups(
         away = np.abs(point[beside[use]] + np.array([turn[1], turn[0]]))
         # What bilinear interpolation takes of a texel at this distance from its centre.
         tent = np.maximum(1.0 - away, 0.0).prod(axis=2) * seen[beside[use]]
-        keys.append(np.stack([use, image[row[use], column[use]]], axis=1))
+        keys.append(use * n_regions + image[row[use], column[use]])
         weights.append(tent.sum(axis=1))
-    pair, index = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
-    total = np.zeros(len(pair))
-    np.add.at(total, index.reshape(-1), np.concatenate(weights))
+    key, index = np.unique(np.concatenate(keys), return_inverse=True)
+    total = np.asarray(np.bincount(index.reshape(-1), np.concatenate(weights), len(key)), np.float64)
+    pair = np.stack(np.divmod(key, n_regions), axis=1)
     return pair, total
 
 

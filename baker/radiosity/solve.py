@@ -23,7 +23,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -109,23 +108,23 @@ def solve_radiosity(
     if bounces is not None:
         irradiance = np.zeros_like(source)
         steps = max(bounces - 1, 0)
-        for step in range(steps):
-            irradiance = apply(matrix, source + albedo * irradiance, threads)
-            report(progress, STAGE, (step + 1) / steps)
+        with _Product(matrix, threads) as product:
+            for step in range(steps):
+                irradiance = product(source + albedo * irradiance)
+                report(progress, STAGE, (step + 1) / steps)
         return Solution(irradiance, steps, 0.0, 0.0)
-    return _converge(matrix, source, albedo, area[:, None], progress, threads)
+    with _Product(matrix, threads) as product:
+        return _converge(product, source, albedo, area[:, None], progress)
 
 
 def _converge(
-    matrix: FormFactorMatrix,
+    product: _Product,
     source: NDArray[np.float64],
     albedo: NDArray[np.float64],
     area: NDArray[np.float64],
     progress: Progress,
-    threads: int,
 ) -> Solution:
     """Solve until every patch has its light; see `solve_radiosity`."""
-    product = partial(apply, matrix, threads=threads)
     exitance = source.copy()
     goal = _Goal(TOLERANCE * (1.0 - albedo), _DARK * source.max(axis=0, initial=0.0))
     iterations = 0
@@ -159,27 +158,53 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
     return [SceneWarning("solve-not-converged", message)]
 
 
-def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64], threads: int = 1) -> NDArray[np.float64]:
+def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return F exitance, (P, 3) float64: the irradiance that patches of that exitance give each other."""
-    irradiance = np.zeros_like(exitance)
-    exitance = np.ascontiguousarray(exitance)
+    with _Product(matrix, 1) as product:
+        return product(exitance)
 
-    def rows(begin: int, end: int) -> None:
-        first, out = matrix.first[begin : end + 1], irradiance[begin:end]
-        if matrix.tint is None:
-            multiply(first, matrix.column, matrix.value, exitance, out)
+
+class _Product:
+    """Multiplies by F, rows shared out among threads that live as long as this.
+
+    Parameters
+    ----------
+    matrix : FormFactorMatrix
+    threads : int
+        Each row is one thread's, so the result does not depend on their number.
+    """
+
+    def __init__(self, matrix: FormFactorMatrix, threads: int) -> None:
+        self._matrix = matrix
+        parts = min(threads, 1 + len(matrix.value) // _PART)
+        inner = np.searchsorted(matrix.first, len(matrix.value) * np.arange(1, parts) / parts)
+        self._cut = np.concatenate([[0], inner, [len(matrix.first) - 1]])
+        self._pool = ThreadPoolExecutor(parts) if parts > 1 else None
+
+    def __enter__(self) -> _Product:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def __call__(self, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return F exitance, both (P, 3) float64."""
+        matrix, irradiance = self._matrix, np.zeros_like(exitance)
+        exitance = np.ascontiguousarray(exitance)
+
+        def rows(begin: int, end: int) -> None:
+            first, out = matrix.first[begin : end + 1], irradiance[begin:end]
+            if matrix.tint is None:
+                multiply(first, matrix.column, matrix.value, exitance, out)
+            else:
+                multiply_coloured(first, matrix.column, matrix.value, matrix.tint, exitance, out)
+
+        if self._pool is None:
+            rows(0, len(exitance))
         else:
-            multiply_coloured(first, matrix.column, matrix.value, matrix.tint, exitance, out)
-
-    parts = min(threads, 1 + len(matrix.value) // _PART)
-    if parts == 1:
-        rows(0, len(exitance))
+            list(self._pool.map(rows, self._cut[:-1], self._cut[1:]))
         return irradiance
-    cut = np.searchsorted(matrix.first, len(matrix.value) * np.arange(1, parts) / parts)
-    cut = np.concatenate([[0], cut, [len(exitance)]])
-    with ThreadPoolExecutor(parts) as pool:
-        list(pool.map(rows, cut[:-1], cut[1:]))
-    return irradiance
 
 
 @dataclass(frozen=True)
