@@ -41,9 +41,10 @@ __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
 # The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
 REACH = 96
-# Mirrored texels around the picture: the filter tints its outermost ones (grey with 5 % noise came out 6 %
-# red in the corners, 0.4 % with this margin).
-MARGIN = 16
+# Mirrored texels around the picture at least, and what its sides are made a multiple of: the filter tints its
+# outermost texels, more where it has to fill up its blocks of 16 itself. Grey with 5 % noise, pages of 225
+# to 240: RMS error of the outermost 8 texels 0.37 to 0.38 % with it, 0.36 to 0.41 % with a margin of 16.
+MARGIN, BLOCK = 8, 16
 # Half window of the slopes at chart borders, texels.
 SLOPE_RADIUS = 4
 # Texels whose slopes are fitted at a time.
@@ -115,10 +116,11 @@ def denoise_page(
     # A room of a millionth of the page's light is black to the filter: it came out worse than it went in.
     level = _levels(noisy, charts, inside)
     picture = surround_charts(noisy / level, inside, charts, threads=threads)
-    wide = np.pad(picture, ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0)), mode="symmetric")
+    rows, columns = (_margins(side) for side in inside.shape)
+    wide = np.pad(picture, (rows, columns, (0, 0)), mode="symmetric")
     with contextlib.ExitStack() as stack:
         wide = (denoiser or stack.enter_context(LightmapDenoiser(threads))).filter(wide, progress)
-    filtered = np.ascontiguousarray(wide[MARGIN:-MARGIN, MARGIN:-MARGIN] * level)
+    filtered = np.ascontiguousarray(wide[rows[0] : -rows[1], columns[0] : -columns[1]] * level)
     error = _error_within(window, noisy, charts, inside, standard_error, bound, threads)
     held = np.array(filtered)
     over_rows(
@@ -128,6 +130,12 @@ def denoise_page(
     )
     result[window][inside] = held[inside][:, : value.shape[2]]
     return result
+
+
+def _margins(side: int) -> tuple[int, int]:
+    """Return the mirrored texels before and after a side of the picture."""
+    total = 2 * MARGIN + -(side + 2 * MARGIN) % BLOCK
+    return total // 2, total - total // 2
 
 
 def _levels(
