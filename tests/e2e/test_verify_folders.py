@@ -45,7 +45,7 @@ def test_a_moved_folder(plain, tmp_path):
 
 
 def test_ao_alone(tmp_path):
-    out = baked(tmp_path / "out", channels="ao", ao_distance="0.4")
+    out = baked(tmp_path / "out", channels="ao", ao_distance="0.4", samples=256)
     found = verify(out, QUICK)
     assert list(found.channels) == ["ao"]
     assert found.passed
