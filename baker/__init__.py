@@ -77,7 +77,7 @@ def unwrap(scene: Scene, *, progress: Progress = silent, **settings: Any) -> Atl
     SettingsError, InputError, Cancelled
     """
     from baker.core.settings import make_settings
-    from baker.unwrap.unwrap import unwrap_scene
+    from baker.uv.unwrap import unwrap_scene
 
     return unwrap_scene(scene, make_settings(settings), progress)
 
@@ -114,6 +114,6 @@ def bake(
     SettingsError, InputError, ResourceError, Cancelled
     """
     from baker.core.settings import make_settings
-    from baker.pipeline import bake as run
+    from baker.pipeline.bake import bake as run
 
     return run(scene, settings=make_settings(settings), out=out, progress=progress, force=force)

@@ -26,11 +26,12 @@ from report import put_into, table
 
 from baker.core.parallel import thread_count
 from baker.io.load import load_scene
-from baker.reference.camera import camera_rays
-from baker.reference.first_hit import first_hits
-from baker.reference.irradiance import new_estimate, openness_pass
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.first_hit import first_hits
+from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
 
 ROOT = Path(__file__).resolve().parent.parent
 WIDTH, HEIGHT = 512, 384

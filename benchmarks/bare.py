@@ -20,9 +20,9 @@ from baker.kernels.emitters import Emitters
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
-from baker.radiosity.points import points_of
+from baker.pipeline.world import World
+from baker.radiosity.point_cache import points_of
 from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR, call_embree_with, new_caster, trace_lanes
-from baker.world import World
 
 # Rows of a packet that hold the ray; the hit needs only its geometry number reset.
 RAY_ROWS = 12
@@ -150,7 +150,7 @@ class BareRays:
     Parameters
     ----------
     world : World
-        See `baker.world.prepare`.
+        See `baker.pipeline.world.prepare`.
     n_samples : int
         Rays per texel.
     occlusion : bool

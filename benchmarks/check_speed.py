@@ -89,7 +89,8 @@ def timed(*arguments: str) -> float:
 
 def profile(path: Path) -> None:
     """Print the seconds of each check, slowest first."""
-    from baker.checking import CheckSettings, check_scene
+    from baker.checks.run import check_scene
+    from baker.checks.settings import CheckSettings
     from baker.core.settings import BakeSettings
 
     report = check_scene(path, CheckSettings(), BakeSettings(resolution=2048))

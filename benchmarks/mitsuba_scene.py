@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from baker.core.scene import Camera, Scene
-from baker.reference.view import FACE, SHADING, Reference
+from baker.pathtracer.scene import FACE, SHADING, Reference
 
 
 def flat(reference: Reference) -> Reference:

@@ -17,9 +17,10 @@ from baker.core.parallel import thread_count
 from baker.core.progress import silent
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.load import load_scene
-from baker.pipeline import trace_transport
-from baker.unwrap.unwrap import unwrap_scene
-from baker.world import Record, World, prepare
+from baker.pipeline.record import Record
+from baker.pipeline.transport import trace_transport
+from baker.pipeline.world import World, prepare
+from baker.uv.unwrap import unwrap_scene
 
 # Stage of the bake -> kind of bare rays it is put beside.
 BESIDE = {
@@ -122,7 +123,7 @@ def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[f
     trace_transport(scene, world, {"irradiance": CHANNELS.get("irradiance")}, settings, record)
     trace_transport(scene, world, {"ao": CHANNELS.get("ao")}, settings, record)
     # Whatever `prepare` does to find buried points is timed there, once; here its rays are cast again.
-    from baker.radiosity.buried import find_buried
+    from baker.radiosity.inside_geometry import find_buried
 
     start = perf_counter()
     _, cast = find_buried(

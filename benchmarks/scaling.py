@@ -30,10 +30,10 @@ WANTED = 20
 
 def bake_once(scene: Path, workers: int) -> dict[str, float]:
     """Return the seconds of each stage; 0 workers is this process, with one thread."""
-    from baker.cluster.connection import Cluster
-    from baker.cluster.farm import ClusterFarm
     from baker.core.settings import make_settings
-    from baker.pipeline import bake
+    from baker.distributed.connection import Cluster
+    from baker.distributed.tile_executor import ClusterFarm
+    from baker.pipeline.bake import bake
 
     settings = make_settings(SETTINGS)
     if not workers:
@@ -52,7 +52,7 @@ def sizes(scene: Path) -> tuple[int, int]:
     """Return the bytes that go to each worker at the start, and texels of the page."""
     from baker.core.settings import make_settings
     from baker.io.load import load_scene
-    from baker.unwrap.unwrap import unwrap_scene
+    from baker.uv.unwrap import unwrap_scene
 
     settings = make_settings(SETTINGS)
     loaded = load_scene(scene)

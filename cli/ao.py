@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from baker.cli.app import COMMANDS
 from baker.cli.bake import job_flags
 from baker.cli.bake import work as bake
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, common_flags, setting_flags
 
 

@@ -14,19 +14,6 @@ from typing import Any, TextIO
 
 from baker.cli.supervise import INTERRUPTED, supervise
 
-# Subcommand -> the line shown in the list; the module of the same name in this package defines it.
-COMMANDS = {
-    "bake": "Bake a scene: unwrap, trace, solve, write lightmaps and scene.glb.",
-    "ao": "Bake ambient occlusion only.",
-    "check": "Find what would spoil a bake, before any ray is cast.",
-    "batch": "Bake many scenes, and only what changed.",
-    "verify": "Say how wrong a bake is, against path tracing.",
-    "diff": "Compare two bakes on the surface, whatever their UVs.",
-    "render": "Path-trace a scene through a camera.",
-    "view": "Show a bake in a local web page.",
-    "inspect": "Tell what is in a scene, a bake or an EXR.",
-}
-
 
 def main() -> None:
     """Run the command line of this process; never returns."""

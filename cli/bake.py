@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from baker.cli.app import COMMANDS
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
-
-    from baker.cluster.farm import ClusterFarm
+    from baker.distributed.tile_executor import ClusterFarm
 
 
 def command() -> Any:
@@ -70,11 +70,11 @@ def work(
     with session.reporter(quiet=quiet) as progress:
         # Inside: importing the kernels takes a moment, and the bar is there meanwhile.
         progress("start", 0.0)
-        from baker.kernels.start import skip_blas
+        from baker.trace.numba_start import skip_blas
 
         skip_blas()
-        from baker.batch.lock import held
-        from baker.pipeline import bake
+        from baker.io.bake.lock import held
+        from baker.pipeline.bake import bake
 
         # What is loaded by now stays: looking for cycles in it takes 4 % of a first bake, which compiles.
         gc.freeze()
@@ -88,8 +88,8 @@ def work(
 
 
 def _farm(address: str, threads: int | None) -> ClusterFarm:
-    from baker.cluster.connection import Cluster
-    from baker.cluster.farm import ClusterFarm
     from baker.core.parallel import thread_count
+    from baker.distributed.connection import Cluster
+    from baker.distributed.tile_executor import ClusterFarm
 
     return ClusterFarm(Cluster(address, threads=thread_count(threads)))

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
-from baker.cli.app import COMMANDS
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
-    from baker.cli.session import Session
-
-    from baker.batch.bakery import Bakery
+    from baker.batch.executor import Bakery
     from baker.batch.run import Outcome
+    from baker.cli.session import Session
 
 
 def command() -> Any:
@@ -72,12 +72,11 @@ def work(
     """Bake what changed, show one progress for all, and tell."""
     session: Session = ctx.obj
     as_json = as_json or session.as_json
-    from baker.cli.config import resolve
-
-    from baker.batch.bakery import LocalBakery
+    from baker.batch.executor import LocalBakery
     from baker.batch.jobs_file import read_jobs
     from baker.batch.memory import parse_size
     from baker.batch.run import BatchOptions, batch_json, run_batch, write_junit
+    from baker.cli.config import resolve
 
     overrides = given(settings)
     options = BatchOptions(
@@ -104,9 +103,9 @@ def work(
 
 
 def _on_cluster(address: str, threads: int | None) -> Bakery:
-    from baker.batch.cluster_bakery import ClusterBakery
-    from baker.cluster.connection import Cluster
     from baker.core.parallel import thread_count
+    from baker.distributed.connection import Cluster
+    from baker.distributed.job_executor import ClusterBakery
 
     return ClusterBakery(Cluster(address, threads=thread_count(threads)))
 

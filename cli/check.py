@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from baker.cli.app import COMMANDS
+
+from baker.cli.commands import COMMANDS
 from baker.cli.failures import FAILED_CHECK
-from baker.cli.mend import asked, mend, mend_flags, mended_json, write_mended_text
+from baker.cli.fix import asked, mend, mend_flags, mended_json, write_mended_text
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
+    from baker.checks.run import CheckReport
+    from baker.checks.settings import CheckSettings
     from baker.cli.session import Session
-
-    from baker.checking import CheckReport, CheckSettings
 
 
 def command() -> Any:
@@ -105,8 +106,8 @@ def work(
     mended = None
     with session.reporter(quiet=quiet) as progress:
         progress("start", 0.0)
-        from baker.checking.report import report_json, write_text
-        from baker.checking.scenes import check_scenes, find_scenes
+        from baker.checks.report import report_json, write_text
+        from baker.checks.scenes import check_scenes, find_scenes
 
         wanted = check_settings(
             config, fail_on=fail_on, ignore=ignore, mip=mip, rates=rates, cost=cost or None
@@ -144,9 +145,8 @@ def check_settings(config: Path | None, **command_line: Any) -> CheckSettings:
     SettingsError
         For an unknown key or a wrong value.
     """
+    from baker.checks.settings import make_check_settings
     from baker.cli.config import read_check_config
-
-    from baker.checking.settings import make_check_settings
 
     table = {} if config is None else read_check_config(config)
     from_file = make_check_settings(table, where=str(config))
@@ -158,15 +158,15 @@ def check_settings(config: Path | None, **command_line: Any) -> CheckSettings:
 
 
 def _write_files(reports: list[CheckReport], *, sarif: Path | None, junit: Path | None) -> None:
-    from baker.judge.junit import write_text
+    from baker.io.junit import write_text
 
     if sarif is not None:
         import json
 
-        from baker.checking.sarif import sarif_log
+        from baker.checks.sarif import sarif_log
 
         write_text(sarif, json.dumps(sarif_log(reports, Path.cwd()), indent=1, allow_nan=False) + "\n")
     if junit is not None:
-        from baker.checking.cases import check_junit
+        from baker.checks.junit import check_junit
 
         write_text(junit, check_junit(reports))

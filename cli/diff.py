@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
-from baker.cli.app import COMMANDS
-from baker.cli.judged import tell, write_failed, write_worst
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, common_flags, flag, given, setting_flags
+from baker.cli.outcome import tell, write_failed, write_worst
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
-
-    from baker.difference import Difference
+    from baker.comparison import Difference
 
 _SHOWN = 3
 
@@ -65,7 +65,7 @@ def work(
     resolved = resolve(given(settings), None)
     with session.reporter(quiet=quiet) as progress:
         progress("start", 0.0)
-        from baker.difference import DiffSettings, compare, difference_json
+        from baker.comparison import DiffSettings, compare, difference_json
 
         wanted = DiffSettings(texels=texels, flip=flip, fail_if=fail_if, seed=resolved.seed)
         found = compare(a, b, wanted, progress)

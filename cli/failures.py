@@ -7,7 +7,7 @@ import json
 import sys
 from typing import Any, TextIO
 
-from baker.core import failure
+from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
 
 # Exit code of a check that the user asked for and that failed.

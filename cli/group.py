@@ -6,8 +6,9 @@ import importlib
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from baker.cli.app import COMMANDS
 from typer.core import TyperCommand, TyperGroup
+
+from baker.cli.commands import COMMANDS
 
 if TYPE_CHECKING:
     from baker.cli.session import Session

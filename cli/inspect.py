@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
-from baker.cli.app import COMMANDS
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, common_flags, setting_flags
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import json
 import shutil
 from pathlib import Path
 
-from baker.batch.lock import OutputLock
+from baker.io.bake.lock import OutputLock
 
 
 def survey(out: str) -> bytes:

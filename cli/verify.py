@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
-from baker.cli.app import COMMANDS
-from baker.cli.judged import tell, write_failed, write_limits, write_worst
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, common_flags, flag, given, setting_flags
+from baker.cli.outcome import tell, write_failed, write_limits, write_worst
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
-
     from baker.verification import Verification
 
 
@@ -103,7 +103,7 @@ def work(
 
             write_report(report, found)
         if junit is not None:
-            from baker.verification.cases import write_junit
+            from baker.verification.junit import write_junit
 
             write_junit(junit, found)
     tell(found, session, write_text, verification_json, quiet=quiet, as_json=as_json, verbose=verbose)

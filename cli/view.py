@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from baker.cli.app import COMMANDS
+
+from baker.cli.commands import COMMANDS
 from baker.cli.options import build, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def work(
     from baker.cli.config import resolve
 
     resolve(given(settings), None)
-    from baker.io.bake_folder import read_bake
+    from baker.io.bake.read_bake import read_bake
     from baker.viewer import find_three, make_server
 
     session: Session = ctx.obj

@@ -14,14 +14,14 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent / "tests" / "unit" / "lint")]
+sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent / "tests" / "unit" / "checks")]
 
-from lint_scenes import CASES  # noqa: E402
+from flawed_scenes import CASES  # noqa: E402
 
+from baker.checks.context import Subject  # noqa: E402
 from baker.core.settings import BakeSettings  # noqa: E402
-from baker.io.gltf_scene import import_gltf  # noqa: E402
+from baker.io.importers.gltf import import_gltf  # noqa: E402
 from baker.io.load import SceneFile  # noqa: E402
-from baker.lint.subject import Subject  # noqa: E402
 
 SIZE, BORDER, SHARP = 180, 12, 3
 UV_CODES = (

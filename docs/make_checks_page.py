@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from baker.lint.registry import GROUPS, Check, all_checks
+from baker.checks.rule import GROUPS, Check, all_checks
 
 PICTURES = Path(__file__).with_name("pictures") / "checks"
 NAMES = {

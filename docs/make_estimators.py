@@ -21,11 +21,11 @@ from PIL import Image
 
 from baker.core.scene import Camera, Instance, Material, Mesh, Scene
 from baker.io.png import srgb_levels
-from baker.reference.camera import look_at
-from baker.reference.estimators import ESTIMATORS
-from baker.reference.irradiance import PointEstimate, new_estimate
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.camera import look_at
+from baker.pathtracer.estimators import ESTIMATORS
+from baker.pathtracer.point_estimate import PointEstimate, new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
 
 HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT = 240, 180

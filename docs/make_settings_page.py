@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 from baker.cli.options import default_of, is_switch, metavar_of, range_of
-
 from baker.core.settings import BakeSettings
 
 HEAD = """\

@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 
 import baker
-from baker.io.bake_folder import read_bake
+from baker.io.bake.read_bake import read_bake
 from baker.viewer import find_three, make_server
 
 HERE = Path(__file__).resolve().parent

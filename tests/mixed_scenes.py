@@ -9,7 +9,7 @@ from scenes import icosphere
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 
 from baker.core.scene import Camera, Instance, Material, Mesh, PunctualLight, Scene, Texture
-from baker.reference.camera import look_at
+from baker.pathtracer.camera import look_at
 
 
 def texture(rows, *, linear=False):

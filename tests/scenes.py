@@ -12,10 +12,11 @@ from baker.core.lightmap import BakeResult
 from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, Texture
 from baker.core.settings import make_settings
+from baker.pipeline.record import Record
+from baker.pipeline.world import World, prepare
 from baker.radiosity.form_factors import FormFactorMatrix, build_form_factors
 from baker.radiosity.patches import PatchSet, build_patches
-from baker.unwrap.unwrap import unwrap_scene
-from baker.world import Record, World, prepare
+from baker.uv.unwrap import unwrap_scene
 
 GAP = 2
 

@@ -71,7 +71,7 @@ def test_the_page_of_an_export_answers_all_questions(name):
 
 
 def test_the_readme_names_every_command():
-    from baker.cli.app import COMMANDS
+    from baker.cli.commands import COMMANDS
 
     text = (ROOT / "README.md").read_text("utf-8")
     assert set(COMMANDS) == set(re.findall(r"^\| `baker (\w+)", text, re.MULTILINE))

@@ -11,12 +11,12 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, Scene
-from baker.kernels.side_table import SeenLight, SeenPatch, no_sides
 from baker.lights.emissive import build_emitters
-from baker.radiosity.hit_table import build_hit_table
+from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, no_sides
 from baker.radiosity.texels import build_texels
-from baker.shading.inside import scene_solids, tell_tales
+from baker.radiosity.triangle_lookup import build_hit_table
 from baker.shading.materials import resolve_materials
+from baker.shading.scene_solids import scene_solids, tell_tales
 from baker.trace.embree import RayScene
 
 
@@ -33,7 +33,7 @@ class Quad:
 
 @dataclass(frozen=True)
 class World:
-    """What `baker.world.prepare` makes, without masks."""
+    """What `baker.pipeline.world.prepare` makes, without masks."""
 
     scene: Any
     atlas: Any

@@ -15,8 +15,8 @@ from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.settings import make_settings
+from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
-from baker.io.output import write_bake
 from baker.io.png import encode_png
 
 SIZE = 32

@@ -17,7 +17,7 @@ from typing import Any
 
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings import BakeSettings, make_settings
-from baker.io.output_folder import own_files
+from baker.io.bake.output_folder import own_files
 
 _TABLES = ("defaults", "job")
 _PLACEHOLDERS = ("stem", "parent")

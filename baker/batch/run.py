@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from baker.batch.bakery import Bakery, Event
-from baker.batch.freshness import Freshness, check_output
+from baker.batch.executor import Bakery, Event
 from baker.batch.jobs_file import Job
-from baker.batch.lock import OutputLock, dead_writers, sweep
+from baker.batch.up_to_date import Freshness, check_output
+from baker.core.error_mapping import explain
 from baker.core.errors import BakerError, ResourceError
-from baker.core.failure import explain
 from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report
-from baker.io.fingerprint import scene_sha256
+from baker.io.bake.lock import OutputLock, dead_writers, sweep
+from baker.io.scene_hash import scene_sha256
 
 STAGE = "batch"
 # Seconds between two looks at locks held by other runs, and at the wish to stop.
@@ -314,7 +314,7 @@ def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
     ResourceError
         If the file cannot be written.
     """
-    from baker.judge.junit import Case, junit_text, write_text
+    from baker.io.junit import Case, junit_text, write_text
 
     cases = [
         Case(

@@ -16,8 +16,8 @@ import threading
 import time
 from typing import Any, TextIO
 
+from baker.core.error_mapping import bug, explain
 from baker.core.errors import BakerError
-from baker.core.failure import bug, explain
 
 # Seconds between two lines about progress.
 _INTERVAL = 0.1
@@ -36,7 +36,7 @@ def main() -> None:
     stop = threading.Event()
     threading.Thread(target=_listen, args=(jobs, stop), daemon=True).start()
     # Before the first job arrives, or while it does.
-    import baker.pipeline  # noqa: F401
+    import baker.pipeline.bake  # noqa: F401
 
     while (job := jobs.get()) is not None:
         _answer(sink, _run(job, sink, stop))
@@ -55,7 +55,7 @@ def _listen(jobs: queue.SimpleQueue[dict[str, Any] | None], stop: threading.Even
 def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, Any]:
     """Bake one job and return what to answer."""
     from baker.core.settings import make_settings
-    from baker.pipeline import bake
+    from baker.pipeline.bake import bake
 
     told = 0.0
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
-from baker.core.limits import BRIGHTEST
+from baker.core.light_limits import BRIGHTEST
 from baker.core.origin import scene_origin
-from baker.core.raw import RawScene
+from baker.core.source_mesh import RawScene
 
 # Metres; the square of a shorter range would leave float32.
 _SHORTEST_RANGE = 1e-12

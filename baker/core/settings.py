@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from baker.core.errors import SettingsError
-from baker.core.limits import BRIGHTEST
+from baker.core.light_limits import BRIGHTEST
 
 # Hemisphere rays per texel for each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}

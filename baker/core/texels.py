@@ -68,7 +68,7 @@ class TexelBuffer:
     def hit_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
         """Spread per-entry values (n, ...) to (P * H * W, ...), backs behind the fronts if there are any.
 
-        Rows are in the order of `kernels.hits.hit_pixel`; pixels without texel get `fill`.
+        Rows are in the order of `kernels.triangle_lookup.hit_pixel`; pixels without texel get `fill`.
         """
         sides = [self.lookup]
         if self.n > self.n_front:

@@ -23,9 +23,9 @@ from baker.core.scene import Material, Scene, Texture
 from baker.core.texels import TexelBuffer
 from baker.export.common import write_json, write_readme
 from baker.finish.dilate import dilate
-from baker.io.bake_folder import StoredBake, read_bake
-from baker.io.glb_pack import Json
-from baker.io.gltf_new import new_document
+from baker.io.bake.read_bake import StoredBake, read_bake
+from baker.io.gltf.build_document import new_document
+from baker.io.gltf.packer import Json
 from baker.io.png import encode_png, grey_levels, srgb_levels
 from baker.radiosity.texels import build_texels
 from baker.shading.materials import resolve_materials

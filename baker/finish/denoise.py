@@ -3,7 +3,7 @@
 1. Every chart's picture is continued into the gaps by reflection, since the filter takes the page for a
    photograph and would draw the empty texels' black over the borders.
 2. Open Image Denoise's lightmap filter runs over the part of the page that has charts.
-3. The result is held to the samples: see `baker.kernels.page_guard`.
+3. The result is held to the samples: see `baker.finish.kernels.page_guard`.
 
 Call it for direct and indirect light apart and add the results, after `recentre` and before `dilate`.
 *Measured* on a sharp shadow edge over noisy indirect light, RMS error together and apart: 1.5 and 0.9 % with
@@ -28,14 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, silent
+from baker.finish.kernels.page_charts import chart_sums
+from baker.finish.kernels.page_fill import nearest_texel, reflect_outwards
+from baker.finish.kernels.page_guard import hold_to_samples
+from baker.finish.kernels.page_slope import NO_OFFSET, noisy_planes
 from baker.finish.noise import estimate_error
 from baker.finish.oidn import LightmapDenoiser, denoiser_name
 from baker.finish.page import check_page
 from baker.finish.tiles import over_rows
-from baker.kernels.page_charts import chart_sums
-from baker.kernels.page_fill import nearest_texel, reflect_outwards
-from baker.kernels.page_guard import hold_to_samples
-from baker.kernels.page_slope import NO_OFFSET, noisy_planes
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 

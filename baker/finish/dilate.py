@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.finish.kernels.page_fill import nearest_texel
+from baker.finish.kernels.page_slope import NO_OFFSET, extrapolate_outwards
 from baker.finish.page import check_page, highest_of_charts
 from baker.finish.tiles import over_rows
-from baker.kernels.page_fill import nearest_texel
-from baker.kernels.page_slope import NO_OFFSET, extrapolate_outwards
 
 
 def dilate(

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress
-from baker.finish.border import recentre
 from baker.finish.denoise import denoise_page
 from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
 from baker.finish.keep_light import keep_light
+from baker.finish.kernels.page_fill import nearest_texel
 from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
-from baker.kernels.page_fill import nearest_texel
+from baker.finish.texel_centre import recentre
 
 STAGE = "finish"
 # A layer is left as it was sampled if the noise of all texels of about one brightness is below this share of

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.page_light import BLOCK, add_shares, group_blocks, missing_shares, sum_groups
+from baker.finish.kernels.page_light import BLOCK, add_shares, group_blocks, missing_shares, sum_groups
 
 
 def keep_light(

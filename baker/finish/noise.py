@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.finish.kernels.page_guard import high_pass
 from baker.finish.tiles import over_rows
-from baker.kernels.page_guard import high_pass
 
 BLOCK = 16
 # Fewer texels than this in a block say too little: the chart's (then the page's) median stands in.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.page_charts import chart_boxes
+from baker.finish.kernels.page_charts import chart_boxes
 
 # Empty texels between charts: their surroundings are filled by reflection.
 _GAP = 8

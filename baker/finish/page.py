@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.page_charts import chart_maxima
+from baker.finish.kernels.page_charts import chart_maxima
 
 
 def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: NDArray[Any]) -> None:

@@ -14,7 +14,7 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
-from baker.io.output_folder import MANIFEST_NAME, file_state, own_files
+from baker.io.bake.output_folder import MANIFEST_NAME, file_state, own_files
 from baker.io.png import decode_palette_png
 
 

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from baker.core.choose import choose_objects
 from baker.core.errors import InputError, ResourceError, SettingsError
 from baker.core.registry import Registry
 from baker.core.scene import Scene, check_brightness
 from baker.core.settings import BakeSettings
+from baker.io.choose import choose_objects
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SceneFile:
 
 
 Importer = Callable[[SceneFile], Scene]
-importers: Registry[Importer] = Registry("baker.io")
+importers: Registry[Importer] = Registry("baker.io.importers")
 
 
 def load_scene(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from baker.kernels.hits import front_facing
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.kernels.triangle_lookup import front_facing
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, NO_HIT, PRIM_ID, trace_lanes
 

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.textures import TexturePack
-from baker.kernels.uv_integral import uv_means
 from baker.lights.texture_levels import TextureLevels, fair_limit
+from baker.lights.uv_integral import uv_means
 
 # A triangle whose noise is lower is cut no further.
 ENOUGH = 0.05

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.textures import TexturePack
-from baker.kernels.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
+from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
 # Rows that are averaged together: bounds the memory of what lies between two levels.

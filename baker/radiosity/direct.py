@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
-from baker.kernels.area_light import light_samples
 from baker.kernels.emitters import Emitters, needed_shading
-from baker.kernels.gather import DIRECT, N_COLUMNS, gather
-from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.shadow import add_visible
-from baker.kernels.side_table import nothing_seen
 from baker.kernels.surface import N_POINTS, Surface
+from baker.kernels.triangle_lookup import HitTable
 from baker.lights.family import LIGHT_FAMILIES
-from baker.radiosity.lamp_choice import Choice, LampChooser
-from baker.radiosity.points import KeptPoints, tile_points
+from baker.radiosity.emitter_choice import Choice, LampChooser
+from baker.radiosity.kernels.area_light import light_samples
+from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
+from baker.radiosity.kernels.shadow import add_visible
+from baker.radiosity.kernels.side_table import nothing_seen
+from baker.radiosity.point_cache import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import Caster, new_caster
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.emitters import Emitters, needed_shading
-from baker.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
-from baker.kernels.hits import HitTable
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.side_table import SeenLight
 from baker.kernels.surface import Surface
+from baker.kernels.triangle_lookup import HitTable
 from baker.radiosity.direct import TILE, batch_variance
-from baker.radiosity.lamp_choice import LampChooser
-from baker.radiosity.points import KeptPoints, tile_points
+from baker.radiosity.emitter_choice import LampChooser
+from baker.radiosity.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
+from baker.radiosity.kernels.side_table import SeenLight
+from baker.radiosity.point_cache import KeptPoints, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 

@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
-from baker.kernels.form_factor import (
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.surface import N_POINTS, Surface
+from baker.kernels.triangle_lookup import HitTable
+from baker.radiosity.kernels.form_factor import (
     SKY,
     cast_form_factors,
     scale_symmetric,
     transpose,
     weigh_reciprocal,
 )
-from baker.kernels.hits import HitTable
-from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.side_table import SeenPatch
-from baker.kernels.surface import N_POINTS, Surface
+from baker.radiosity.kernels.side_table import SeenPatch
 from baker.radiosity.patches import PatchSet
-from baker.radiosity.points import KeptPoints, some_points
+from baker.radiosity.point_cache import KeptPoints, some_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.texels import TexelBuffer
-from baker.kernels.regions import flood_regions
 from baker.kernels.surface import N_POINTS, Surface, place_points
+from baker.radiosity.kernels.regions import flood_regions
 
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _RING = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c]

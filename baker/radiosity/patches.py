@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.texels import TexelBuffer
-from baker.kernels.regions import join_linked
+from baker.radiosity.kernels.regions import join_linked
 
 # The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
 MAX_PATCHES = 32768
-# Depth in gaps (`crevices`) from which blocks are as small as can be.
+# Depth in gaps (`narrow_gaps`) from which blocks are as small as can be.
 NARROW = 2
 
 
@@ -75,8 +75,8 @@ def build_patches(
     ----------
     texels : TexelBuffer
     depth : (n,) uint8, optional
-        0 to 2; entries of different depth share no patch (`crevices`). Those of depth 2 form smaller blocks
-        that keep to `max_patches` for themselves.
+        0 to 2; entries of different depth share no patch (`narrow_gaps`). Those of depth 2 form smaller
+        blocks that keep to `max_patches` for themselves.
     link : (m, 2) int32, optional
         Neighbouring entries that see each other (`sides.Sides.link`): in the charts that these lie in,
         entries of a block that are not linked within it form patches of their own.

@@ -2,9 +2,9 @@
 
 A floor that runs on under a wall, a ceiling over walls, a beam through a wall: a texel there has points on
 both sides of the other surface. Left as one, it would average the light of both sides and carry it from one
-to the other. Its points are grouped by mutual visibility (`kernels.sides`); each group becomes an entry of
-its own: the entry of the page keeps the side with the largest free area; the others stand behind fronts and
-backs, take part in light transport, and are stored in no map.
+to the other. Its points are grouped by mutual visibility (`radiosity.kernels.sides`); each group becomes an
+entry of its own: the entry of the page keeps the side with the largest free area; the others stand behind
+fronts and backs, take part in light transport, and are stored in no map.
 
 Neighbouring texels are linked if some of their points see each other. The connected parts of a chart are its
 regions: values are not mixed across their borders (denoising, borders, dilation). No patch spans texels of a
@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
-from baker.kernels.form_factor import SPLIT
-from baker.kernels.hits import HitTable
-from baker.kernels.regions import join_linked, neighbour_pairs
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
-from baker.kernels.sides import (
+from baker.kernels.surface import N_POINTS, Surface, place_points
+from baker.kernels.triangle_lookup import HitTable
+from baker.radiosity.kernels.form_factor import SPLIT
+from baker.radiosity.kernels.regions import join_linked, neighbour_pairs
+from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
+from baker.radiosity.kernels.sides import (
     count_backs,
     crossed_texels,
     free_segments,
@@ -35,9 +36,8 @@ from baker.kernels.sides import (
     hidden_corners,
     point_heights,
 )
-from baker.kernels.surface import N_POINTS, Surface, place_points
 from baker.radiosity.lent_regions import lend_regions
-from baker.radiosity.points import points_of
+from baker.radiosity.point_cache import points_of
 from baker.trace.embree import Tracer
 from baker.trace.packets import Caster, new_caster
 

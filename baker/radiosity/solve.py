@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
 from baker.core.scene import SceneWarning
-from baker.kernels.conjugate_gradients import conjugate_step
-from baker.kernels.form_factor import multiply, multiply_coloured
 from baker.radiosity.form_factors import FormFactorMatrix
+from baker.radiosity.kernels.conjugate_gradients import conjugate_step
+from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
 STAGE = "solve"
 # Largest error of a patch's light, as a share of that light, at which the solve stops.

@@ -11,10 +11,10 @@ from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import sobol_reversed
+from baker.kernels.shading import Shading
 from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.texel_info import texel_albedo, texel_geometry
-from baker.kernels.texel_raster import keep_main_chart, list_overlaps, morton_keys
-from baker.shading.materials import Shading
+from baker.radiosity.kernels.texel_raster import keep_main_chart, list_overlaps, morton_keys
 
 _TILE = 4096
 STAGE = "texels"

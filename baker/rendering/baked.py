@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.scene import SceneWarning
-from baker.io.bake_folder import SCENE_NAME, StoredBake, read_bake
-from baker.io.fingerprint import scene_sha256
+from baker.io.bake.read_bake import SCENE_NAME, StoredBake, read_bake
 from baker.io.load import load_scene
-from baker.reference.first_hit import FirstHits
-from baker.reference.vertex import glow
-from baker.reference.view import EMISSION, SHINES, Reference
+from baker.io.scene_hash import scene_sha256
+from baker.pathtracer.first_hit import FirstHits
+from baker.pathtracer.scene import EMISSION, SHINES, Reference
+from baker.pathtracer.vertex import glow
 from baker.trace.jit import kernel, scratch
 from baker.trace.kernel_cache import keep_kernels
 
-keep_kernels(__file__, "trace", "kernels", "lights", "reference")
+keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.lights", "baker.pathtracer")
 
 _new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 

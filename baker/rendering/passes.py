@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera
-from baker.reference.camera import camera_rays
-from baker.reference.first_hit import FirstHits, first_hits
-from baker.reference.irradiance import PointEstimate, add_pass, new_estimate, openness_pass
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import Reference
+from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.first_hit import FirstHits, first_hits
+from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.point_estimate import PointEstimate, add_pass, new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import Reference
 from baker.rendering.baked import BakedLight
 from baker.rendering.settings import RenderSettings
 

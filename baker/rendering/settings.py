@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baker.core.errors import SettingsError
-from baker.reference.estimators import estimator_named
+from baker.pathtracer.estimators import estimator_named
 
 AOVS = ("albedo", "normal", "depth")
 DEFAULT_SPP = 64

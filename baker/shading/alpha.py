@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
-from baker.core.rows import compact, first_equal
 from baker.core.scene import Scene
 from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, SURFACE, TEXTURE, UV, AlphaTable, no_alpha
 from baker.kernels.textures import TexturePack
-from baker.kernels.tint import TintTable
+from baker.kernels.transmittance import TintTable
+from baker.topology.unique_rows import compact, first_equal
 from baker.trace.embree import SeeThrough
 
 
@@ -78,7 +78,7 @@ def see_through(shading: Any, tint: TintTable | None = None) -> SeeThrough | Non
     if not len(shading.alpha.row):
         return None
     # Loading the compiled function takes time that other scenes need not spend.
-    from baker.kernels.alpha_filter import filter_of
+    from baker.shading.kernels.alpha_filter import filter_of
 
     return filter_of(shading.alpha, tint, shading.pack)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from baker.core.geometry import Geometry
 from baker.shading.alpha import see_through
-from baker.shading.tint import build_tint, tint
+from baker.shading.transmittance import build_tint, tint
 from baker.trace.embree import RayScene
 
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report
-from baker.io.bake_folder import StoredBake
-from baker.judge.flip import flip_error
-from baker.judge.texel_area import texel_places
-from baker.reference.irradiance import irradiance_pass, new_estimate, openness_pass
-from baker.reference.view import Reference
+from baker.io.bake.read_bake import StoredBake
+from baker.metrics.flip import flip_error
+from baker.metrics.texel_area import texel_places
+from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.scene import Reference
 
 SIZE = 24
 _MOST = 3

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from baker.core.geometry import Geometry
-from baker.judge.choice import choose_texels
-from baker.judge.texel_area import TexelPlaces, square_metres, texel_places, texel_points
-from baker.reference.view import Reference
+from baker.metrics.sample_texels import choose_texels
+from baker.metrics.texel_area import TexelPlaces, square_metres, texel_places, texel_points
+from baker.pathtracer.scene import Reference
 from baker.verification.surroundings import buried_places, in_contact, lifted, seen_along
 
 # Shares of the points: at the borders of charts, near other surfaces, anywhere.

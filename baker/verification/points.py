@@ -14,11 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from baker.core.errors import InputError
 from baker.core.geometry import Geometry
 from baker.core.lightmap import TexelStatus
-from baker.io.bake_folder import StoredBake
-from baker.judge.choice import choose_texels, scarce_texels
-from baker.judge.suspects import steep_texels, suspect_texels
-from baker.judge.texel_area import TexelPlaces, instance_map, texel_places, texel_points
-from baker.reference.view import Reference
+from baker.io.bake.read_bake import StoredBake
+from baker.metrics.sample_texels import choose_texels, scarce_texels
+from baker.metrics.suspects import steep_texels, suspect_texels
+from baker.metrics.texel_area import TexelPlaces, instance_map, texel_places, texel_points
+from baker.pathtracer.scene import Reference
 from baker.verification.edges import edge_points
 from baker.verification.settings import VerifySettings
 from baker.verification.surroundings import look_around

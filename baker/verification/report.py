@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.io.junit import write_text
 from baker.io.png import encode_png, srgb_levels
-from baker.judge.figures import dark_floor, relative_error
-from baker.judge.junit import write_text
+from baker.metrics.error_metrics import dark_floor, relative_error
 from baker.verification.judgements.registry import FIGURE_NAMES
 from baker.verification.summary import mean_flip, verification_json
 from baker.verification.verify import ChannelCheck, Verification

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baker.judge.figures import z_scores
+from baker.metrics.error_metrics import z_scores
 from baker.verification.verify import ChannelCheck, Verification
 
 

@@ -1,8 +1,8 @@
 """What lies around judged places: whether they are buried or in narrow gaps, and which room they are in.
 
-`reference.buried` tells what is buried. A place is in a gap if most of what it sees is nearer than two
-texels: no texel can follow the light there, so gaps are counted, and judged by the figures over all texels
-only.
+`pathtracer.inside_geometry` tells what is buried. A place is in a gap if most of what it sees is nearer than
+two texels: no texel can follow the light there, so gaps are counted, and judged by the figures over all
+texels only.
 A room is what can be seen from one point in the air. Such points are the middles of rays between surfaces;
 the one that sees most places makes the first room, the one that sees most of the rest the second. Closed
 rooms are told apart, and so are those whose doors stand open, but for what is seen through the door.
@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.texel_area import TexelPlaces
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.surface import OFFSET, ROUNDING
-from baker.reference.buried import RAYS, is_buried
-from baker.reference.buried import look_around as cast_around
-from baker.reference.first_hit import first_hits
-from baker.reference.view import Reference
+from baker.metrics.texel_area import TexelPlaces
+from baker.pathtracer.first_hit import first_hits
+from baker.pathtracer.inside_geometry import RAYS, is_buried
+from baker.pathtracer.inside_geometry import look_around as cast_around
+from baker.pathtracer.scene import Reference
 
 # Texels; and the share of a place's rays that end within them in a gap.
 _NEAR, _GAP, _CONTACT = 2.0, 0.5, 0.1

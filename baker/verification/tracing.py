@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
-from baker.judge.figures import dark_floor
-from baker.judge.texel_area import TexelPlaces
-from baker.reference.first_hit import first_hits
-from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
-from baker.reference.view import Reference
+from baker.metrics.error_metrics import dark_floor
+from baker.metrics.texel_area import TexelPlaces
+from baker.pathtracer.first_hit import first_hits
+from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.point_estimate import PointEstimate, new_estimate
+from baker.pathtracer.scene import Reference
 
 # Passes of all texels before some are called good enough; passes beyond which AO is not followed.
 _FIRST, _MOST_OPENNESS = 8, 1024

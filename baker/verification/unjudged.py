@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.lightmap import TexelStatus
-from baker.io.bake_folder import StoredBake
-from baker.judge.texel_area import texel_places
-from baker.reference.view import Reference
+from baker.io.bake.read_bake import StoredBake
+from baker.metrics.texel_area import texel_places
+from baker.pathtracer.scene import Reference
 from baker.verification.points import Pages
 from baker.verification.surroundings import visible
 

@@ -1,6 +1,6 @@
 """Path-traces chosen points of a finished bake and says how far the stored maps are from that.
 
-The reference knows scene and lights only (`baker.reference`); the maps are taken as the files hold them,
+The reference knows scene and lights only (`baker.pathtracer`); the maps are taken as the files hold them,
 after half float, denoiser and repairs. Every figure stands beside what the reference's own noise adds to it.
 What is concluded from the figures is in `judgements`.
 """
@@ -20,13 +20,14 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
-from baker.io.bake_folder import StoredBake, read_bake
-from baker.judge.groups import Compared
-from baker.judge.limits import Verdict, judge, parse_limits
-from baker.judge.texel_area import look_up
-from baker.judge.worst import worst_texels
-from baker.reference.irradiance import PointEstimate
-from baker.reference.view import Reference, build_reference
+from baker.io.bake.read_bake import StoredBake, read_bake
+from baker.metrics.groups import Compared
+from baker.metrics.limits import Verdict, judge, parse_limits
+from baker.metrics.texel_area import look_up
+from baker.metrics.worst_texels import worst_texels
+from baker.pathtracer.point_estimate import PointEstimate
+from baker.pathtracer.scene import Reference, build_reference
+from baker.pipeline.precompile import cache_warnings
 from baker.verification.crops import Crop, trace_crops
 from baker.verification.judgements.judgement import Evidence, Judged
 from baker.verification.judgements.registry import FIGURE_NAMES, JUDGEMENTS, default_limits
@@ -43,7 +44,6 @@ from baker.verification.tracing import (
     trace_openness,
 )
 from baker.verification.unjudged import Unjudged, measure_unjudged
-from baker.warm import cache_warnings
 
 CHANNELS = ("irradiance", "ao")
 # Pictures of the worst places get this share of the time limit on top.

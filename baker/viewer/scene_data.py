@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Material, Texture
-from baker.io.bake_folder import StoredBake
+from baker.io.bake.read_bake import StoredBake
 from baker.shading.materials import corner_uv, vertex_colour
 
 # Rec.709 luminance.

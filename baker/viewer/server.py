@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
-from baker.io.bake_folder import StoredBake
-from baker.io.output_folder import own_files
+from baker.io.bake.output_folder import own_files
+from baker.io.bake.read_bake import StoredBake
 from baker.viewer.page_data import page_numbers
 from baker.viewer.scene_data import scene_data
 from baker.viewer.script import ThreeScript

@@ -22,8 +22,8 @@ from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
 from baker.export.common import template, unique_name
 from baker.export.unity import scale_offset
+from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
-from baker.io.output import write_bake
 
 NAMES = EXPORTS.names()
 # Names that one or the other engine changes or reads as a hint, one of them twice.

@@ -75,7 +75,7 @@ HOWS = {f.__name__: f for f in (polite, deaf, threads, helper, crash, killed)} |
 
 if __name__ == "__main__":
     HOW = sys.argv.pop(1)
-    sys.modules["baker.pipeline"] = types.SimpleNamespace(bake=bake)
+    sys.modules["baker.pipeline.bake"] = types.SimpleNamespace(bake=bake)
     from baker.cli.app import main
 
     main()

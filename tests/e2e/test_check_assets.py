@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from baker.checking import CheckSettings, check_scene
+from baker.checks.run import check_scene
+from baker.checks.settings import CheckSettings
 from baker.core.errors import InputError
 from baker.core.settings import BakeSettings
 from baker.io.load import load_scene

@@ -15,10 +15,11 @@ import pytest
 from gltf_builder import QUAD, GltfBuilder, quad_builder, write
 
 ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "tests" / "unit" / "lint"))
+sys.path.append(str(ROOT / "tests" / "unit" / "checks"))
+
+from flawed_scenes import CASES  # noqa: E402
 
 from baker.cli.app import run  # noqa: E402
-from lint_scenes import CASES  # noqa: E402
 
 
 def check(*arguments):

@@ -12,12 +12,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+
 from baker.cli.app import run
 from baker.cli.progress import Reporter
-
-from baker.batch.lock import OutputLock
 from baker.core.errors import Cancelled, InputError
 from baker.core.settings import BakeSettings
+from baker.io.bake.lock import OutputLock
 
 MANIFEST = {
     "version": 1,
@@ -31,7 +31,7 @@ MANIFEST = {
 
 
 class FakePipeline:
-    """Stands in for `baker.pipeline`: remembers how it was called, then answers or fails."""
+    """Stands in for `baker.pipeline.bake`: remembers how it was called, then answers or fails."""
 
     def __init__(self):
         self.calls = []
@@ -50,7 +50,7 @@ class FakePipeline:
 @pytest.fixture
 def pipeline(monkeypatch):
     fake = FakePipeline()
-    monkeypatch.setitem(sys.modules, "baker.pipeline", fake)
+    monkeypatch.setitem(sys.modules, "baker.pipeline.bake", fake)
     return fake
 
 

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baker.cli.app import run
 from tiny_scenes import Quad, box_quads, grey, joined, quad_scene
 
+from baker.cli.app import run
 from baker.core.geometry import world_geometry
 from baker.core.scene import PunctualLight
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
-from baker.io.bake_folder import read_bake
-from baker.judge.texel_area import instance_map
-from baker.pipeline import bake
+from baker.io.bake.read_bake import read_bake
+from baker.metrics.texel_area import instance_map
+from baker.pipeline.bake import bake
 
 ROOM = box_quads((0, 0, 0), (2, 3, 2), inward=True, material=grey(0.6))
 LAMP = Quad((0.5, 1.9, 1.95), (0.8, 0, 0), (0, -0.6, 0), grey(0, 8.0))

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baker.cli.app import run
 from gltf_builder import GltfBuilder, quad_builder, write
 
+from baker.cli.app import run
 from baker.core.errors import Cancelled, InputError, ResourceError
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.png import decode_png
-from baker.pipeline import bake
+from baker.pipeline.bake import bake
 from baker.rendering import RenderSettings, render
 from baker.rendering.passes import STAGE
 

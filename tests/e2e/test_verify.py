@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baker.cli.app import run
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 
+from baker.cli.app import run
 from baker.core.scene import Material, PunctualLight
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
-from baker.pipeline import bake
+from baker.pipeline.bake import bake
 from baker.verification import VerifySettings, tracing, verify
 
 QUICK = ["--texels", "400", "--spp", "256"]
@@ -50,8 +50,8 @@ def tampered(sound: Path, tmp_path: Path, change) -> Path:
 def doubled(pixels, out):
     manifest = json.loads((out / "bake.json").read_text())
     from baker.core.geometry import world_geometry
-    from baker.io.bake_folder import read_bake
-    from baker.judge.texel_area import instance_map
+    from baker.io.bake.read_bake import read_bake
+    from baker.metrics.texel_area import instance_map
 
     stored = read_bake(out)
     owner = instance_map(world_geometry(stored.scene, stored.atlas), 1, 128)[0]
@@ -137,8 +137,8 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
 
 def test_texels_stand_for_the_surface_of_their_objects(sound):
     from baker.core.geometry import world_geometry
-    from baker.io.bake_folder import read_bake
-    from baker.judge.texel_area import instance_map, texel_places
+    from baker.io.bake.read_bake import read_bake
+    from baker.metrics.texel_area import instance_map, texel_places
 
     stored = read_bake(sound)
     geometry = world_geometry(stored.scene, stored.atlas)

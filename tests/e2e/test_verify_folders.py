@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from baker.cli.app import run
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 
+from baker.cli.app import run
 from baker.core.settings import make_settings
-from baker.pipeline import bake
+from baker.pipeline.bake import bake
 from baker.verification import VerifySettings, verification_json, verify
 
 QUICK = VerifySettings(texels=120, spp=128, time_limit=None)

@@ -20,10 +20,10 @@ from baker.core.geometry import world_geometry
 from baker.core.scene import Material
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
-from baker.io.bake_folder import read_bake
-from baker.judge.texel_area import instance_map, texel_places
+from baker.io.bake.read_bake import read_bake
 from baker.lights.emissive import build_emitters
-from baker.pipeline import bake
+from baker.metrics.texel_area import instance_map, texel_places
+from baker.pipeline.bake import bake
 from baker.verification import VerifySettings, verify
 
 # The module, which the function of the same name hides.
@@ -297,7 +297,7 @@ def test_an_emitter_that_both_finders_forget_is_missed_all_the_same(tmp_path, mo
         emission[emission.max(axis=1) < 1] = 0
         return real(geometry, shading._replace(emission=emission), *rest)
 
-    for place in ("baker.world", "baker.reference.lamps"):
+    for place in ("baker.pipeline.world", "baker.pathtracer.light_table"):
         monkeypatch.setattr(f"{place}.build_emitters", forgetful)
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
     found = verify(tmp_path / "out", replace(SETTINGS, texels=300, spp=256))

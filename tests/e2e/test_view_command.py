@@ -11,8 +11,9 @@ from io import StringIO
 from urllib.request import urlopen
 
 import pytest
-from baker.cli.app import run
 from view_bake import make_bake
+
+from baker.cli.app import run
 
 BAKER = [sys.executable, "-c", "from baker.cli.app import main; main()"]
 

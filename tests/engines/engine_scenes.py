@@ -17,8 +17,8 @@ import baker
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.settings import make_settings
+from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
-from baker.io.output import write_bake
 
 ALBEDO = (0.8, 0.5, 0.25)
 QUADRANT = np.array([[1.0, 2.0], [0.25, 0.5]])

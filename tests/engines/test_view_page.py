@@ -30,7 +30,7 @@ from view_bake import (
 
 from baker.core.colour import linear_from_srgb
 from baker.encodings.exr import decode_exr
-from baker.io.bake_folder import read_bake
+from baker.io.bake.read_bake import read_bake
 from baker.io.png import decode_palette_png
 from baker.viewer import find_three, make_server
 

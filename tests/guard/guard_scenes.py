@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-for _folder in ("assets", "tests", "tests/unit/lint"):
+for _folder in ("assets", "tests", "tests/unit/checks"):
     if str(ROOT / _folder) not in sys.path:
         sys.path.append(str(ROOT / _folder))
 
+import flawed_scenes  # noqa: E402
 import gltf_builder as gltf  # noqa: E402
-import lint_scenes  # noqa: E402
 from glb import GlbBuilder  # noqa: E402
 from shapes import ball, box, box_faces, quads  # noqa: E402
 
@@ -78,7 +78,7 @@ def write_scenes(folder: Path) -> None:
         part.json["extras"] = {"name": name}
         gltf.write(folder / "parts" / f"{name}.glb", part)
     (folder / "faults").mkdir()
-    for name, case in lint_scenes.CASES.items():
+    for name, case in flawed_scenes.CASES.items():
         (folder / "faults" / f"{name}.glb").write_bytes(case.bad)
     (folder / "broken.glb").write_bytes((folder / "cornell.glb").read_bytes()[:3000])
     (folder / "JOBS.toml").write_text(JOBS)

@@ -12,8 +12,9 @@ import numpy as np
 from scipy import stats
 
 from baker.core.scene import Scene
-from baker.reference.irradiance import PointEstimate, irradiance_pass, new_estimate, openness_pass
-from baker.reference.view import Reference, build_reference
+from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.point_estimate import PointEstimate, new_estimate
+from baker.pathtracer.scene import Reference, build_reference
 
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002

@@ -12,13 +12,14 @@ from mixed_scenes import ROOM_CAMERA, YARD_CAMERA, glossy, glossy_room, open_yar
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
-import baker.reference.bidirectional_pass as bidirectional_pass
+import baker.pathtracer.bidirectional_pass as bidirectional_pass
 from baker.core.scene import PunctualLight
-from baker.reference.bsdf import bsdf_eval
-from baker.reference.camera import look_at
-from baker.reference.irradiance import irradiance_pass, new_estimate
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.bsdf import bsdf_eval
+from baker.pathtracer.camera import look_at
+from baker.pathtracer.irradiance import irradiance_pass
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
 
 (bsdf_eval,) = compiled(bsdf_eval)
 SIZE = 12

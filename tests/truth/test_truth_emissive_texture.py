@@ -13,7 +13,7 @@ from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
 from baker.core.scene import Material, Texture
-from baker.reference.estimators import ESTIMATORS
+from baker.pathtracer.estimators import ESTIMATORS
 
 N = 64
 RED, GREEN, BLUE = np.eye(3)

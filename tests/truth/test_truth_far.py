@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from scenes import SceneBuilder
 
+from baker.checks.context import Subject
+from baker.checks.direct_light import estimate_levels
+from baker.comparison.compare import compare
 from baker.core.settings import make_settings
-from baker.difference.compare import compare
-from baker.lint.light_levels import estimate_levels
-from baker.lint.subject import Subject
-from baker.pipeline import bake
-from baker.reference.camera import look_at
-from baker.reference.irradiance import new_estimate, openness_pass
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.camera import look_at
+from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
+from baker.pipeline.bake import bake
 from baker.verification.verify import VerifySettings, verify
 
 # Whole numbers in binary, so that single precision can hold what the room's own coordinates are.

@@ -14,10 +14,11 @@ import pytest
 from ztest import critical
 
 from baker.io.load import load_scene
-from baker.reference.first_hit import first_hits
-from baker.reference.irradiance import irradiance_pass, new_estimate
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.first_hit import first_hits
+from baker.pathtracer.irradiance import irradiance_pass
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
 
 pytestmark = pytest.mark.mitsuba
 ROOT = Path(__file__).parents[2]

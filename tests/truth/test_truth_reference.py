@@ -1,4 +1,4 @@
-"""The path tracer's estimators against each other, and its bytes; `test_truth_judge` has its closed forms."""
+"""The path tracer's estimators against each other, and its bytes; `test_truth_metrics` has its closed forms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
 from baker.core.scene import PunctualLight
-from baker.reference.estimators import ESTIMATORS
+from baker.pathtracer.estimators import ESTIMATORS
 
 
 def room():

@@ -14,10 +14,10 @@ from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
 from baker.core.scene import Camera, Material, PunctualLight
-from baker.reference.first_hit import first_hits
-from baker.reference.irradiance import new_estimate
-from baker.reference.radiance import radiance_pass
-from baker.reference.view import build_reference
+from baker.pathtracer.first_hit import first_hits
+from baker.pathtracer.point_estimate import new_estimate
+from baker.pathtracer.radiance import radiance_pass
+from baker.pathtracer.scene import build_reference
 
 STAINED = Material(base_colour=(*COLOUR.tolist(), HALF), alpha_mode="BLEND", double_sided=True)
 VIEW = Camera("view", 0, (0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 0.5)

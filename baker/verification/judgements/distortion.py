@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from baker.core.lightmap import TexelStatus
-from baker.judge.fillings import misfilled_share
-from baker.judge.levels import cut_off, few_levels
-from baker.judge.registration import best_shift, exponent, is_blurred
+from baker.metrics.fillings import misfilled_share
+from baker.metrics.levels import cut_off, few_levels
+from baker.metrics.misalignment import best_shift, exponent, is_blurred
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 
 # A shifted chart fits this much better where it should be; there are many, and few texels tell of each.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.figures import beyond_noise, dark_floor
-from baker.judge.texel_area import look_up
+from baker.metrics.error_metrics import beyond_noise, dark_floor
+from baker.metrics.texel_area import look_up
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.groups import LEAST, GroupFigures, bright_light, compare_group
+from baker.metrics.groups import LEAST, GroupFigures, bright_light, compare_group
 from baker.verification.judgements.judgement import Evidence
 
 # Differences are held against at least this much light: no one sees a percent of the AO of a corner.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
-from baker.io.bake_folder import StoredBake
-from baker.judge.groups import Compared
+from baker.io.bake.read_bake import StoredBake
+from baker.metrics.groups import Compared
 from baker.verification.points import EDGE, SCARCE, STEEP, SUSPECT, TEXEL, Pages, Points
 from baker.verification.unjudged import Unjudged
 

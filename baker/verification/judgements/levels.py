@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.choice import light_level
-from baker.judge.groups import Compared
+from baker.metrics.groups import Compared
+from baker.metrics.sample_texels import light_level
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 

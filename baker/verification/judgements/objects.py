@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baker.judge.figures import dark_floor, figures
+from baker.metrics.error_metrics import dark_floor, figures
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 

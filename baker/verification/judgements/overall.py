@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from baker.judge.figures import FIGURES, beyond_noise, figures
+from baker.metrics.error_metrics import FIGURES, beyond_noise, figures
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 
 
 def judge(evidence: Evidence) -> Judged:
-    """Return the figures of `judge.figures`, and what the median holds beside the reference's noise."""
+    """Return the figures of `error_metrics`, and what the median holds beside the reference's noise."""
     mine = evidence.texels
     places = evidence.compared.of(mine)
     found = figures(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.judge.choice import LEVELS, light_level
+from baker.metrics.sample_texels import LEVELS, light_level
 from baker.verification.judgements.groups import make_groups, worst_figures
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 from baker.verification.judgements.levels import level_light

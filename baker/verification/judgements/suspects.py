@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baker.judge.figures import dark_floor
+from baker.metrics.error_metrics import dark_floor
 from baker.verification.judgements.judgement import Evidence, Judged, Judgement
 
 _WRONG, _SURE = 0.3, 4.0

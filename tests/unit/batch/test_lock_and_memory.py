@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from gltf_builder import quad_builder, write
 
-from baker.batch.lock import OutputLock, dead_writers, sweep
 from baker.batch.memory import estimate_peak, parse_size, size_words
 from baker.core.errors import SettingsError
 from baker.core.settings import make_settings
+from baker.io.bake.lock import OutputLock, dead_writers, sweep
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from baker.batch.lock import OutputLock
+from baker.io.bake.lock import OutputLock
 lock = OutputLock(Path(sys.argv[1]))
 print(lock.acquire(), flush=True)
 time.sleep(60)

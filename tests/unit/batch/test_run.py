@@ -9,13 +9,13 @@ import pytest
 from gltf_builder import quad_builder, write
 
 from baker.batch import memory
-from baker.batch.bakery import Event
+from baker.batch.executor import Event
 from baker.batch.jobs_file import Job
-from baker.batch.lock import OutputLock
 from baker.batch.run import BatchOptions, batch_json, run_batch, write_junit
 from baker.core.errors import Cancelled
 from baker.core.progress import silent
 from baker.core.settings import BakeSettings
+from baker.io.bake.lock import OutputLock
 
 
 class FakeBakery:

@@ -12,10 +12,10 @@ from baker.core.progress import silent
 from baker.finish import oidn
 from baker.finish.denoise import FITTED, denoise_page, denoiser_name, surround_charts
 from baker.finish.finish import PageLayer, PagePlan, finish_page
+from baker.finish.kernels import page_guard
+from baker.finish.kernels.page_guard import hold_to_samples
 from baker.finish.noise import estimate_error
 from baker.finish.oidn import LightmapDenoiser
-from baker.kernels import page_guard
-from baker.kernels.page_guard import hold_to_samples
 
 TINT = np.array([1.0, 0.85, 0.6], np.float32)
 

@@ -9,8 +9,8 @@ from gltf_builder import write
 from io_scenes import quad_result, rich_builder
 
 from baker.core.errors import InputError
+from baker.io.bake.write_bake import write_bake
 from baker.io.inspect import inspect_path
-from baker.io.output import write_bake
 from baker.io.png import encode_palette_png, encode_png
 
 

@@ -18,7 +18,7 @@ from io_scenes import PICTURE, make_atlas, split_layout
 from needed_cases import BLOB, DOCUMENT, GONE, REFUSED, SILENT, SPARE_VIEW, WARNED, WHOLE, Document, at
 
 from baker.core.errors import InputError
-from baker.io.gltf_write import make_glb
+from baker.io.gltf.write_baked import make_glb
 from baker.io.load import load_scene
 
 

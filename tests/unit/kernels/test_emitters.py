@@ -10,7 +10,6 @@ from tiny_scenes import Quad, grey, quad_world
 
 from baker.core.geometry import Geometry, face_normals
 from baker.core.scene import Material, Texture
-from baker.kernels.area_light import emitter_hit, mis_weighted
 from baker.kernels.emitters import (
     bounding_sphere,
     cluster_chances,
@@ -19,9 +18,10 @@ from baker.kernels.emitters import (
     lamps_for,
     sample_emitter,
 )
+from baker.kernels.shading import Shading
 from baker.kernels.textures import pack_textures
 from baker.lights.emissive import MAX_CLUSTERS, build_emitters
-from baker.shading.materials import Shading
+from baker.radiosity.kernels.area_light import emitter_hit, mis_weighted
 
 bounding_sphere, emitted_radiance, emitter_density = compiled(
     bounding_sphere, emitted_radiance, emitter_density

@@ -7,9 +7,9 @@ import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
 from baker.core.progress import silent
-from baker.kernels.form_factor import SPLIT
+from baker.radiosity.kernels.form_factor import SPLIT
 from baker.radiosity.patches import build_patches
-from baker.radiosity.points import points_of
+from baker.radiosity.point_cache import points_of
 from baker.radiosity.sides import split_texels
 
 SIZE = 48

@@ -23,13 +23,13 @@ import pkgutil, importlib
 for package in ("kernels", "trace", "lights", "reference"):
     for found in pkgutil.iter_modules(importlib.import_module(f"baker.{package}").__path__):
         importlib.import_module(f"baker.{package}.{found.name}")
-from baker.reference.camera import camera_rays, look_at
+from baker.pathtracer.camera import camera_rays, look_at
 import numpy as np
 way = camera_rays(look_at((0, 0, 0), (0, 0, 1), 30.0), 2, 2, np.arange(4), 1, 0, 0)
 np.testing.assert_allclose((way * way).sum(axis=2), 1)
 """
 WARNED = """
-from baker.warm import cache_warnings, start
+from baker.pipeline.precompile import cache_warnings, start
 assert start() is None
 print(*(w.code for w in cache_warnings()))
 """
@@ -57,7 +57,7 @@ def test_kernels_work_where_nothing_can_be_kept():
 
 
 def test_nothing_is_said_where_they_can():
-    assert said("from baker.warm import cache_warnings\nprint(cache_warnings())") == "[]"
+    assert said("from baker.pipeline.precompile import cache_warnings\nprint(cache_warnings())") == "[]"
 
 
 def test_other_programs_are_left_alone():

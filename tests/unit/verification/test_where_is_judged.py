@@ -9,8 +9,8 @@ import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_atlas, quad_scene
 
 from baker.core.geometry import world_geometry
-from baker.judge.texel_area import instance_map, texel_places
-from baker.reference.view import build_reference
+from baker.metrics.texel_area import instance_map, texel_places
+from baker.pathtracer.scene import build_reference
 from baker.verification.edges import border_texels, edge_points
 from baker.verification.points import chart_numbers
 from baker.verification.surroundings import in_contact, look_around, visible

@@ -1,0 +1,89 @@
+"""Whether an output folder still is the bake of its scene: by content alone, never by times or paths.
+
+A bake's manifest holds the hash of its scene with every file that names, its settings, the versions of
+baker and the libraries, and the hash of each file written. All of them must be what they would be today.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from baker.core.settings import BakeSettings
+from baker.io.bake.manifest import library_versions, resolved_settings
+from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
+
+# Decides only how `samples` is filled in, and that is compared itself.
+_NOT_COMPARED = {"quality", "ao_distance_metres"}
+# Differences told; a changed library set would else fill the line.
+_TOLD = 3
+
+
+@dataclass(frozen=True)
+class Freshness:
+    """What an output folder is worth.
+
+    Attributes
+    ----------
+    fresh : bool
+        Nothing has to be done.
+    why : str
+        What differs, in words.
+    manifest : bytes
+        The `bake.json` that was looked at, empty if there is none.
+    """
+
+    fresh: bool
+    why: str
+    manifest: bytes = b""
+
+
+def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
+    """Compare an output folder with what baking would give today.
+
+    Parameters
+    ----------
+    out : Path
+        Need not exist.
+    sha256 : str
+        Hash of the scene and the files it names, see `io.scene_hash`.
+    settings : BakeSettings
+    """
+    try:
+        data = (out / MANIFEST_NAME).read_bytes()
+    except OSError:
+        return Freshness(False, "not baked yet")
+    try:
+        manifest = json.loads(data)
+        found = _differences(manifest["versions"], library_versions())
+        if manifest["input"]["sha256"] != sha256:
+            found.append("the scene, or a file that it names, changed")
+        found += _differences(manifest["settings"], resolved_settings(settings))
+        for entry in [] if found else manifest["files"]:
+            state = file_state(out / str(entry["file"]), str(entry["sha256"]))
+            if state != AS_BAKED:
+                words = "is missing" if state == "missing" else "is not as it was baked"
+                found.append(f"{entry['file']} {words}")
+    except (ValueError, KeyError, TypeError, AttributeError, OSError):
+        return Freshness(False, f"its {MANIFEST_NAME} is unreadable", data)
+    if not found:
+        return Freshness(True, "nothing changed", data)
+    more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
+    return Freshness(False, "; ".join(found[:_TOLD]) + more, data)
+
+
+def _differences(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
+    names = [name for name in dict.fromkeys([*now, *before]) if name not in _NOT_COMPARED]
+    return [
+        f"{name} {_words(before.get(name))} -> {_words(now.get(name))}"
+        for name in names
+        if before.get(name) != now.get(name)
+    ]
+
+
+def _words(value: Any) -> str:
+    if value is None:
+        return "none"
+    return ",".join(map(str, value)) if isinstance(value, list) else str(value)

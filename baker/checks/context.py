@@ -1,0 +1,181 @@
+"""What is checked: a scene as its file has it, with what checks share about it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.finding import Place
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.scene_rays import World
+from baker.checks.uv_facts import UvFacts
+from baker.core.parallel import thread_count
+from baker.core.scene import Mesh, Scene
+from baker.core.settings import BakeSettings
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
+
+if TYPE_CHECKING:
+    from baker.checks.bake_rates import Rates
+    from baker.checks.direct_light import Levels
+    from baker.checks.emission import Emission
+
+# Mip level down to which charts must not bleed into each other, if none is asked for.
+DEFAULT_MIP = 2
+
+
+class Subject:
+    """A scene with the settings that it is to be baked with.
+
+    Attributes
+    ----------
+    scene : Scene
+        Loaded leniently, or as a bake has it.
+    raw : RawScene
+    settings : BakeSettings
+    mip : int
+        Mip level of the lightmap down to which charts must not bleed into each other.
+    meshes : tuple of MeshFacts, one for each of `raw.meshes`
+    rates : Rates or None
+        Speed of an earlier bake.
+    probe : bool
+        Measure the speed if it is not known.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: BakeSettings,
+        *,
+        mip: int = DEFAULT_MIP,
+        rates: Rates | None = None,
+        probe: bool = False,
+    ) -> None:
+        self.scene = scene
+        self.settings = settings
+        self.mip = mip
+        self.rates = rates
+        self.probe = probe
+        self.raw = scene.raw if scene.raw is not None else raw_of(scene)
+        self._uv: dict[int, UvFacts] = {}
+        trusted = scene.raw is None
+        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.raw.meshes)
+
+    @cached_property
+    def first_instance(self) -> dict[int, RawInstance]:
+        """Return the first instance of each mesh."""
+        found: dict[int, RawInstance] = {}
+        for instance in self.raw.instances:
+            found.setdefault(instance.mesh, instance)
+        return found
+
+    @cached_property
+    def box(self) -> NDArray[np.float64]:
+        """Return the lowest and highest corner (2, 3) of all good triangles, metres, world; inf if none."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for instance in self.raw.instances:
+            facts = self.meshes[instance.mesh]
+            if not len(facts.good):
+                continue
+            # The corners of the mesh's own box reach at least as far as the mesh itself.
+            own = facts.bounds
+            box = np.array(list(product(*own.T)))
+            world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
+            low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+        return np.stack([low, high])
+
+    @property
+    def diagonal(self) -> float:
+        """Return the diagonal of that box, metres."""
+        low, high = self.box
+        return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
+
+    @cached_property
+    def world(self) -> World:
+        """Return all good triangles in the world."""
+        return World(self, thread_count(self.settings.threads))
+
+    @cached_property
+    def used_materials(self) -> list[int]:
+        """Return the materials that good triangles have."""
+        used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
+        return [int(k) for k in np.unique(np.concatenate(used))] if used else []
+
+    @property
+    def wants_light(self) -> bool:
+        """Tell whether anything else than AO is to be baked."""
+        return any(name != "ao" for name in self.settings.channels)
+
+    @cached_property
+    def emission(self) -> Emission:
+        """Return the triangles that emit."""
+        from baker.checks.emission import find_emission
+
+        return find_emission(self)
+
+    @property
+    def glows(self) -> bool:
+        """Tell whether any triangle emits; one whose part of the emissive texture is black does not."""
+        some = any(max(self.scene.materials[k].emission) > 0 for k in self.used_materials)
+        return some and len(self.emission.triangle) > 0
+
+    @cached_property
+    def levels(self) -> Levels | None:
+        """Return direct light at sample points; None without light, surface, or wish for either."""
+        from baker.checks.direct_light import estimate_levels
+
+        bright = [max(light.intensity) for light in self.scene.lights]
+        lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
+        if not self.wants_light or not (lit or self.glows) or not self.world.area.sum() > 0:
+            return None
+        return estimate_levels(self)
+
+    def uv(self, mesh: int) -> UvFacts:
+        """Return the lightmap uv of a mesh, worked out once."""
+        if mesh not in self._uv:
+            self._uv[mesh] = UvFacts(self.meshes[mesh])
+        return self._uv[mesh]
+
+    def place(self, mesh: int) -> Place:
+        """Return where a mesh stands first."""
+        instance = self.first_instance.get(mesh)
+        if instance is None:
+            return Place(self.raw.meshes[mesh].name)
+        return Place(instance.name or self.raw.meshes[mesh].name, instance.node)
+
+    def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
+        """Return a (3,) point of a mesh in the world, where the mesh stands first."""
+        instance = self.first_instance.get(mesh)
+        matrix = np.eye(4) if instance is None else instance.world_from_object
+        x, y, z = (float(v) for v in matrix[:3, :3] @ np.asarray(point, np.float64) + matrix[:3, 3])
+        return x, y, z
+
+
+def raw_of(scene: Scene) -> RawScene:
+    """Return the good triangles of a scene in the form of raw ones, without copies."""
+    meshes = tuple(RawMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
+    stand = tuple(RawInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
+    return RawScene(meshes, stand)
+
+
+def _primitives(mesh: Mesh) -> tuple[PrimitiveArrays, ...]:
+    # Vertices and triangles of a primitive stand together, in the order of primitives.
+    out = []
+    for number in np.unique(mesh.primitive):
+        rows = slice(*np.searchsorted(mesh.vertex_primitive, [number, number + 1]))
+        faces = slice(*np.searchsorted(mesh.primitive, [number, number + 1]))
+        out.append(
+            PrimitiveArrays(
+                index=int(number),
+                material=int(mesh.material[faces][0]),
+                position=mesh.position[rows],
+                triangle=mesh.triangle[faces].astype(np.int64) - rows.start,
+                normal=mesh.normal[rows],
+                texcoord={k: value[rows] for k, value in enumerate(mesh.texcoord) if value is not None},
+                colour=None if mesh.colour is None else mesh.colour[rows],
+            )
+        )
+    return tuple(out)

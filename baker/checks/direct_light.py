@@ -1,0 +1,137 @@
+"""Direct irradiance at a few hundred points of a scene, before any bake.
+
+E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each where nothing is in the way
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.core.scene import PunctualLight
+
+# Receivers, a multiple of 16; rays from each to emissive surfaces, and into the sky.
+POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Direct irradiance at sample points.
+
+    Attributes
+    ----------
+    position : (n, 3) float64, metres, relative to `Scene.origin`
+    irradiance : (n,) float64, lx, brightest of RGB
+    triangle : (n,) int64, the triangle of `World` each point lies on
+    """
+
+    position: NDArray[np.float64]
+    irradiance: NDArray[np.float64]
+    triangle: NDArray[np.int64]
+
+
+def estimate_levels(subject: Subject) -> Levels:
+    """Estimate direct light at points spread over all front sides by area."""
+    world = subject.world
+    random = np.random.default_rng(subject.settings.seed)
+    position, normal, triangle = spread_points(subject, POINTS, random)
+    total = np.zeros((len(position), 3))
+    origin = world.lifted(position, triangle, normal)
+    for light in subject.scene.local_lights:
+        if max(light.intensity) > 0:
+            total += _punctual(subject, light, origin, normal)
+    total += _emissive(subject, origin, normal, random)
+    sky = np.array(subject.settings.sky_radiance)
+    if sky.any():
+        way = cosine_ways(normal, SKY_RAYS, random)
+        far = np.full(len(way), 1e30)
+        hit, _ = world.first_hits(np.repeat(origin, SKY_RAYS, axis=0), way, np.zeros(len(way)), far)
+        total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
+    return Levels(position, total.max(axis=1), triangle)
+
+
+def spread_points(
+    subject: Subject, n: int, random: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Return n points, stratified by area, with the normal of their face and its number."""
+    world = subject.world
+    share = np.cumsum(world.area)
+    pick = (np.arange(n) + random.random(n)) / n * share[-1]
+    triangle = np.minimum(np.searchsorted(share, pick), len(share) - 1)
+    return points_inside(subject, triangle, random), world.normal[triangle], triangle
+
+
+def points_inside(
+    subject: Subject,
+    triangle: NDArray[np.int64],
+    random: np.random.Generator,
+    part: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Return a random point of each triangle, or of a part of it (n, 3), see `Emission.inside`."""
+    world = subject.world
+    u, v = random.random((2, len(triangle)))
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    if part is not None:
+        u, v = part[:, 0] + part[:, 2] * u, part[:, 1] + part[:, 2] * v
+    corner = world.position[world.triangle[triangle]].astype(np.float64)
+    point: NDArray[np.float64] = (
+        corner[:, 0] + u[:, None] * (corner[:, 1] - corner[:, 0]) + v[:, None] * (corner[:, 2] - corner[:, 0])
+    )
+    return point
+
+
+def _punctual(
+    subject: Subject, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    from baker.lights.family import LIGHT_FAMILIES
+
+    family = LIGHT_FAMILIES.get(light.kind)
+    if family is None:
+        return np.zeros((len(origin), 3))
+    # A family fills rows of 16 points.
+    shape = (len(origin) // 16, 16)
+    ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
+    at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
+    family(light, at, up, ray, weight)
+    rows = ray.reshape(-1, 4)
+    hit, _ = subject.world.first_hits(origin, rows[:, :3], np.zeros(len(rows)), rows[:, 3])
+    seen = np.where(hit < 0, weight.reshape(-1), 0.0)
+    return np.asarray(seen[:, None] * np.array(light.intensity), np.float64)
+
+
+def _emissive(
+    subject: Subject, origin: NDArray[np.float64], normal: NDArray[np.float64], random: np.random.Generator
+) -> NDArray[np.float64]:
+    """Light from emissive triangles, by points chosen by power, (n, 3) float64."""
+    world, found = subject.world, subject.emission
+    power = found.area * (found.radiance @ _LUMINANCE)
+    total = np.zeros((len(origin), 3))
+    if not power.sum() > 0:
+        return total
+    share = np.cumsum(power) / power.sum()
+    for _ in range(EMITTER_RAYS):
+        part = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
+        chosen = found.triangle[part]
+        way = points_inside(subject, chosen, random, found.inside[part]) - origin
+        square = np.maximum(np.einsum("nx,nx->n", way, way), 1e-20)
+        here = np.einsum("nx,nx->n", way, normal)
+        there = -np.einsum("nx,nx->n", way, world.normal[chosen])
+        there = np.where(world.double_sided[chosen], np.abs(there), there)
+        hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 0.9999))
+        geometry = np.maximum(here, 0) * np.maximum(there, 0) / square**2 * (hit < 0)
+        density = power[part] / power.sum() / np.maximum(found.area[part], 1e-300)
+        total += found.radiance[part] * (geometry / density)[:, None] / EMITTER_RAYS
+    return total
+
+
+def cosine_ways(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
+    """Return n cosine-weighted directions around each normal, (N n, 3) float64."""
+    way = random.normal(size=(len(normal) * n, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    out: NDArray[np.float64] = way * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)
+    return out

@@ -1,0 +1,87 @@
+"""What each triangle of the file emits: exact means of emissive textures, and where on it the light is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.core.scene import Texture
+
+# Parts that textured triangles are cut into, beside what they were.
+_MOST_PARTS = 2048
+
+
+@dataclass(frozen=True)
+class Emission:
+    """The E triangles that emit, textured ones in parts.
+
+    Attributes
+    ----------
+    triangle : (E,) int64
+        Triangle of `World`.
+    inside : (E, 3) float64
+        Which part of it, see `baker.lights.emissive_texture.Parts`.
+    radiance : (E, 3) float64
+        Mean, cd/m2.
+    area : (E,) float64, m2
+    """
+
+    triangle: NDArray[np.int64]
+    inside: NDArray[np.float64]
+    radiance: NDArray[np.float64]
+    area: NDArray[np.float64]
+
+
+def find_emission(subject: Subject) -> Emission:
+    """Find what emits; triangles whose part of the texture is black do not."""
+    world, materials = subject.world, subject.scene.materials
+    factor = np.array([m.emission for m in materials], np.float64).reshape(-1, 3)
+    emits = np.flatnonzero((factor.max(axis=1, initial=0.0) > 0)[world.material] & (world.area > 0))
+    textured = np.array([m.emission_texture is not None for m in materials], bool)[world.material[emits]]
+    plain, image = emits[~textured], emits[textured]
+    triangle, inside = plain, np.tile([0.0, 0.0, 1.0], (len(plain), 1))
+    radiance = factor[world.material[plain]]
+    if len(image):
+        # Kernels are compiled for files that have such textures only.
+        from baker.kernels.textures import pack_textures
+        from baker.lights.emissive_texture import EmissiveTextures, cut
+
+        used = [int(k) for k in np.unique(world.material[image])]
+        textures = [t for k in used if (t := materials[k].emission_texture) is not None]
+        number = np.searchsorted(used, world.material[image])
+        pack = pack_textures([(t.image, t.wrap) for t in textures], [t.nearest for t in textures])
+        uv = np.zeros((len(image), 3, 2))
+        for k, texture in enumerate(textures):
+            uv[number == k] = _image_uv(subject, image[number == k], texture)
+        shone = EmissiveTextures(pack, number, factor[world.material[image]], uv)
+        parts = cut(shone, world.area[image], np.zeros(len(image)), _MOST_PARTS)
+        triangle = np.concatenate([triangle, image[parts.owner]])
+        inside, radiance = np.concatenate([inside, parts.inside]), np.concatenate([radiance, parts.mean])
+    return Emission(triangle, inside, radiance, world.area[triangle] * inside[:, 2] ** 2)
+
+
+def _image_uv(subject: Subject, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
+    """Return where the corners of triangles lie in a texture, (n, 3, 2); (0, 0) without such a set."""
+    world = subject.world
+    out = np.zeros((len(triangle), 3, 2))
+    for k in np.unique(world.instance[triangle]):
+        own = np.flatnonzero(world.instance[triangle] == k)
+        place = subject.raw.instances[k]
+        facts = subject.meshes[place.mesh]
+        sets = [p.texcoord.get(texture.texcoord) for p in facts.raw.primitives]
+        known = [
+            np.zeros((len(p.position), 2)) if uv is None or len(uv) != len(p.position) else uv
+            for p, uv in zip(facts.raw.primitives, sets, strict=True)
+        ]
+        corner = facts.triangle[world.face[triangle[own]]]
+        if np.linalg.det(place.world_from_object[:3, :3]) < 0:
+            corner = corner[:, ::-1]
+        given = np.array([uv is not None for uv in sets])[facts.primitive[world.face[triangle[own]]]]
+        uv = np.concatenate(known)[corner].astype(np.float64)
+        uv = np.where(np.isfinite(uv), uv, 0.0)
+        moved = uv @ texture.transform[:, :2].T + texture.transform[:, 2]
+        out[own] = np.where(given[:, None, None], moved, 0.0)
+    return out

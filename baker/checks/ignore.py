@@ -1,0 +1,43 @@
+"""Findings that somebody has looked at and accepted: `CODE`, or `CODE@OBJECT`, both with `*`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+
+from baker.checks.rule import CHECKS
+from baker.core.errors import SettingsError
+
+
+@dataclass(frozen=True)
+class Ignore:
+    """One rule."""
+
+    code: str
+    object: str = "*"
+
+    def matches(self, code: str, name: str) -> bool:
+        """Tell whether the rule covers a finding."""
+        return fnmatchcase(code, self.code) and fnmatchcase(name, self.object)
+
+
+def parse_ignore(rules: Iterable[str]) -> list[Ignore]:
+    """Return the rules of `CODE[@OBJECT]` texts.
+
+    Raises
+    ------
+    SettingsError
+        For a code that no check has.
+    """
+    known = CHECKS.names()
+    out = []
+    for rule in rules:
+        code, at, name = rule.partition("@")
+        if not any(fnmatchcase(entry, code) for entry in known):
+            near = get_close_matches(code, known, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else "; docs/CHECKS.md lists all codes"
+            raise SettingsError(f"there is no finding '{code}' to ignore{hint}", object="ignore")
+        out.append(Ignore(code, name if at else "*"))
+    return out

@@ -1,0 +1,195 @@
+"""What several checks need to know of one mesh, each worked out once: faces, edges, pieces."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import Material
+from baker.core.source_mesh import RawMesh
+from baker.topology.edges import Edges, find_edges
+from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
+from baker.topology.weld import number_by_first, number_rows
+
+
+class MeshFacts:
+    """A mesh of the file with its triangles sorted into good and bad.
+
+    Faces are numbered over all primitives; `primitive` and `local` say where the file has them.
+
+    Attributes
+    ----------
+    position : (V, 3) float32, object space
+    triangle : (T, 3) int64, indices into `position`, possibly out of range
+    primitive, local : (T,) int64
+        Primitive of each face and its number in it.
+    material : (T,) int32
+    trusted : bool
+        The importer has left bad faces out already: nothing is looked for twice.
+    """
+
+    def __init__(self, raw: RawMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
+        self.raw = raw
+        self.trusted = trusted
+        self.materials = materials
+        start = np.cumsum([0] + [len(p.position) for p in raw.primitives])
+        self.vertex_start = start
+        empty = [np.zeros((0, 3), np.float32)]
+        self.position: NDArray[np.float32] = np.concatenate([p.position for p in raw.primitives] or empty)
+        parts, primitive, local, material = [], [], [], []
+        for k, p in enumerate(raw.primitives):
+            number = np.arange(len(p.triangle))
+            if p.stitched:
+                # Triangles with a repeated index only join the pieces of a strip.
+                t = p.triangle
+                number = number[(t[:, 0] != t[:, 1]) & (t[:, 1] != t[:, 2]) & (t[:, 2] != t[:, 0])]
+            parts.append(p.triangle[number] + start[k])
+            primitive.append(np.full(len(number), k, np.int64))
+            local.append(number)
+            material.append(np.full(len(number), p.material, np.int32))
+        none = np.zeros(0, np.int64)
+        self.triangle: NDArray[np.int64] = np.concatenate(parts or [np.zeros((0, 3), np.int64)])
+        self.primitive: NDArray[np.int64] = np.concatenate(primitive or [none])
+        self.local: NDArray[np.int64] = np.concatenate(local or [none])
+        self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
+
+    @cached_property
+    def within(self) -> NDArray[np.bool_]:
+        """Tell which faces name only vertices of their own primitive, (T,) bool."""
+        if self.trusted:
+            return np.ones(len(self.triangle), bool)
+        low, high = self.vertex_start[self.primitive], self.vertex_start[self.primitive + 1]
+        return in_range(self.triangle, low, high)
+
+    @cached_property
+    def usable(self) -> NDArray[np.bool_]:
+        """Tell which faces have finite corners within range, (T,) bool; false where an index is wrong."""
+        if self.trusted:
+            return self.within
+        good = usable_vertices(self.position)
+        if good.all() and self.within.all():
+            return self.within
+        found = self.within.copy()
+        found[self.within] = good[self.triangle[self.within]].all(axis=1)
+        return found
+
+    @cached_property
+    def flat(self) -> NDArray[np.bool_]:
+        """Tell which usable faces have no area, (T,) bool."""
+        found = np.zeros(len(self.triangle), bool)
+        if self.trusted:
+            return found
+        usable = np.flatnonzero(self.usable)
+        found[usable] = zero_area(self.position, self.triangle[usable])
+        return found
+
+    @cached_property
+    def repeated(self) -> NDArray[np.bool_]:
+        """Tell which usable faces with area repeat an earlier one, (T,) bool."""
+        found = np.zeros(len(self.triangle), bool)
+        if self.trusted:
+            return found
+        rest = np.flatnonzero(self.usable & ~self.flat)
+        double_sided = np.array([m.double_sided for m in self.materials], bool)
+        found[rest] = duplicates(self.position, self.triangle[rest], self.material[rest], double_sided)
+        return found
+
+    @cached_property
+    def good(self) -> NDArray[np.int64]:
+        """Return the numbers of the faces that a bake uses, (G,) int64."""
+        return np.flatnonzero(self.usable & ~self.flat & ~self.repeated)
+
+    @cached_property
+    def corner(self) -> NDArray[np.float64]:
+        """Return the corner positions of the good faces, (G, 3, 3) float64, object space."""
+        return self.position[self.triangle[self.good]].astype(np.float64)
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Return the lowest and highest corner of the good faces, (2, 3) float64, object space."""
+        used = self.position[self.triangle[self.good].reshape(-1)].astype(np.float64)
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @cached_property
+    def area_vector(self) -> NDArray[np.float64]:
+        """Return the good faces' normals as long as their area, (G, 3) float64, object space."""
+        return 0.5 * face_normal(self.position, self.triangle[self.good])
+
+    @cached_property
+    def area(self) -> NDArray[np.float64]:
+        """Return the areas of the good faces, (G,) float64, object space."""
+        area: NDArray[np.float64] = np.sqrt(np.einsum("gx,gx->g", self.area_vector, self.area_vector))
+        return area
+
+    @cached_property
+    def double_sided(self) -> NDArray[np.bool_]:
+        """Tell which good faces have a double-sided material, (G,) bool."""
+        return np.array([m.double_sided for m in self.materials], bool)[self.material[self.good]]
+
+    @cached_property
+    def welded(self) -> NDArray[np.int64]:
+        """Return for each corner of the good faces the number of its position, (G, 3) int64."""
+        corner = self.triangle[self.good]
+        return number_rows(self.position)[corner]
+
+    @cached_property
+    def single(self) -> NDArray[np.bool_]:
+        """Tell which good faces have no twin of the opposite winding, (G,) bool."""
+        ordered = np.sort(self.welded, axis=1)
+        n = int(ordered.max(initial=0)) + 1
+        # One number for three would overflow: the hash of the last two is enough to find candidates.
+        key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
+        order = np.argsort(key)
+        same = key[order][1:] == key[order][:-1]
+        twin = np.zeros(len(key), bool)
+        twin[order[1:][same]] = True
+        twin[order[:-1][same]] = True
+        return ~twin
+
+    @cached_property
+    def edges(self) -> Edges:
+        """Return the edges of the good faces without twins (row numbers refer to `sheet`)."""
+        return find_edges(self.welded[self.sheet])
+
+    @cached_property
+    def sheet(self) -> NDArray[np.int64]:
+        """Return the rows of `good` that `edges` is made of: no face with a twin of the other winding."""
+        return np.flatnonzero(self.single)
+
+    @cached_property
+    def piece(self) -> NDArray[np.int32]:
+        """Return the piece of each face of `sheet`: faces that hang together by edges."""
+        return number_by_first(self.edges.connected_faces(len(self.sheet)))
+
+    @cached_property
+    def n_pieces(self) -> int:
+        """Count the pieces."""
+        return int(self.piece.max(initial=-1)) + 1
+
+    @cached_property
+    def closed(self) -> NDArray[np.bool_]:
+        """Tell which pieces have two faces at every edge, wound alike, (P,) bool."""
+        edges = self.edges
+        fine = (edges.count == 2) & (edges.balance == 0)
+        closed = np.ones(self.n_pieces, bool)
+        closed[self.piece[edges.face[edges.first[~fine]]]] = False
+        return closed
+
+    @cached_property
+    def volume(self) -> NDArray[np.float64]:
+        """Return the signed volume of each piece, (P,) float64; meaningful where `closed`."""
+        corner = self.corner[self.sheet]
+        corner = corner - corner.mean(axis=(0, 1))
+        six = np.einsum("gx,gx->g", corner[:, 0], 2.0 * self.area_vector[self.sheet])
+        return np.bincount(self.piece, six / 6.0, minlength=self.n_pieces).astype(np.float64)
+
+    def named(self, faces: NDArray[np.integer], most: int = 10) -> tuple[int, ...]:
+        """Return the first few faces' numbers within their primitives."""
+        return tuple(int(k) for k in self.local[faces[:most]])
+
+    def primitive_of(self, faces: NDArray[np.integer]) -> int | None:
+        """Return the source number of the primitive that the first face belongs to."""
+        return int(self.raw.primitives[self.primitive[faces[0]]].index) if len(faces) else None

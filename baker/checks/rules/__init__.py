@@ -1,0 +1,1 @@
+"""Plugins: the checks, one subject a file, one function a code."""

@@ -1,0 +1,169 @@
+"""Checks of single faces and vertices: what the file says that no bake can use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found, Place
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.rule import check
+from baker.topology.triangle_check import usable_vertices
+
+# Height over longest side of a face that counts as a needle.
+NEEDLE = 1e-3
+
+
+def faces_found(
+    subject: Subject, mesh: int, faces: NDArray[np.integer], what: str, *, whole: int | None = None
+) -> Found:
+    """Return a finding about faces of a mesh, by their numbers over all its primitives.
+
+    Parameters
+    ----------
+    what : str
+        The message, with `{n}` for the count and `{some}` for "1 face" or "n faces".
+    whole : int or None
+        What the percentage is of; all faces by default.
+    """
+    facts = subject.meshes[mesh]
+    n = len(faces)
+    position = None
+    first = faces[:1]
+    if n and facts.usable[first].all():
+        position = subject.to_world(mesh, facts.position[facts.triangle[first[0]]].mean(axis=0))
+    elif n and facts.within[first].all():
+        corner = facts.position[facts.triangle[first[0]]]
+        finite = usable_vertices(corner)
+        position = subject.to_world(mesh, corner[finite][0]) if finite.any() else None
+    return Found(
+        what.format(n=n, some="1 face" if n == 1 else f"{n} faces"),
+        subject.place(mesh),
+        n,
+        percent=100.0 * n / max(len(facts.triangle) if whole is None else whole, 1),
+        primitive=facts.primitive_of(faces),
+        faces=facts.named(faces),
+        position=position,
+    )
+
+
+def _each(subject: Subject) -> Iterator[tuple[int, MeshFacts]]:
+    yield from enumerate(subject.meshes)
+
+
+@check(
+    "index-range",
+    group="geometry",
+    severity="error",
+    fix="export the mesh again: its index buffer belongs to other vertices",
+)
+def index_range(subject: Subject) -> Iterator[Found]:
+    """Faces that name a vertex which does not exist.
+
+    The index buffer and the vertices do not belong together. A bake refuses such a file.
+    """
+    for m, facts in _each(subject):
+        bad = np.flatnonzero(~facts.within)
+        if len(bad):
+            yield faces_found(subject, m, bad, "{some} with an index beyond the last vertex")
+
+
+@check(
+    "bad-vertices",
+    group="geometry",
+    severity="error",
+    fix="delete or repair these vertices where the mesh was made; a bake leaves their faces out",
+)
+def bad_vertices(subject: Subject) -> Iterator[Found]:
+    """Faces with a corner that is NaN, infinite or further away than 1e18.
+
+    A bake leaves them out, which opens holes that let light through.
+    """
+    for m, facts in _each(subject):
+        bad = np.flatnonzero(facts.within & ~facts.usable)
+        if len(bad):
+            yield faces_found(subject, m, bad, "{some} with NaN, infinite or huge coordinates")
+
+
+@check(
+    "zero-area",
+    group="geometry",
+    severity="warning",
+    fix="dissolve degenerate faces (`--fix` drops them); a bake leaves them out",
+)
+def zero_area_faces(subject: Subject) -> Iterator[Found]:
+    """Faces without area: a line or a point.
+
+    Nothing can be seen of them and a bake leaves them out, but a collapsed face often stands where a real
+    one was meant to be. The limit is a height of 1e-7 of the longest side, below which the plane of the
+    face is only rounding.
+    """
+    for m, facts in _each(subject):
+        bad = np.flatnonzero(facts.flat)
+        if len(bad):
+            yield faces_found(subject, m, bad, "{some} without area")
+
+
+@check(
+    "needle-faces",
+    group="geometry",
+    severity="info",
+    fix="remesh or retriangulate where these faces are (`--repair` can, for scans)",
+)
+def needle_faces(subject: Subject) -> Iterator[Found]:
+    """Faces less than a thousandth as high as long.
+
+    Their normals are mostly rounding and unwrapping makes slivers of them, which own hardly a texel.
+    """
+    for m, facts in _each(subject):
+        if not len(facts.good):
+            continue
+        corner = facts.corner
+        longest = np.max(
+            [np.linalg.norm(corner[:, (k + 1) % 3] - corner[:, k], axis=1) for k in range(3)], axis=0
+        )
+        bad = facts.good[2.0 * facts.area < NEEDLE * longest**2]
+        if len(bad):
+            yield faces_found(subject, m, bad, "{some} thinner than a thousandth of their length")
+
+
+@check(
+    "duplicate-faces",
+    group="geometry",
+    severity="warning",
+    fix="remove doubles (`--fix` drops them); a bake keeps the first of each",
+)
+def duplicate_faces(subject: Subject) -> Iterator[Found]:
+    """Faces that repeat another one of the same mesh, corner by corner.
+
+    Two surfaces in the same place shadow each other at random. A bake keeps the first of each; engines
+    keep both. A face with the opposite winding is the other's back and no double, unless their material is
+    double-sided anyway.
+    """
+    for m, facts in _each(subject):
+        bad = np.flatnonzero(facts.repeated)
+        if len(bad):
+            yield faces_found(subject, m, bad, "{some} that repeat another face")
+
+
+@check(
+    "no-triangles",
+    group="geometry",
+    severity="warning",
+    fix="delete the object, or export its faces as triangles",
+)
+def no_triangles(subject: Subject) -> Iterator[Found]:
+    """Meshes of which nothing can be baked.
+
+    An error if the whole scene holds no usable triangle: a bake then refuses it.
+    """
+    if not any(len(facts.good) for facts in subject.meshes):
+        yield Found("the scene holds no usable triangle: there is nothing to bake", severity="error")
+        return
+    for m, facts in _each(subject):
+        if not len(facts.good):
+            place: Place = subject.place(m)
+            yield Found("the mesh has no usable triangle", place, len(facts.triangle))

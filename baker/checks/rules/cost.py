@@ -1,0 +1,159 @@
+"""What a bake of the scene will cost: texels, pages, rays, memory, time, and whose they are."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baker.checks.bake_rates import RAY_STAGES, Rates
+from baker.checks.context import Subject
+from baker.checks.finding import Found
+from baker.checks.rule import check
+
+# Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024.
+FILLED = 0.8
+# Largest resident memory of a bake, measured (docs/PERFORMANCE.md): start, each texel, each triangle.
+_BYTES, _PER_TEXEL, _PER_TRIANGLE = 350e6, 380.0, 600.0
+# Rays a texel that are not the user's choice: against burial, towards a light without area, near emitters.
+_BURIED, _POINTS, _NEAR = 4, 16, 4
+_PATCHES, _LEAST_PATCH_RAYS, _MOST_PATCH_RAYS = 32768, 128, 512
+# With a probe only: rays a bake traces in the time of a probe's ray, and a texel's other seconds a thread.
+# Measured on cornell.glb, hall.glb and interior.glb.
+_OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
+PROBE_SECONDS = 1.0
+# Objects whose share is told.
+MOST_SHARES = 20
+
+
+@dataclass(frozen=True)
+class Cost:
+    """An estimate; the rays are an upper bound, for rows that end early."""
+
+    texels: int
+    pages: int
+    rays: dict[str, int]
+    bytes: int
+    triangles: int
+    shares: list[dict[str, Any]]
+
+
+def estimate_cost(subject: Subject) -> Cost:
+    """Estimate what a bake with the subject's settings takes."""
+    settings, world = subject.settings, subject.world
+    area = np.bincount(world.instance, world.area, len(subject.raw.instances))
+    page = settings.resolution**2
+    texels, pages = FILLED * page, 1
+    if settings.density is not None:
+        texels = float(area.sum()) * settings.density**2
+        pages = max(1, int(np.ceil(texels / (FILLED * page))))
+        if pages > settings.max_pages:
+            pages = settings.max_pages
+            texels = FILLED * page * pages
+    elif all(subject.uv(m).valid for m, f in enumerate(subject.meshes) if len(f.good)):
+        laid = sum(float(np.abs(subject.uv(i.mesh).signed_area).sum()) for i in subject.raw.instances)
+        texels = min(laid, FILLED) * page
+    n = round(texels)
+    order = np.argsort(-area, kind="stable")[:MOST_SHARES]
+    total = max(float(area.sum()), 1e-300)
+    shares = [
+        {
+            "object": subject.raw.instances[k].name,
+            "node": subject.raw.instances[k].node,
+            "percent": round(100.0 * float(area[k]) / total, 2),
+            "texels": round(n * float(area[k]) / total),
+        }
+        for k in order
+    ]
+    need = round(_BYTES + _PER_TEXEL * n + _PER_TRIANGLE * len(world.triangle))
+    return Cost(n, pages, _rays(subject, n), need, len(world.triangle), shares)
+
+
+def _rays(subject: Subject, texels: int) -> dict[str, int]:
+    settings = subject.settings
+    hemisphere = settings.hemisphere_samples
+    light = settings.light_samples or hemisphere
+    occlusion = settings.ao_samples or hemisphere
+    rays = {"buried texels": _BURIED * texels}
+    if subject.wants_light:
+        lamps = sum(max(x.intensity) > 0 for x in subject.scene.lights)
+        glows = subject.glows
+        rays["direct light"] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
+        if settings.bounces != 0:
+            each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)
+            rays["form factors"] = min(texels, _PATCHES) * each
+        rays["final gather"] = texels * hemisphere
+    if "ao" in settings.channels and not (subject.wants_light and occlusion == hemisphere):
+        rays["ambient occlusion"] = texels * occlusion
+    return rays
+
+
+def probe(subject: Subject) -> Rates:
+    """Cast rays between surfaces of the scene for up to a second and return how fast that goes."""
+    world = subject.world
+    random = np.random.default_rng(subject.settings.seed)
+    share = np.cumsum(world.area)
+    pick = np.sort(random.random(1 << 16)) * share[-1]
+    chosen = np.minimum(np.searchsorted(share, pick), len(share) - 1)
+    middle = world.position[world.triangle[chosen]].mean(axis=1).astype(np.float64)
+    origin = world.lifted(middle, chosen, world.normal[chosen])
+    way = random.normal(size=origin.shape)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    way += world.normal[chosen]
+    near, far = np.zeros(len(way)), np.full(len(way), 1e30)
+    # Once unmeasured: the kernel is loaded and the tree built.
+    world.first_hits(origin, way, near, far)
+    start, cast = time.perf_counter(), 0
+    while time.perf_counter() - start < PROBE_SECONDS:
+        world.first_hits(origin, way, near, far)
+        cast += len(way)
+    each = (time.perf_counter() - start) / cast / _OF_PROBE
+    texel = _PER_TEXEL_SECONDS / world.threads
+    return Rates(dict.fromkeys(RAY_STAGES, each), texel, 0.0, "a probe of one second")
+
+
+def seconds_of(cost: Cost, rates: Rates) -> float:
+    """Return how long a bake takes; a stage that was never timed counts as the slowest known."""
+    slowest = max(rates.ray.values(), default=0.0)
+    rays = sum(n * rates.ray.get(stage, slowest) for stage, n in cost.rays.items())
+    return rays + cost.texels * rates.texel + cost.triangles * rates.triangle
+
+
+@check(
+    "cost", group="cost", severity="info", fix="lower --resolution, --density or --quality if it is too much"
+)
+def cost_of_bake(subject: Subject) -> Iterator[Found]:
+    """What a bake with these settings will take: texels, pages, rays, memory, and time if it is known.
+
+    Time comes from an earlier bake: the one that `--rates OUT` names, else the latest of this scene in a
+    folder beside it; or, with `--cost` and no bake, from rays cast for one second. Else it is left out. It
+    does not hold the unwrap, whose time hangs on the shapes. `objects` lists the 20 largest with their
+    share of surface, which is their share of texels and nearly of the time.
+    """
+    if not subject.world.area.sum() > 0:
+        return
+    cost = estimate_cost(subject)
+    rates = subject.rates
+    if rates is None and subject.probe:
+        rates = probe(subject)
+    rays = sum(cost.rays.values())
+    pages = "1 page" if cost.pages == 1 else f"{cost.pages} pages"
+    text = (
+        f"about {cost.texels:.3g} texels on {pages}, {rays:.3g} rays, {cost.bytes / 2**30:.2g} GiB of memory"
+    )
+    more: dict[str, Any] = {
+        "texels": cost.texels,
+        "pages": cost.pages,
+        "rays": cost.rays,
+        "bytes": cost.bytes,
+        "objects": cost.shares,
+    }
+    if rates is not None:
+        seconds = seconds_of(cost, rates)
+        shown = f"{seconds / 60:.2g} minutes" if seconds >= 90 else f"{seconds:.2g} s"
+        text += f", {shown} by {rates.basis}"
+        more.update(seconds=round(seconds, 2), basis=rates.basis)
+    yield Found(text, count=1, more=more)

@@ -1,0 +1,134 @@
+"""Faces that lie inside of a solid, where nobody sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found, Place
+from baker.checks.rule import check
+from baker.checks.scene_rays import World
+from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
+
+# A face is looked at in its middle and beside its corners, which are drawn in by this share.
+_DRAWN_IN = 0.02
+# Rays from the inside of a solid that prove a point to be there.
+_PROOF = 2
+# Directions that are added to the normal: no rounding of a modeller's numbers.
+_WAYS = np.array(
+    [
+        [0.53, 0.41, 0.743],
+        [-0.61, 0.37, -0.7],
+        [0.29, -0.83, 0.476],
+        [-0.43, -0.59, -0.684],
+        [0.77, 0.19, -0.609],
+        [-0.31, 0.87, 0.383],
+    ]
+)
+
+
+@check(
+    "enclosed-faces",
+    group="geometry",
+    severity="info",
+    fix="delete the hidden faces to save their texels; a bake fills them from their neighbours",
+)
+def enclosed_faces(subject: Subject) -> Iterator[Found]:
+    """Faces that lie as a whole inside of a closed solid.
+
+    The foot of a crate that is sunk into a floor, the end of a wall inside another wall, faces between two
+    boxes that touch. Nobody sees them and no light gets there. A bake marks their texels invalid and fills
+    them from visible neighbours of the same chart. Whether materials are double-sided does not matter; rooms
+    (with a lamp, a camera or most of the scene inside) are no solids. Faces that a solid surrounds only in
+    part are not counted. Double-sided faces that bound a solid and look into it are counted: turn them over,
+    or their map holds the dark inside.
+    """
+    world = subject.world
+    if not len(world.triangle):
+        return
+    solids = _solids(subject, world)
+    if not solids.inside.any():
+        return
+    inverted = (solids.inside == BEFORE) & world.double_sided
+    holder = _holders(world, solids)
+    # One-sided faces that look into their own solid are told as `inside-out` or `flipped-neighbours`.
+    holder[solids.inside == BEFORE] = -1
+    for number in np.unique(world.instance[(holder >= 0) | inverted]):
+        own = world.instance == number
+        hidden, turned = np.flatnonzero(own & (holder >= 0)), np.flatnonzero(own & inverted)
+        if len(hidden):
+            name, count = np.unique(holder[hidden], return_counts=True)
+            most = int(name[count.argmax()])
+            around = f"'{subject.raw.instances[most].name}'" if most != number else "another part of it"
+            others = "" if len(name) == 1 else f" and {len(name) - 1} more"
+            yield _found(subject, hidden, f"{{some}} inside of {around}{others}: nobody sees them")
+        if len(turned):
+            yield _found(subject, turned, "{some} the wrong way round: their front is inside of a solid")
+
+
+def _found(subject: Subject, rows: NDArray[np.int64], text: str) -> Found:
+    world = subject.world
+    instance = subject.raw.instances[int(world.instance[rows[0]])]
+    facts = subject.meshes[instance.mesh]
+    faces = world.face[rows]
+    area = float(world.area[rows].sum())
+    whole = float(world.area[world.instance == world.instance[rows[0]]].sum())
+    x, y, z = world.place_of(rows[0])
+    return Found(
+        text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
+        Place(instance.name or subject.raw.meshes[instance.mesh].name, instance.node),
+        len(rows),
+        percent=100.0 * area / max(whole, 1e-300),
+        primitive=facts.primitive_of(faces),
+        faces=facts.named(faces),
+        position=(x, y, z),
+        more={"area": round(area, 6)},
+    )
+
+
+def _solids(subject: Subject, world: World) -> Solids:
+    materials = subject.scene.materials
+    surfaces = Surfaces(
+        position=world.position,
+        triangle=world.triangle,
+        instance=world.instance,
+        opaque=np.array([m.alpha_mode == "OPAQUE" for m in materials], bool)[world.material],
+        double_sided=world.double_sided,
+        glows=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
+    )
+    return find_solids(surfaces, lamps_and_cameras(subject.scene))
+
+
+def _holders(world: World, solids: Solids) -> NDArray[np.int64]:
+    """Return (T,) int64: an object with a solid that each face lies in, or -1."""
+    corner = world.position[world.triangle].astype(np.float64)
+    middle = corner.mean(axis=1)
+    rows = np.flatnonzero(world.area > 0)
+    found = np.full(len(corner), -1, np.int64)
+    for k in range(4):
+        point = middle[rows] if k == 0 else corner[rows, k - 1]
+        point = point + _DRAWN_IN * (middle[rows] - point)
+        holder = _held(world, solids, world.lifted(point, rows, world.normal[rows]), world.normal[rows])
+        found[rows] = holder
+        rows = rows[holder >= 0]
+    return found
+
+
+def _held(
+    world: World, solids: Solids, origin: NDArray[np.float64], normal: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return (n,) int64: an object with a solid that each point lies in, or -1."""
+    count, holder = np.zeros(len(origin), np.int64), np.full(len(origin), -1, np.int64)
+    near, far = np.zeros(len(origin), np.float32), np.full(len(origin), np.inf, np.float32)
+    for way in _WAYS:
+        aim = normal + way
+        hit, _ = world.first_hits(origin, aim, near, far)
+        met = hit >= 0
+        front = np.einsum("nx,nx->n", world.normal[hit], aim) < 0
+        inside = met & (solids.inside[hit] == np.where(front, BEFORE, BEHIND))
+        count += inside
+        holder = np.where(inside, world.instance[hit], holder)
+    return np.where(count >= _PROOF, holder, -1)

@@ -1,0 +1,48 @@
+"""What the importer noticed while it read the file and no other check tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found, Place
+from baker.checks.rule import check
+
+# Importer's code: severity, what to do. Codes of the same name as a check are left to that check.
+NOTES = {
+    "broken-attribute": ("warning", "export the attribute again if the level needs it"),
+    "broken-camera": ("info", "export the camera again if the level needs it"),
+    "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
+    "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
+    "integer-colours": ("warning", "export the vertex colours as normalized integers or floats"),
+    "missing-file": ("info", "put the file beside the scene if the level needs it"),
+    "missing-mtl": ("warning", "put the material library beside the scene"),
+    "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
+    "missing-texture": ("warning", "put the image beside the scene, or take the texture off the material"),
+    "morphed": ("info", "bake the shape that is shown most, or leave the object out"),
+    "no-material": ("info", "name a material for these faces"),
+    "not-triangles": ("info", "nothing to do, if points and lines are not to be baked"),
+    "odd-indices": ("warning", "export the mesh again: its index buffer is cut off"),
+    "several-scenes": ("info", "export the scene wanted by itself"),
+    "skinned": ("info", "nothing to do, if the pose of the file is what is to be baked"),
+    "transmission": ("warning", "give the material alphaMode BLEND and an alpha below 1"),
+    "unknown-material": ("warning", "export the material with a base colour"),
+    "up-and-scale-ignored": ("info", "leave --up and --scale away for glTF"),
+}
+
+
+@check("file-note", group="file", severity="info", fix="see the message")
+def file_note(subject: Subject) -> Iterator[Found]:
+    """Parts of the file that a bake passes by or reads in its own way.
+
+    The importer's own code is in `note`: unknown extensions, skins (posed by their joints), morph targets
+    (the base shape is baked), primitives of points and lines, several scenes in one file, missing texture
+    coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
+    needed: normal maps, unused files, tangents, cameras.
+    """
+    for warning in subject.scene.warnings:
+        if warning.code in NOTES:
+            severity, advice = NOTES[warning.code]
+            node = next((i.node for i in subject.raw.instances if i.name == warning.object), None)
+            text = f"{warning.message}; {advice}"
+            yield Found(text, Place(warning.object, node), severity=severity, more={"note": warning.code})

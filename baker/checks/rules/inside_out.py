@@ -1,0 +1,121 @@
+"""Closed meshes whose fronts point inwards although nothing is in there to see them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.rule import check
+from baker.checks.rules.bad_faces import faces_found
+from baker.topology.winding_number import first_inside
+
+# Length of the summed area vectors over the area, above which a mesh cannot be closed all over.
+_ROUNDING = 1e-4
+# Share of a mesh's surface below which parts that are inside out are a blemish.
+MOST_WRONG = 0.05
+# Points of another object that are looked at before it counts as outside.
+_WITNESSES = 8
+
+
+@check(
+    "inside-out",
+    group="geometry",
+    severity="error",
+    fix="flip the normals of this part (`--fix` does), or make the material double-sided",
+    in_bake=True,
+)
+def inside_out(subject: Subject) -> Iterator[Found]:
+    """A closed part whose faces all look inwards, with nothing in it.
+
+    Seen from outside it is black and swallows all light. A room is the same thing on purpose: a part with a
+    light, a camera or other geometry in it, one that glows itself, the hollow of a shell, and double-sided
+    surfaces are left alone. Less than 5 % of an object's surface is a warning only.
+    """
+    for m, facts in enumerate(subject.meshes):
+        wrong = inside_out_parts(subject, m)
+        if wrong:
+            rows = np.concatenate(wrong)
+            share = float(facts.area[rows].sum() / facts.area.sum())
+            parts = "a closed part" if len(wrong) == 1 else f"{len(wrong)} closed parts"
+            looks = "looks" if len(wrong) == 1 else "look"
+            text = f"{parts} of {{some}} {looks} inwards, and nothing is inside"
+            found = faces_found(subject, m, facts.good[rows], text)
+            severity = "warning" if share < MOST_WRONG else None
+            yield replace(found, percent=100.0 * share, severity=severity)
+
+
+def inside_out_parts(subject: Subject, mesh: int) -> list[NDArray[np.int64]]:
+    """Return the parts of a mesh that are inside out, each as rows of the mesh's `good` faces."""
+    facts = subject.meshes[mesh]
+    if not len(facts.good) or not _may_be(facts):
+        return []
+    wrong = []
+    suspect = np.flatnonzero(facts.closed & (facts.volume < 0))
+    glowing = np.array([max(material.emission) > 0 for material in facts.materials], bool)
+    for piece in suspect:
+        rows = facts.sheet[facts.piece == piece]
+        if facts.double_sided[rows].all() or glowing[facts.material[facts.good[rows]]].any():
+            continue
+        if not _inhabited(subject, mesh, rows, int(piece)):
+            wrong.append(rows)
+    return wrong
+
+
+def _may_be(facts: MeshFacts) -> bool:
+    """Tell, without looking at edges, whether a closed part may be inside out."""
+    if facts.double_sided.all():
+        return False
+    if len(facts.good) < 4:
+        return False
+    total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
+    # All parts closed and the sum of their volumes positive: a part inside out would still hide in it, so
+    # only a mesh without any face towards its own middle is let go.
+    outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
+    return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
+
+
+def _inhabited(subject: Subject, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
+    """Tell whether anything is inside a closed part, or the part is the hollow of another one."""
+    facts = subject.meshes[mesh]
+    corner = facts.corner[rows]
+    others = [np.zeros((0, 3))]
+    # Other parts of the same mesh.
+    for other in range(facts.n_pieces):
+        if other != piece:
+            own = facts.sheet[facts.piece == other]
+            others.append(facts.corner[own[:_WITNESSES], 0])
+            if facts.closed[other] and facts.volume[other] > 0:
+                hollow = first_inside(facts.corner[own], corner[:_WITNESSES, 0])
+                if hollow is not None:
+                    return True
+    if first_inside(corner, np.concatenate(others)) is not None:
+        return True
+    for instance in subject.raw.instances:
+        if instance.mesh == mesh:
+            inverse = np.linalg.pinv(instance.world_from_object)
+            points = _things(subject, instance.node)
+            local = points @ inverse[:3, :3].T + inverse[:3, 3]
+            if first_inside(corner, local) is not None:
+                return True
+    return False
+
+
+def _things(subject: Subject, node: int) -> NDArray[np.float64]:
+    """Return points of lights, cameras and all objects but that of `node`, (n, 3) float64, world."""
+    scene = subject.scene
+    points = [np.array(light.position) for light in scene.lights if light.kind != "directional"]
+    points += [np.array(camera.position) for camera in scene.cameras]
+    for instance in subject.raw.instances:
+        facts = subject.meshes[instance.mesh]
+        if instance.node == node or not len(facts.good):
+            continue
+        step = max(1, len(facts.good) // _WITNESSES)
+        matrix = instance.world_from_object
+        points += list(facts.corner[::step, 0][:_WITNESSES] @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.array(points, np.float64).reshape(-1, 3)

@@ -1,0 +1,154 @@
+"""Objects of which nothing is there: alpha 0 everywhere, or below the cutoff everywhere.
+
+alpha = factor x texture x vertex alpha; MASK shows what reaches the cutoff, BLEND what is above 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.rule import check
+from baker.core.scene import Material, Texture
+
+# Alpha of BLEND below which nothing is seen: half a level of an image of eight bits.
+LEAST_SEEN = 0.5 / 255.0
+# Barycentrics of the points of a triangle at which textures are looked up first.
+_LOOKS = np.array(
+    [[1 / 3, 1 / 3, 1 / 3], [2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]]
+)
+
+
+@check(
+    "invisible",
+    group="light",
+    severity="warning",
+    fix="raise its alpha (in MTL write `d 1`; `Tr 1` alone means transparent) or lower the alphaCutoff; "
+    "else leave the object out",
+    in_bake=True,
+)
+def invisible(subject: Subject) -> Iterator[Found]:
+    """An object that its materials make invisible as a whole.
+
+    Alpha is 0 everywhere (BLEND) or below the cutoff everywhere (MASK): factor, texture and vertex colours
+    are looked at. Such an object neither blocks nor reflects nor emits light. Exporters that take `Tr` of
+    MTL files for opacity write such materials, and so does an alpha channel that was never painted. An
+    object of which a part can be seen is left alone.
+    """
+    fades = np.array([material.alpha_mode != "OPAQUE" for material in subject.scene.materials], bool)
+    if not fades.any():
+        return
+    for m, facts in enumerate(subject.meshes):
+        material = facts.material[facts.good]
+        if not len(material) or not fades[material].all():
+            continue
+        used = [int(k) for k in np.unique(material)]
+        if any(_seen(facts, k, subject.scene.materials[k]) for k in used):
+            continue
+        places = sum(instance.mesh == m for instance in subject.raw.instances)
+        if places:
+            yield Found(_sentence([subject.scene.materials[k] for k in used]), subject.place(m), places)
+
+
+def _sentence(materials: list[Material]) -> str:
+    why = [
+        f"'{m.name}' has alpha below its cutoff of {m.alpha_cutoff:g}"
+        if m.alpha_mode == "MASK"
+        else f"'{m.name}' has alpha 0"
+        for m in materials[:3]
+    ]
+    noun = "material" if len(materials) == 1 else "materials"
+    return f"nothing of it is visible, and it takes no part in the light: {noun} {', '.join(why)} everywhere"
+
+
+def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
+    """Tell whether anything of a material's faces on a mesh is there."""
+    least = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_SEEN
+    face = facts.good[facts.material[facts.good] == number]
+    alpha = material.base_colour[3] * _vertex_alpha(facts)[facts.triangle[face]]
+    # As kernels compare: in float32, with the last digit to spare.
+    enough = np.float32(least) * np.float32(1.0 - 1e-6)
+    strong = alpha.max(axis=1) >= enough
+    if not strong.any():
+        return False
+    texture = material.base_colour_texture
+    if texture is None:
+        return True
+    image = texture.image[..., 3].astype(np.float32) / (255.0 if texture.image.dtype == np.uint8 else 1.0)
+    if float(image.max(initial=0.0)) * float(alpha.max()) < enough:
+        return False
+    face, alpha = face[strong], alpha[strong]
+    uv = _image_uv(facts, texture)[facts.triangle[face]]
+    looks = np.einsum("kc,tcx->tkx", _LOOKS, uv)
+    there = alpha @ _LOOKS.T
+    size = np.array(image.shape[::-1])
+    column, row = (np.floor(looks % 1.0 * size).astype(np.int64).clip(0, size - 1)[..., i] for i in (0, 1))
+    if texture.wrap == ("repeat", "repeat") and (image[row, column] * there >= enough).any():
+        return True
+    return _any_within(image * float(alpha.max()) >= enough, uv, texture.wrap)
+
+
+def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
+    """Return (V,) float32: the vertex colours' alpha, 1 without colours."""
+    parts = [
+        np.ones(len(p.position), np.float32)
+        if p.colour is None
+        else np.clip(np.nan_to_num(p.colour[:, 3], nan=1.0), 0.0, 1.0).astype(np.float32)
+        for p in facts.raw.primitives
+    ]
+    return np.concatenate(parts)
+
+
+def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
+    """Return (V, 2) float64: where each vertex looks the texture up; 0 where it has no such set."""
+    parts = [
+        np.nan_to_num(
+            p.texcoord.get(texture.texcoord, np.zeros((len(p.position), 2))), nan=0.0, posinf=0.0, neginf=0.0
+        )
+        for p in facts.raw.primitives
+    ]
+    return np.concatenate(parts).astype(np.float64) @ texture.transform[:, :2].T + texture.transform[:, 2]
+
+
+def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[str, str]) -> bool:
+    """Tell whether any texel of a mask lies in the box of any triangle's uv, a texel for lookup around it.
+
+    Parameters
+    ----------
+    mask : (H, W) bool
+    uv : (T, 3, 2) float64
+    wrap : (str, str)
+    """
+    total = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int64)
+    total[1:, 1:] = mask.cumsum(axis=0).cumsum(axis=1)
+    (left, right), (top, bottom) = (
+        _range(uv[..., axis], mask.shape[1 - axis], wrap[axis]) for axis in (0, 1)
+    )
+    count = total[bottom, right] - total[top, right] - total[bottom, left] + total[top, left]
+    return bool((count > 0).any())
+
+
+def _range(value: NDArray[np.float64], size: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and the last texel (exclusive) that triangles look up along one axis.
+
+    A triangle that goes over the image's border counts as one that sees all of it.
+    """
+    low, high = value.min(axis=1), value.max(axis=1)
+    if wrap == "clamp":
+        low, high = low.clip(0.0, 1.0), high.clip(0.0, 1.0)
+        whole = np.zeros(len(low), bool)
+    else:
+        tile = np.floor(low)
+        whole = high > tile + 1.0
+        odd = (tile % 2 == 1) & (wrap == "mirror")
+        low, high = low - tile, high - tile
+        low, high = np.where(odd, 1.0 - high, low), np.where(odd, 1.0 - low, high)
+        whole |= (wrap == "repeat") & ((low * size < 0.5) | (high * size > size - 0.5))
+    first = np.floor(low * size - 0.5).clip(0, size - 1).astype(np.int64)
+    last = (np.floor(high * size - 0.5) + 2).clip(1, size).astype(np.int64)
+    return np.where(whole, 0, first), np.where(whole, size, last)

@@ -1,0 +1,111 @@
+"""What direct light does at a few hundred points: all black, or too bright for half floats.
+
+E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each where nothing is in the way
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from baker.checks.context import Subject
+from baker.checks.direct_light import cosine_ways, points_inside
+from baker.checks.finding import Found, Place
+from baker.checks.rule import check
+
+# Rays from emissive surfaces that look for anything to light.
+FACING_RAYS = 64
+HALF_MAX = 65504.0
+
+
+@check(
+    "all-black",
+    group="light",
+    severity="warning",
+    fix="look where the lights are and what is between them and the surfaces",
+)
+def all_black(subject: Subject) -> Iterator[Found]:
+    """A scene with light of which nothing arrives at any of 512 points on its surfaces."""
+    levels = subject.levels
+    if levels is not None and not levels.irradiance.any():
+        yield Found(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
+
+
+@check(
+    "clips-half",
+    group="light",
+    severity="warning",
+    fix="lower the lights, move them away from surfaces, or bake with --dtype float",
+)
+def clips_half(subject: Subject) -> Iterator[Found]:
+    """Direct light over 65504 lx, the largest half float, at some of 512 points on the surfaces.
+
+    The map stores that number instead. With `--dtype float` nothing is clipped.
+    """
+    levels = subject.levels
+    if levels is None or subject.settings.dtype == "float":
+        return
+    over = np.flatnonzero(levels.irradiance > HALF_MAX)
+    if len(over):
+        worst = over[levels.irradiance[over].argmax()]
+        share = 100.0 * len(over) / len(levels.irradiance)
+        x, y, z = (float(v) for v in levels.position[worst] + subject.scene.origin)
+        most = levels.irradiance[worst]
+        text = f"about {share:.3g}% of the surface gets more than 65504 lx, up to {most:.3g}"
+        at = subject.raw.instances[subject.world.instance[levels.triangle[worst]]]
+        yield Found(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
+
+
+@check(
+    "light-levels",
+    group="light",
+    severity="info",
+    fix="nothing to do: this is what direct light will look like",
+)
+def light_levels(subject: Subject) -> Iterator[Found]:
+    """Brightest and darkest direct irradiance at 512 points on the surfaces, before any bounce."""
+    levels = subject.levels
+    if levels is not None and levels.irradiance.any():
+        low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
+        dark = 100.0 * float((levels.irradiance == 0).mean())
+        text = f"direct light is {low:.3g} to {high:.3g} lx, median {middle:.3g}; {dark:.2g}% gets none"
+        more = {"darkest": float(low), "median": float(middle), "brightest": float(high)}
+        yield Found(text, count=len(levels.position), percent=dark, more=more)
+
+
+@check(
+    "emitter-unseen",
+    group="light",
+    severity="warning",
+    fix="turn the emitting faces towards the scene, or make their material double-sided",
+)
+def emitter_unseen(subject: Subject) -> Iterator[Found]:
+    """An emissive object that faces away from everything.
+
+    Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
+    their front only.
+    """
+    if not subject.glows or len(subject.raw.instances) < 2:
+        return
+    world = subject.world
+    random = np.random.default_rng(subject.settings.seed)
+    glows = np.unique(subject.emission.triangle)
+    for k in np.unique(world.instance[glows]):
+        own = glows[world.instance[glows] == k]
+        share = np.cumsum(world.area[own])
+        pick = (np.arange(FACING_RAYS) + 0.5) / FACING_RAYS * share[-1]
+        chosen = own[np.minimum(np.searchsorted(share, pick), len(own) - 1)]
+        sides = (1.0, -1.0) if world.double_sided[own].any() else (1.0,)
+        met = False
+        for side in sides:
+            normal = side * world.normal[chosen]
+            origin = world.lifted(points_inside(subject, chosen, random), chosen, normal)
+            way = cosine_ways(normal, 1, random)
+            hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
+            met = met or bool((hit >= 0).any())
+        if not met:
+            instance = subject.raw.instances[k]
+            x, y, z = world.place_of(own[0])
+            place = Place(instance.name, instance.node)
+            yield Found("its emitting faces face away from everything", place, len(own), position=(x, y, z))

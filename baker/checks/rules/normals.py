@@ -1,0 +1,159 @@
+"""Checks of vertex normals and of vertices that repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.rule import check
+from baker.checks.rules.bad_faces import faces_found
+from baker.core.source_mesh import PrimitiveArrays
+from baker.topology.weld import number_rows
+
+# Deviation of a normal's length from 1 that is more than a byte's rounding.
+UNIT_SLACK = 0.02
+
+
+def _parts(facts: MeshFacts) -> Iterator[tuple[int, PrimitiveArrays]]:
+    yield from enumerate(facts.raw.primitives)
+
+
+def _faces_at(facts: MeshFacts, part: int, vertex: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the faces of a primitive with a corner among the chosen of its vertices."""
+    rows = np.flatnonzero((facts.primitive == part) & facts.within)
+    local = facts.triangle[rows] - facts.vertex_start[part]
+    touched: NDArray[np.bool_] = vertex[local].any(axis=1)
+    return rows[touched]
+
+
+def _length(normal: NDArray[np.float32]) -> NDArray[np.float64]:
+    wide = normal.astype(np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        length: NDArray[np.float64] = np.sqrt((wide * wide).sum(axis=1))
+    return length
+
+
+@check(
+    "missing-normals",
+    group="geometry",
+    severity="info",
+    fix="export normals if the surface is meant to look smooth; it is baked with flat faces",
+)
+def missing_normals(subject: Subject) -> Iterator[Found]:
+    """Meshes without vertex normals.
+
+    glTF asks for flat normals then: every face gets an edge of its own in the light.
+    """
+    for m, facts in enumerate(subject.meshes):
+        lacking = [k for k, p in _parts(facts) if p.normal is None and len(p.triangle)]
+        if lacking:
+            faces = np.flatnonzero(np.isin(facts.primitive, lacking))
+            yield faces_found(subject, m, faces, "{some} without vertex normals")
+
+
+@check(
+    "bad-normals",
+    group="geometry",
+    severity="warning",
+    fix="recalculate normals where the mesh was made; a bake makes these anew from the faces",
+)
+def bad_normals(subject: Subject) -> Iterator[Found]:
+    """Vertex normals that are NaN, infinite or of no length."""
+    for m, facts in enumerate(subject.meshes):
+        for k, p in _parts(facts):
+            if p.normal is None:
+                continue
+            length = _length(p.normal)
+            faces = _faces_at(facts, k, ~(np.isfinite(length) & (length > 1e-12)))
+            if len(faces):
+                yield faces_found(subject, m, faces, "{some} with a normal of no length or not finite")
+
+
+@check(
+    "normal-length",
+    group="geometry",
+    severity="warning",
+    fix="normalise the normals on export; a bake does so by itself, engines may not",
+)
+def normal_length(subject: Subject) -> Iterator[Found]:
+    """Vertex normals that are not one unit long, by more than 2 %.
+
+    A shader that trusts them shades the surface too bright or too dark.
+    """
+    for m, facts in enumerate(subject.meshes):
+        for k, p in _parts(facts):
+            if p.normal is None:
+                continue
+            length = _length(p.normal)
+            odd = np.isfinite(length) & (length > 1e-12) & (np.abs(length - 1.0) > UNIT_SLACK)
+            faces = _faces_at(facts, k, odd)
+            if len(faces):
+                worst = length[odd][np.argmax(np.abs(length[odd] - 1.0))]
+                yield faces_found(subject, m, faces, f"{{some}} with a normal of length {worst:.3g}, not 1")
+
+
+@check(
+    "normals-against-faces",
+    group="geometry",
+    severity="warning",
+    fix="recalculate normals, or flip the faces: winding and normals disagree about the front",
+)
+def normals_against_faces(subject: Subject) -> Iterator[Found]:
+    """Faces whose vertex normals all point to their back.
+
+    The winding says which side is the front and gets light, the normals say from where it is counted: between
+    them nothing is left and the face comes out black.
+    """
+    for m, facts in enumerate(subject.meshes):
+        for k, p in _parts(facts):
+            rows = np.flatnonzero(facts.primitive[facts.good] == k)
+            if p.normal is None or not len(rows):
+                continue
+            local = facts.triangle[facts.good[rows]] - facts.vertex_start[k]
+            normal = np.nan_to_num(p.normal[local].astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+            side = np.einsum("fcx,fx->fc", normal, facts.area_vector[rows])
+            against = facts.good[rows[(side < 0).all(axis=1)]]
+            if len(against):
+                yield faces_found(subject, m, against, "{some} whose normals all point to their back")
+
+
+@check(
+    "duplicate-vertices",
+    group="geometry",
+    severity="info",
+    fix="merge equal vertices on export (`--fix` welds them): smaller files, the same picture",
+)
+def duplicate_vertices(subject: Subject) -> Iterator[Found]:
+    """Vertices that repeat another one of the same primitive in every attribute."""
+    for m, facts in enumerate(subject.meshes):
+        double, total = 0, 0
+        first: int | None = None
+        at: tuple[float, float, float] | None = None
+        for _, p in _parts(facts):
+            if not len(p.triangle):
+                continue
+            further = None if p.further is None else p.further.astype(np.float32)
+            columns = [p.position, p.normal, *p.texcoord.values(), p.colour, further]
+            number = number_rows(np.concatenate([c for c in columns if c is not None], axis=1))
+            repeats = len(number) - (int(number.max()) + 1)
+            double, total = double + repeats, total + len(number)
+            if repeats and first is None:
+                first = p.index
+                which = np.flatnonzero(np.bincount(number)[number] > 1)[0]
+                if np.isfinite(p.position[which]).all():
+                    at = subject.to_world(m, p.position[which])
+        if double:
+            some = "1 vertex repeats" if double == 1 else f"{double} of {total} vertices repeat"
+            yield Found(
+                f"{some} another one in every attribute",
+                subject.place(m),
+                double,
+                percent=100.0 * double / total,
+                primitive=first,
+                position=at,
+            )

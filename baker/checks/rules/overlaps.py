@@ -1,0 +1,209 @@
+"""Checks of surfaces in each other's way: within a mesh by rays along edges, between objects by planes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import MOST_FACES, Found, Place
+from baker.checks.mesh_facts import MeshFacts
+from baker.checks.rule import check
+from baker.checks.rules.bad_faces import faces_found
+from baker.checks.scene_rays import cast
+from baker.core.parallel import thread_count
+
+# Shares of an edge at its ends that are not looked at: neighbours touch it there.
+_ENDS = 1e-4
+# How deep an edge must pierce, as share of the mesh's diagonal, to be more than a touch.
+_DEPTH = 1e-5
+# Rounds in which a ray that met a neighbour goes on behind it.
+_ROUNDS = 4
+# Distance of planes that flicker, as share of the scene's diagonal, and its limits in metres.
+COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3
+# Steps of a normal's components that tell planes apart.
+_TURN = 256.0
+
+
+@check(
+    "self-intersection",
+    group="geometry",
+    severity="info",
+    fix="join the parts with a boolean union, if light bleeds where they meet",
+)
+def self_intersection(subject: Subject) -> Iterator[Found]:
+    """Faces of one mesh that pierce each other.
+
+    Common and mostly harmless where parts are stuck together; the texels inside the other part are black
+    and are filled from their neighbours. Found by rays along all edges; parts that only touch are not
+    counted.
+    """
+    for m, facts in enumerate(subject.meshes):
+        pierced, n = _crossings(facts, thread_count(subject.settings.threads))
+        if n:
+            both = facts.good[pierced]
+            some = "1 edge pierces" if n == 1 else f"{n} edges pierce"
+            found = faces_found(subject, m, np.unique(both), f"{some} another face of the mesh")
+            pairs = tuple((int(a), int(b)) for a, b in facts.local[both[:MOST_FACES]])
+            yield replace(found, count=n, pairs=pairs)
+
+
+def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
+    """Return (n, 2) pairs of rows of `good`, a face with an edge that pierces another face and that one, and
+    the number of such edges.
+    """
+    from baker.trace.embree import RayScene
+
+    edges = facts.edges
+    if len(facts.sheet) < 2:
+        return np.zeros((0, 2), np.int64), 0
+    face, corner = facts.sheet[edges.face[edges.first]], edges.corner[edges.first]
+    begin = facts.corner[face, corner]
+    end = facts.corner[face, (corner + 1) % 3]
+    low, high = edges.low, edges.high
+    near = np.full(len(face), _ENDS)
+    low_corner, high_corner = facts.bounds
+    depth = _DEPTH * float(np.linalg.norm(high_corner - low_corner))
+    tree = RayScene(facts.position, facts.triangle[facts.good].astype(np.uint32), threads=threads)
+    out = [np.zeros((0, 2), np.int64)]
+    rows, piercing = np.arange(len(face)), np.zeros(len(face), bool)
+    for _ in range(_ROUNDS):
+        if not len(rows):
+            break
+        way = end[rows] - begin[rows]
+        far = np.full(len(rows), 1.0 - _ENDS)
+        hit, distance = cast(tree.tracer, threads, begin[rows], way, near[rows], far)
+        met = hit >= 0
+        rows, other, distance = rows[met], hit[met].astype(np.int64), distance[met]
+        ends = facts.welded[other]
+        neighbour = ((ends == low[rows, None]) | (ends == high[rows, None])).any(axis=1)
+        through = ~neighbour & _pierces(facts, begin[rows], end[rows], other, depth)
+        piercing[rows[through]] = True
+        out.append(np.stack([face[rows[through]], other[through]], axis=1))
+        near[rows] = distance + _ENDS
+        rows = rows[near[rows] < 1.0 - _ENDS]
+    tree.close()
+    pairs = np.sort(np.concatenate(out), axis=1)
+    return np.unique(pairs, axis=0), int(piercing.sum())
+
+
+def _pierces(
+    facts: MeshFacts,
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+    other: NDArray[np.int64],
+    depth: float,
+) -> NDArray[np.bool_]:
+    """Tell whether edges have their ends on both sides of a face's plane, by more than `depth`."""
+    normal = facts.area_vector[other] / np.maximum(facts.area[other], 1e-300)[:, None]
+    at = facts.corner[other, 0]
+    one = np.einsum("nx,nx->n", begin - at, normal)
+    two = np.einsum("nx,nx->n", end - at, normal)
+    return np.asarray((one * two < 0) & (np.minimum(np.abs(one), np.abs(two)) > depth))
+
+
+@check(
+    "coplanar-overlap",
+    group="geometry",
+    severity="warning",
+    fix="move one surface by a millimetre, or cut the hidden part away",
+)
+def coplanar_overlap(subject: Subject) -> Iterator[Found]:
+    """Surfaces of different objects in the same place that look the same way (z-fighting).
+
+    Engines show now one, now the other, and each shadows the other at random. Planes count as the same
+    within a millionth of the scene's diagonal. A box that stands on a floor is not meant: the two look at
+    each other.
+    """
+    partner = _partners(subject)
+    world = subject.world
+    mine = np.flatnonzero(partner >= 0)
+    if not len(mine):
+        return
+    n = len(subject.raw.instances)
+    one, two = world.instance[mine], world.instance[partner[mine]]
+    key = np.minimum(one, two) * n + np.maximum(one, two)
+    for k in np.unique(key):
+        a, b = (subject.raw.instances[int(v)] for v in divmod(int(k), n))
+        own = mine[(key == k) & (one == int(k) // n)]
+        rest = mine[(key == k) & (one != int(k) // n)]
+        chosen = own if len(own) else rest
+        faces = world.face[chosen]
+        shown = a if len(own) else b
+        facts = subject.meshes[shown.mesh]
+        x, y, z = world.place_of(chosen[0])
+        some = "1 face lies" if len(chosen) == 1 else f"{len(chosen)} faces lie"
+        hidden = b if len(own) else a
+        yield Found(
+            f"{some} in the same plane as '{hidden.name}' and overlap it",
+            Place(shown.name, shown.node),
+            len(chosen),
+            percent=100.0 * len(chosen) / max(len(facts.good), 1),
+            primitive=facts.primitive_of(faces),
+            faces=facts.named(faces),
+            position=(x, y, z),
+            more={"other": hidden.name, "other_node": hidden.node},
+        )
+
+
+def _partners(subject: Subject) -> NDArray[np.int64]:
+    """Return for each world triangle one of another instance that it overlaps in its plane, or -1."""
+    world = subject.world
+    partner = np.full(len(world.triangle), -1, np.int64)
+    if len(subject.raw.instances) < 2 or not len(world.triangle):
+        return partner
+    tolerance = min(max(COPLANAR * subject.diagonal, LEAST), MOST)
+    corner = world.position[world.triangle[:, 0]].astype(np.float64)
+    away = np.einsum("tx,tx->t", world.normal, corner)
+    turn = np.round(world.normal * _TURN).astype(np.int64) + int(_TURN)
+    direction = (turn[:, 0] * 1024 + turn[:, 1]) * 1024 + turn[:, 2]
+    # Two grids half a step apart, at numbers that no modeller chooses: equal planes share a cell in one.
+    for shift in (0.3137, 0.8137):
+        step = np.floor(away / (2.0 * tolerance) + shift).astype(np.int64)
+        _match(subject, direction, step, tolerance, partner)
+    return partner
+
+
+def _match(
+    subject: Subject,
+    direction: NDArray[np.int64],
+    step: NDArray[np.int64],
+    tolerance: float,
+    partner: NDArray[np.int64],
+) -> None:
+    """Find overlaps among triangles of equal direction and step; fills `partner`."""
+    from baker.checks.kernels.coplanar import coplanar_partners
+
+    world = subject.world
+    step = step - step.min()
+    key = direction * (int(step.max()) + 1) + step
+    order = np.argsort(key, kind="stable")
+    new = np.ones(len(order), bool)
+    new[1:] = key[order][1:] != key[order][:-1]
+    group = np.cumsum(new) - 1
+    begin = np.flatnonzero(new)
+    owner = world.instance[order]
+    shared = np.minimum.reduceat(owner, begin) != np.maximum.reduceat(owner, begin)
+    keep = shared[group] & (world.area[order] > 0)
+    order, group = order[keep], group[keep]
+    if not len(order):
+        return
+    # The two axes that the plane is least tilted against.
+    drop = np.abs(world.normal[order]).argmax(axis=1)
+    axes = np.array([[1, 2], [0, 2], [0, 1]])[drop]
+    corner = world.position[world.triangle[order]].astype(np.float64)
+    flat = np.take_along_axis(corner, np.repeat(axes[:, None, :], 3, axis=1), axis=2)
+    low, high = flat.min(axis=1), flat.max(axis=1)
+    by_x = np.lexsort((low[:, 0], group))
+    order, group = order[by_x], group[by_x]
+    first = np.append(np.flatnonzero(np.append(True, group[1:] != group[:-1])), len(group))
+    found = np.full(len(order), -1, np.int64)
+    coplanar_partners(
+        np.ascontiguousarray(flat[by_x]), low[by_x], high[by_x], first, world.instance[order],
+        10.0 * tolerance, found,
+    )  # fmt: skip
+    met = found >= 0
+    partner[order[met]] = order[found[met]]

@@ -1,0 +1,237 @@
+"""Checks of a lightmap uv at the asked resolution: chart size, padding, density, stretch, waste."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.finding import Found
+from baker.checks.rule import check
+from baker.checks.rules.bad_faces import faces_found
+from baker.checks.rules.uv_layout import laid_out
+from baker.checks.uv_facts import UvFacts
+
+# Texels below which a chart has no room for a shadow.
+SMALLEST_CHART = 4.0
+# Factor in texels per metre from the object's middle that counts as an outlier: two mip levels.
+DENSITY_FACTOR = 4.0
+# Ratio of a face's two stretches above which its texels are strips, and the share of surface that may be so.
+STRETCH, MOST_STRETCHED = 4.0, 0.05
+# Share of its own rectangle that a layout should fill.
+LEAST_FILLED = 0.4
+# Share of surface whose TEXCOORD_0 has no area in a palette lookup, and the most colours it looks up.
+PALETTE_SHARE = 0.9
+
+
+@check(
+    "uv.tiny_chart",
+    group="uv",
+    severity="warning",
+    fix="give these charts more room, join them with neighbours, or raise --resolution",
+)
+def tiny_chart(subject: Subject) -> Iterator[Found]:
+    """Charts that cover less than four texels.
+
+    Their light is one value, mixed with the neighbours' by every filter.
+    """
+    resolution = subject.settings.resolution
+    for m, uv in laid_out(subject):
+        texels = uv.per_chart(np.abs(uv.signed_area)) * resolution**2
+        small = np.flatnonzero((texels < SMALLEST_CHART) & (texels > 0))
+        if len(small):
+            faces = uv.faces[np.isin(uv.chart, small)]
+            some = "1 chart covers" if len(small) == 1 else f"{len(small)} of {uv.n_charts} charts cover"
+            found = faces_found(subject, m, faces, f"{some} less than four texels at {resolution}")
+            yield replace(found, count=len(small), percent=100.0 * len(small) / uv.n_charts)
+
+
+@check(
+    "uv.padding",
+    group="uv",
+    severity="warning",
+    fix="leave at least two texels between charts at the resolution used, or unwrap anew",
+)
+def padding(subject: Subject) -> Iterator[Found]:
+    """Charts so close that bilinear lookup mixes them.
+
+    A lookup at a chart's border reads the next texel, too. If that belongs to another chart, its light
+    bleeds in as a bright or dark line.
+    """
+    for m, uv in laid_out(subject):
+        close, covered = _close(uv, subject.settings.resolution)
+        if close:
+            percent = 100.0 * close / covered
+            yield Found(
+                f"{percent:.3g}% of its texels touch another chart's: bilinear lookup mixes them",
+                subject.place(m),
+                close,
+                percent=percent,
+            )
+
+
+@check(
+    "uv.padding_mip",
+    group="uv",
+    severity="info",
+    fix="use 2^level texels and more between charts, or sample the lightmap without mipmaps",
+)
+def padding_mip(subject: Subject) -> Iterator[Found]:
+    """Charts that mix at the asked mip level (`--mip`, default 2).
+
+    At level n a texel stands for 2^n of the page. Only lightmaps that are sampled with mipmaps mind.
+    """
+    coarse = subject.settings.resolution >> subject.mip
+    for m, uv in laid_out(subject):
+        if coarse < 1 or uv.n_charts < 2 or _close(uv, subject.settings.resolution)[0]:
+            continue
+        close, covered = _close(uv, coarse)
+        if close:
+            percent = 100.0 * close / covered
+            yield Found(
+                f"{percent:.3g}% of its texels at mip level {subject.mip} touch another chart's",
+                subject.place(m),
+                close,
+                percent=percent,
+            )
+
+
+def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
+    """Return the texels next to another chart's, and all that are covered."""
+    from baker.uv.kernels.uv_overlap import count_close, mark_charts
+
+    owner = np.zeros((resolution, resolution), np.int32)
+    mark_charts(np.ascontiguousarray(uv.uv) * resolution, uv.chart, owner)
+    return int(count_close(owner, 1)), max(int(np.count_nonzero(owner)), 1)
+
+
+@check(
+    "uv.density",
+    group="uv",
+    severity="warning",
+    fix="scale these charts to the size of the others",
+)
+def density(subject: Subject) -> Iterator[Found]:
+    """Charts with over four times more or fewer texels per metre than the middle of the object's surface.
+
+    Where they meet others a shadow changes from sharp to blurred.
+    """
+    for m, uv in laid_out(subject):
+        flat, real = uv.per_chart(np.abs(uv.signed_area)), uv.per_chart(uv.area)
+        usable = (flat > 0) & (real > 0)
+        if usable.sum() < 2:
+            continue
+        with np.errstate(divide="ignore", invalid="ignore"):
+            per_metre = np.sqrt(flat / real)
+        middle = _weighted_median(per_metre[usable], real[usable])
+        ratio = np.where(usable, per_metre / middle, 1.0)
+        odd = np.flatnonzero((ratio > DENSITY_FACTOR) | (ratio < 1.0 / DENSITY_FACTOR))
+        if len(odd):
+            worst = ratio[odd][np.argmax(np.abs(np.log(ratio[odd])))]
+            faces = uv.faces[np.isin(uv.chart, odd)]
+            some = "1 chart has" if len(odd) == 1 else f"{len(odd)} of {uv.n_charts} charts have"
+            found = faces_found(
+                subject, m, faces, f"{some} up to {worst:.3g} times the usual texels per metre"
+            )
+            yield replace(found, count=len(odd), percent=100.0 * float(real[odd].sum() / real.sum()))
+
+
+def _weighted_median(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    order = np.argsort(value)
+    total = np.cumsum(weight[order])
+    return float(value[order[np.searchsorted(total, 0.5 * total[-1])]])
+
+
+@check(
+    "uv.stretch",
+    group="uv",
+    severity="warning",
+    fix="cut these charts more often, or unwrap anew",
+)
+def stretch(subject: Subject) -> Iterator[Found]:
+    """A lightmap uv that stretches over 5 % of the surface more than four times more along one axis.
+
+    Texels are strips there: shadows look sharp across and blurred along them. The figure is the ratio of the
+    singular values of the map from surface to uv.
+    """
+    for m, uv in laid_out(subject):
+        ratio = _anisotropy(uv)
+        bad = ratio > STRETCH
+        share = float(uv.area[bad].sum()) / max(float(uv.area.sum()), 1e-300)
+        if share > MOST_STRETCHED:
+            order = np.argsort(-uv.area[bad], kind="stable")
+            text = f"{{some}}, {100 * share:.3g}% of the surface, stretched over {STRETCH:g} times one way"
+            yield replace(faces_found(subject, m, uv.faces[bad][order], text), percent=100.0 * share)
+
+
+def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
+    """Return the ratio of the stretches of each face, (F,) float64; 1 where there is none to speak of."""
+    corner = uv.facts.corner[uv.rows]
+    e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    length = np.maximum(np.sqrt(np.einsum("fx,fx->f", e1, e1)), 1e-300)
+    # The face in its own plane: e1 along x.
+    x2 = np.einsum("fx,fx->f", e1, e2) / length
+    y2 = 2.0 * uv.area / length
+    d1, d2 = uv.uv[:, 1] - uv.uv[:, 0], uv.uv[:, 2] - uv.uv[:, 0]
+    along = d1 / length[:, None]
+    across = (d2 - along * x2[:, None]) / np.maximum(y2, 1e-300)[:, None]
+    a, c = np.einsum("fx,fx->f", along, along), np.einsum("fx,fx->f", across, across)
+    b = np.einsum("fx,fx->f", along, across)
+    middle, half = 0.5 * (a + c), np.sqrt(0.25 * (a - c) ** 2 + b * b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.sqrt((middle + half) / np.maximum(middle - half, 0.0))
+    return np.asarray(np.where(uv.signed_area == 0, 1.0, np.nan_to_num(ratio, nan=1.0, posinf=1e9)))
+
+
+@check(
+    "uv.utilisation",
+    group="uv",
+    severity="info",
+    fix="pack the charts closer, or unwrap anew",
+)
+def utilisation(subject: Subject) -> Iterator[Found]:
+    """A lightmap uv that fills less than 40 % of its own rectangle.
+
+    The rest of the rectangle is memory without light in it.
+    """
+    for m, uv in laid_out(subject):
+        low, high = uv.uv.min(axis=(0, 1)), uv.uv.max(axis=(0, 1))
+        rectangle = float(np.prod(high - low))
+        filled = float(np.abs(uv.signed_area).sum())
+        if rectangle > 0 and filled < LEAST_FILLED * rectangle:
+            percent = 100.0 * filled / rectangle
+            yield Found(
+                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", subject.place(m), percent=percent
+            )
+
+
+@check(
+    "uv.palette",
+    group="uv",
+    severity="info",
+    fix="nothing to do for a bake; never use TEXCOORD_0 as lightmap uv here",
+)
+def palette(subject: Subject) -> Iterator[Found]:
+    """Objects whose TEXCOORD_0 only looks colours up in a palette.
+
+    Nearly all faces lie in single points of the texture, so the set cannot serve as a lightmap uv, as some
+    engines try where TEXCOORD_1 is missing.
+    """
+    for m, facts in enumerate(subject.meshes):
+        uv = UvFacts(facts, 0)
+        if not len(uv.rows) or not uv.finite.all():
+            continue
+        # Less than a texel of a texture of 1024, counted as if the object filled the texture.
+        point = np.abs(uv.signed_area) * 1024.0**2 < 1.0
+        share = float(uv.area[point].sum()) / max(float(uv.area.sum()), 1e-300)
+        if share <= PALETTE_SHARE:
+            continue
+        # To the nearest 1/256; one number for both, which sorts ten times faster than rows.
+        step = np.clip(np.round(uv.uv[point].reshape(-1, 2) * 256.0), -(2.0**20), 2.0**20).astype(np.int64)
+        colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
+        if len(uv.rows) >= 2 * colours:
+            text = f"its TEXCOORD_0 looks up {colours} colours for {100 * share:.3g}% of the surface"
+            yield Found(text, subject.place(m), int(point.sum()), percent=100.0 * share)

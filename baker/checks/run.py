@@ -1,0 +1,123 @@
+"""Runs every check on a scene and says whether it passed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from baker.checks.bake_rates import rates_beside, rates_of
+from baker.checks.context import Subject
+from baker.checks.finding import SEVERITIES, Finding, Found, Place
+from baker.checks.ignore import Ignore, parse_ignore
+from baker.checks.rule import CHECKS, all_checks, run_check
+from baker.checks.settings import CheckSettings, with_extras
+from baker.core.errors import IndexRangeError
+from baker.core.progress import Progress, silent
+from baker.core.progress import report as tell_progress
+from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
+from baker.io.load import load_for_bake
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """All that was found about one scene.
+
+    Attributes
+    ----------
+    path : Path
+    findings : tuple of Finding
+        Worst first.
+    ignored : tuple of Finding
+    fail_on : str
+    seconds : float
+    """
+
+    path: Path
+    findings: tuple[Finding, ...]
+    ignored: tuple[Finding, ...]
+    fail_on: str
+    seconds: float = 0.0
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether nothing reaches the limit."""
+        limit = SEVERITIES.index(self.fail_on)
+        return all(finding.rank < limit for finding in self.findings)
+
+
+def check_scene(
+    path: Path | str,
+    settings: CheckSettings,
+    bake_settings: BakeSettings,
+    progress: Progress = silent,
+) -> CheckReport:
+    """Read a scene leniently and run every check on it.
+
+    Parameters
+    ----------
+    path : Path or str
+    settings : CheckSettings
+    bake_settings : BakeSettings
+        What the scene is to be baked with: resolution, padding, uv, sky ...
+    progress : Progress
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read at all.
+    SettingsError
+        For an unknown code among `ignore`, `rates` without a bake, or wrong values in the scene's extras.
+    """
+    start = time.perf_counter()
+    path = Path(path)
+    parse_ignore(settings.ignore)
+    timings: dict[str, float] = {}
+    try:
+        scene = load_for_bake(path, bake_settings, lenient=True)
+    except IndexRangeError as error:
+        found = [_index_range(error)]
+    else:
+        timings["load"] = time.perf_counter() - start
+        settings = with_extras(settings, scene)
+        found = _run(path, scene, settings, bake_settings, progress, timings)
+    found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
+    ignore = parse_ignore(settings.ignore)
+    counted = tuple(finding for finding in found if not _ignored(ignore, finding))
+    ignored = tuple(finding for finding in found if _ignored(ignore, finding))
+    limit = settings.fail_on or "error"
+    return CheckReport(path, counted, ignored, limit, time.perf_counter() - start, timings)
+
+
+def _run(
+    path: Path,
+    scene: Scene,
+    settings: CheckSettings,
+    bake_settings: BakeSettings,
+    progress: Progress,
+    timings: dict[str, float],
+) -> list[Finding]:
+    rates = rates_beside(path) if settings.rates is None else rates_of(Path(settings.rates))
+    subject = Subject(scene, bake_settings, mip=settings.mip, rates=rates, probe=settings.cost)
+    found: list[Finding] = []
+    entries = all_checks()
+    for k, entry in enumerate(entries):
+        tell_progress(progress, "checks", k / len(entries))
+        begin = time.perf_counter()
+        found += run_check(entry, subject)
+        timings[entry.code] = time.perf_counter() - begin
+    return found
+
+
+def _index_range(error: IndexRangeError) -> Finding:
+    # Some formats cannot be taken apart any further once an index is wrong.
+    entry = CHECKS.get("index-range")
+    assert entry is not None
+    found = Found(error.message, Place(error.object or ""))
+    return Finding(entry.code, entry.severity, error.message, entry.fix, found)
+
+
+def _ignored(ignore: list[Ignore], finding: Finding) -> bool:
+    return any(rule.matches(finding.code, finding.object) for rule in ignore)

@@ -1,0 +1,131 @@
+"""All good triangles in the world, and rays among them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from baker.checks.context import Subject
+    from baker.trace.embree import RayScene, Tracer
+
+# Rays that one call of the kernel takes; also what a thread works on at a time.
+_TILE = 1 << 16
+
+
+class World:
+    """Every instance's good faces, in the order of instances.
+
+    Attributes
+    ----------
+    position : (V, 3) float32, metres, world, relative to `origin`
+    origin : (3,) float64, metres: `Scene.origin`
+    triangle : (T, 3) int64
+        Wound as the front is seen: nodes that mirror turn the winding over.
+    instance : (T,) int64, index into the raw scene's instances
+    face : (T,) int64, face number in `MeshFacts`
+    normal : (T, 3) float64, unit; area : (T,) float64, m2
+    material : (T,) int32; double_sided : (T,) bool
+    """
+
+    def __init__(self, subject: Subject, threads: int) -> None:
+        self.threads = threads
+        self.origin = subject.scene.origin
+        position, triangle, instance, face, material = [], [], [], [], []
+        start = 0
+        for k, place in enumerate(subject.raw.instances):
+            facts = subject.meshes[place.mesh]
+            matrix = place.world_from_object
+            with np.errstate(over="ignore", invalid="ignore"):
+                world = facts.position.astype(np.float64) @ matrix[:3, :3].T + (matrix[:3, 3] - self.origin)
+            corner = facts.triangle[facts.good]
+            if np.linalg.det(matrix[:3, :3]) < 0:
+                corner = corner[:, ::-1]
+            position.append(world.astype(np.float32))
+            triangle.append(corner + start)
+            instance.append(np.full(len(corner), k, np.int64))
+            face.append(facts.good)
+            material.append(facts.material[facts.good])
+            start += len(world)
+        none = np.zeros(0, np.int64)
+        self.position = np.concatenate(position or [np.zeros((0, 3), np.float32)])
+        self.triangle: NDArray[np.int64] = np.concatenate(triangle or [np.zeros((0, 3), np.int64)])
+        self.instance: NDArray[np.int64] = np.concatenate(instance or [none])
+        self.face: NDArray[np.int64] = np.concatenate(face or [none])
+        self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
+        sided = np.array([m.double_sided for m in subject.scene.materials], bool)
+        self.double_sided: NDArray[np.bool_] = sided[self.material]
+        # Instances squashed flat have faces without area.
+        a, b, c = (self.position[self.triangle[:, k]].astype(np.float64) for k in range(3))
+        cross = np.cross(b - a, c - a)
+        length = np.sqrt(np.einsum("tx,tx->t", cross, cross))
+        self.area: NDArray[np.float64] = 0.5 * length
+        self.normal: NDArray[np.float64] = cross / np.maximum(length, 1e-300)[:, None]
+
+    @cached_property
+    def size(self) -> NDArray[np.float64]:
+        """Return the largest edge component of each triangle, (T,) float64, metres."""
+        corner = self.position[self.triangle].astype(np.float64)
+        return np.asarray(np.abs(corner[:, 1:] - corner[:, :1]).max(axis=(1, 2), initial=0.0))
+
+    def lifted(
+        self, point: NDArray[np.float64], triangle: NDArray[np.int64], normal: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return ray origins just off points (n, 3) of triangles (n,), along normals (n, 3)."""
+        # Here: it brings the compiler.
+        from baker.kernels.surface import OFFSET, ROUNDING
+
+        far, size = np.abs(point).max(axis=1, initial=0.0), self.size[triangle]
+        step = np.maximum(ROUNDING * np.maximum(far, size), OFFSET * np.minimum(far, size))
+        return np.asarray(point + step[:, None] * normal)
+
+    def place_of(self, triangle: int) -> tuple[float, float, float]:
+        """Return the middle of a triangle, metres, world."""
+        middle = self.position[self.triangle[triangle]].mean(axis=0) + self.origin
+        x, y, z = (float(v) for v in middle)
+        return x, y, z
+
+    @cached_property
+    def rays(self) -> RayScene:
+        """Return the ray tree, built once."""
+        from baker.trace.embree import RayScene
+
+        return RayScene(self.position, self.triangle.astype(np.uint32), threads=self.threads)
+
+    def first_hits(
+        self,
+        origin: NDArray[np.floating],
+        way: NDArray[np.floating],
+        near: NDArray[np.floating],
+        far: NDArray[np.floating],
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Return the triangle (-1 for none) and distance that (n, 3) rays hit between `near` and `far`."""
+        return cast(self.rays.tracer, self.threads, origin, way, near, far)
+
+
+def cast(
+    tracer: Tracer,
+    threads: int,
+    origin: NDArray[np.floating],
+    way: NDArray[np.floating],
+    near: NDArray[np.floating],
+    far: NDArray[np.floating],
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the triangle (-1 for none) and distance of the first hit of (n, 3) rays."""
+    from baker.core.parallel import run_tiles
+    from baker.core.progress import silent
+    from baker.kernels.cast import first_hits
+    from baker.trace.packets import new_caster
+
+    n = len(origin)
+    triangle, distance = np.full(n, -1, np.int32), np.zeros(n, np.float32)
+    a, b, c, d = (np.ascontiguousarray(value, np.float32) for value in (origin, way, near, far))
+
+    def work(i: int, j: int) -> None:
+        first_hits(new_caster(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
+
+    run_tiles(n, _TILE, work, threads=threads, stage="rays", progress=silent)
+    return triangle, distance

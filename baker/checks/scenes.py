@@ -1,0 +1,76 @@
+"""Which scene files are meant, and their checks one after the other."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from baker.checks.ignore import parse_ignore
+from baker.checks.run import CheckReport, check_scene
+from baker.checks.settings import CheckSettings
+from baker.core.errors import InputError
+from baker.core.progress import Progress, silent
+from baker.core.settings import BakeSettings
+from baker.io.load import importers
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """A scene of several that could not be read."""
+
+    path: Path
+    error: InputError
+
+
+def find_scenes(paths: Sequence[Path]) -> list[Path]:
+    """Return the scene files that paths, folders (all scenes below) and patterns (`*`) stand for, each once.
+
+    Raises
+    ------
+    InputError
+        For a folder or a pattern without any scene file.
+    """
+    known = set(importers.names())
+    found: dict[Path, None] = {}
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.rglob("*") if p.suffix.lower() in known and p.is_file())
+            if not inside:
+                raise InputError(f"there is no scene file ({', '.join(sorted(known))}) below", file=str(path))
+            found.update(dict.fromkeys(inside))
+        elif not path.exists() and glob.has_magic(str(path)):
+            # Shells that do not expand patterns leave it to us.
+            root = Path(path.anchor)
+            matches = sorted(root.glob(str(path.relative_to(root))))
+            if not matches:
+                raise InputError("no file has a name like this", file=str(path))
+            found.update(dict.fromkeys(matches))
+        else:
+            found[path] = None
+    return list(found)
+
+
+def check_scenes(
+    paths: Sequence[Path], settings: CheckSettings, bake_settings: BakeSettings, progress: Progress = silent
+) -> tuple[list[CheckReport], list[Unreadable]]:
+    """Check scenes; of several, one that cannot be read does not stop the others.
+
+    Raises
+    ------
+    InputError
+        If the only scene cannot be read.
+    SettingsError
+        For an unknown code among `ignore`.
+    """
+    parse_ignore(settings.ignore)
+    reports, unreadable = [], []
+    for path in paths:
+        try:
+            reports.append(check_scene(path, settings, bake_settings, progress))
+        except InputError as error:
+            if len(paths) == 1:
+                raise
+            unreadable.append(Unreadable(path, error))
+    return reports, unreadable

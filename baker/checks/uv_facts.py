@@ -1,0 +1,84 @@
+"""What checks need to know of a mesh's lightmap uv: its triangles, areas, charts."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.mesh_facts import MeshFacts
+from baker.topology.weld import connected_vertices, number_rows
+
+LIGHTMAP_SET = 1
+# A lightmap uv may lie this far outside 0..1: exporters round.
+RANGE_SLACK = 1e-4
+
+
+class UvFacts:
+    """TEXCOORD_1 of the good faces of a mesh.
+
+    Attributes
+    ----------
+    rows : (F,) int64
+        Rows of `MeshFacts.good` whose primitive has the set.
+    uv : (F, 3, 2) float64
+    """
+
+    def __init__(self, facts: MeshFacts, number: int = LIGHTMAP_SET) -> None:
+        self.facts = facts
+        have = np.array([number in p.texcoord for p in facts.raw.primitives], bool)
+        self.rows: NDArray[np.int64] = np.flatnonzero(have[facts.primitive[facts.good]])
+        blank = [np.zeros((len(p.position), 2), np.float32) for p in facts.raw.primitives]
+        parts = [p.texcoord.get(number, zero) for p, zero in zip(facts.raw.primitives, blank, strict=True)]
+        self._vertex = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
+        self.triangle: NDArray[np.int64] = facts.triangle[facts.good[self.rows]]
+        self.uv: NDArray[np.float64] = self._vertex[self.triangle].astype(np.float64)
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Return the face numbers of the rows."""
+        return self.facts.good[self.rows]
+
+    @cached_property
+    def finite(self) -> NDArray[np.bool_]:
+        """Tell which rows have finite uv."""
+        return np.asarray(np.isfinite(self.uv).all(axis=(1, 2)))
+
+    @cached_property
+    def valid(self) -> bool:
+        """Tell whether all uv are finite and lie in 0..1, or nearly, so that the rest can be looked at."""
+        return bool(len(self.rows)) and bool(self.finite.all()) and not self.outside.any()
+
+    @cached_property
+    def outside(self) -> NDArray[np.bool_]:
+        """Tell which rows reach out of 0..1 by more than exporters round."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((self.uv < -RANGE_SLACK) | (self.uv > 1.0 + RANGE_SLACK)).any(axis=(1, 2)))
+
+    @cached_property
+    def signed_area(self) -> NDArray[np.float64]:
+        """Return the signed uv areas, (F,) float64."""
+        e1, e2 = self.uv[:, 1] - self.uv[:, 0], self.uv[:, 2] - self.uv[:, 0]
+        area: NDArray[np.float64] = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
+        return area
+
+    @cached_property
+    def area(self) -> NDArray[np.float64]:
+        """Return the faces' areas in object space, (F,) float64."""
+        return self.facts.area[self.rows]
+
+    @cached_property
+    def chart(self) -> NDArray[np.int32]:
+        """Return the chart of each row: pieces connected in space and in uv."""
+        label = number_rows(np.concatenate([self.facts.position, self._vertex], axis=1))
+        return connected_vertices(label[self.triangle], int(label.max(initial=-1)) + 1)
+
+    @cached_property
+    def n_charts(self) -> int:
+        """Count the charts."""
+        return int(self.chart.max(initial=-1)) + 1
+
+    def per_chart(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the sums of a value over the charts."""
+        return np.bincount(self.chart, value, self.n_charts).astype(np.float64)

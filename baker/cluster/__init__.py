@@ -1,1 +1,0 @@
-"""Bakes on more than one machine."""

@@ -1,0 +1,258 @@
+"""Compares the maps of two finished bakes at the same points of the surface.
+
+Points are texels of a's; the maps of both are read there bilinearly, each at its own lightmap uv, as an
+engine reads them. b is the reference: a bias of +10 % says that a is brighter.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.comparison.manifests import manifest_differences
+from baker.comparison.match import Sides, SurfacePoints, make_sides, match
+from baker.comparison.pairs import pair_objects
+from baker.comparison.pictures import FlipMeans, page_flip, read
+from baker.core.errors import InputError, SettingsError
+from baker.core.geometry import world_geometry
+from baker.core.lightmap import TexelStatus
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import SceneWarning
+from baker.io.bake.read_bake import StoredBake, read_bake
+from baker.metrics.error_metrics import FIGURES, dark_floor, figures
+from baker.metrics.limits import Verdict, judge, parse_limits
+from baker.metrics.sample_texels import choose_texels
+from baker.metrics.texel_area import instance_map, texel_points
+from baker.metrics.worst_texels import worst_texels
+
+# A second bake has no noise that is known, so no limit can be set on it.
+LIMITED = (*(name for name in FIGURES if not name.startswith(("noise", "z_", "energy"))), "flip")
+
+
+@dataclass(frozen=True)
+class DiffSettings:
+    """How much is compared.
+
+    Attributes
+    ----------
+    texels : int
+        Points of the surface.
+    flip : bool
+        Compare pages as pictures, too.
+    fail_if : str or None
+    seed : int
+    """
+
+    texels: int = 20000
+    flip: bool = True
+    fail_if: str | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense."""
+        if self.texels < 1:
+            raise SettingsError("--texels must be at least 1", object="texels")
+
+
+@dataclass(frozen=True)
+class ChannelDifference:
+    """A channel at the points of both bakes.
+
+    Attributes
+    ----------
+    value, reference : (n, C) float64, a's and b's
+    standard_error : (n, C) float64, 0: a bake is compared as it is
+    figures : dict, see `metrics.error_metrics`, and "flip"
+    """
+
+    value: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    standard_error: NDArray[np.float64]
+    figures: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What `compare` found.
+
+    Attributes
+    ----------
+    a, b : StoredBake
+    channels : dict of name to ChannelDifference
+    objects, worst, differences : list of dict, as in the JSON
+    only_in_a, only_in_b : list of {object, node}
+    unmatched : int
+        Points of a's objects that are not on b's surface, beside those of `only_in_a`.
+    verdicts : list of Verdict
+    warnings : list of SceneWarning
+    seconds : float
+    """
+
+    a: StoredBake
+    b: StoredBake
+    channels: dict[str, ChannelDifference]
+    objects: list[dict[str, Any]]
+    worst: list[dict[str, Any]]
+    differences: list[dict[str, Any]]
+    only_in_a: list[dict[str, Any]]
+    only_in_b: list[dict[str, Any]]
+    unmatched: int
+    verdicts: list[Verdict]
+    warnings: list[SceneWarning]
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Tell whether no limit was passed."""
+        return not any(verdict.failed for verdict in self.verdicts)
+
+
+def compare(
+    a: Path | str, b: Path | str, settings: DiffSettings | None = None, progress: Progress = silent
+) -> Difference:
+    """Compare the bake in folder a with that in folder b.
+
+    Raises
+    ------
+    InputError
+        If one is no bake, or they have no channel or no surface in common.
+    SettingsError, ResourceError, Cancelled
+    """
+    settings = settings or DiffSettings()
+    start = time.monotonic()
+    report(progress, "load", 0.0)
+    first, second = read_bake(a), read_bake(b)
+    names = [n for n in first.maps if n in second.maps and first.maps[n].shape[3] == second.maps[n].shape[3]]
+    if not names:
+        raise InputError("the bakes have no channel in common", file=str(b))
+    limits = parse_limits(settings.fail_if, names, LIMITED) if settings.fail_if else []
+    for bake in (first, second):
+        _check_pages(bake, names)
+    pairs = pair_objects(first.scene, second.scene)
+    # Both relative to the same origin.
+    origin = first.scene.origin
+    surfaces = [world_geometry(bake.scene, bake.atlas, origin) for bake in (first, second)]
+    sides = make_sides(surfaces[0], surfaces[1], first.scene, second.scene, pairs)
+    report(progress, "compare", 0.0)
+    owners = _owners(first, sides)
+    pixel, points, other, lost = _choose(first, sides, owners, names[0], settings)
+    if not len(pixel):
+        raise InputError("the bakes have no surface in common; are they of the same scene?", file=str(b))
+    means = FlipMeans(dict.fromkeys(names), {})
+    if settings.flip:
+        means = page_flip(first, second, sides, owners >= 0, names, settings.seed, progress)
+    channels = {}
+    for name in names:
+        value, reference = read(first, sides.a, points, name), read(second, sides.b, other, name)
+        found = {**figures(value, reference), "flip": means.channel[name]}
+        channels[name] = ChannelDifference(value, reference, np.zeros_like(value), found)
+    owner = sides.a.instance[points.triangle]
+    size = first.atlas.resolution
+    where = points.at(sides.a, "position") + origin
+    worst = worst_texels(first.scene.instances, size, pixel, owner, where, channels)
+    worst = [entry for entry in worst if entry["error"] > 0]
+    _add_places(worst, first, second, sides, pixel, other)
+    return Difference(
+        a=first,
+        b=second,
+        channels=channels,
+        objects=_objects(first, channels, means, owner, lost),
+        worst=worst,
+        differences=manifest_differences(first, second, pairs),
+        only_in_a=_named(first, sides.missing_a),
+        only_in_b=_named(second, sides.missing_b),
+        unmatched=int(lost.sum()),
+        verdicts=judge(limits, {name: check.figures for name, check in channels.items()}),
+        warnings=[
+            SceneWarning(w.code, f"{bake.folder}: {w.message}", w.object)
+            for bake in (first, second)
+            for w in bake.warnings
+        ],
+        seconds=time.monotonic() - start,
+    )
+
+
+def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
+    """Return (P, H, W): the object of each texel whose surface is compared, -1 for others."""
+    owner = instance_map(sides.a, bake.atlas.n_pages, bake.atlas.resolution)
+    covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
+    return np.where(covered & ~sides.missing_a[owner], owner, -1).astype(np.int32)
+
+
+def _choose(
+    bake: StoredBake, sides: Sides, owner: NDArray[np.int32], name: str, settings: DiffSettings
+) -> tuple[NDArray[np.int64], SurfacePoints, SurfacePoints, NDArray[np.int64]]:
+    """Return texels, their points on both sides, and how many of each object are not on the other side."""
+    brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
+    owner = owner.reshape(-1)
+    pixel = choose_texels(owner, owner >= 0, brightness, settings.texels, settings.seed)
+    points = SurfacePoints(*texel_points(sides.a, pixel, bake.atlas.resolution, settings.seed))
+    other = match(sides, points)
+    met = other.triangle >= 0
+    lost = np.bincount(sides.a.instance[points.triangle[~met]], minlength=len(bake.scene.instances))
+    return pixel[met], points[met], other[met], np.where(sides.missing_a, 0, lost)
+
+
+def _check_pages(bake: StoredBake, names: list[str]) -> None:
+    for name in names:
+        if len(bake.maps[name]) != bake.atlas.n_pages:
+            message = f"the bake lacks pages of {name}; bake the scene again"
+            raise InputError(message, file=str(bake.folder))
+
+
+def _objects(
+    bake: StoredBake,
+    channels: dict[str, ChannelDifference],
+    means: FlipMeans,
+    owner: NDArray[np.int32],
+    lost: NDArray[np.int64],
+) -> list[dict[str, Any]]:
+    """Return the figures of each object that has points."""
+    found = []
+    floor = {name: dark_floor(check.reference) for name, check in channels.items()}
+    for number, instance in enumerate(bake.scene.instances):
+        mine = owner == number
+        if not mine.any() and not lost[number]:
+            continue
+        entry: dict[str, Any] = {"object": instance.name, "node": instance.node}
+        entry["unmatched"] = int(lost[number])
+        entry["channels"] = {
+            name: {
+                **figures(check.value[mine], check.reference[mine], floor=floor[name]),
+                "flip": means.object.get((name, number)),
+            }
+            for name, check in channels.items()
+        }
+        found.append(entry)
+    return found
+
+
+def _add_places(
+    worst: list[dict[str, Any]],
+    a: StoredBake,
+    b: StoredBake,
+    sides: Sides,
+    pixel: NDArray[np.int64],
+    other: SurfacePoints,
+) -> None:
+    """Say where in b's maps the worst places are."""
+    size_a, size_b = a.atlas.resolution, b.atlas.resolution
+    uv = other.at(sides.b, "uv")
+    for entry in worst:
+        del entry["standard_error"]
+        i = np.searchsorted(pixel, (entry["page"] * size_a + entry["row"]) * size_a + entry["column"])
+        column, row = np.clip(np.floor(uv[i] * size_b), 0, size_b - 1).astype(int).tolist()
+        triangle = other.triangle[i]
+        instance = b.scene.instances[int(sides.b.instance[triangle])]
+        place = {"page": int(sides.b.page[triangle]), "row": row, "column": column}
+        entry["in_b"] = {"object": instance.name, "node": instance.node, **place}
+
+
+def _named(bake: StoredBake, which: NDArray[np.bool_]) -> list[dict[str, Any]]:
+    some = (bake.scene.instances[i] for i in np.flatnonzero(which))
+    return [{"object": instance.name, "node": instance.node} for instance in some]

@@ -1,0 +1,86 @@
+"""FLIP between two bakes: the pages of one, beside the same texels filled from the other's maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.comparison.match import Sides, SurfacePoints, match
+from baker.core.geometry import Geometry
+from baker.core.progress import Progress, report
+from baker.io.bake.read_bake import StoredBake
+from baker.metrics.flip import flip_error
+from baker.metrics.texel_area import look_up_uv, texel_points
+
+# Of larger pages every second, third ... row and column is taken: FLIP takes two seconds for this many.
+_LARGEST = 512
+
+
+@dataclass(frozen=True)
+class FlipMeans:
+    """Means of FLIP.
+
+    Attributes
+    ----------
+    channel : dict of channel to float or None
+    object : dict of (channel, instance of a) to float
+    """
+
+    channel: dict[str, float | None]
+    object: dict[tuple[str, int], float]
+
+
+def read(bake: StoredBake, geometry: Geometry, points: SurfacePoints, name: str) -> NDArray[np.float64]:
+    """Read a channel (n, C) at points of the surface, as engines do."""
+    return look_up_uv(bake.maps[name], geometry.page[points.triangle], points.at(geometry, "uv"))
+
+
+def page_flip(
+    a: StoredBake,
+    b: StoredBake,
+    sides: Sides,
+    judged: NDArray[np.bool_],
+    names: list[str],
+    seed: int,
+    progress: Progress,
+) -> FlipMeans:
+    """Compare pages as pictures, means being over texels with surface that both bakes have.
+
+    Parameters
+    ----------
+    judged : (P, H, W) bool
+        Texels of a on whose surface the bakes are compared.
+    """
+    size, pages = a.atlas.resolution, a.atlas.n_pages
+    step = -(-size // _LARGEST)
+    total = {name: np.zeros((2, len(a.scene.instances))) for name in names}
+    for number in range(pages):
+        row, column = np.nonzero(judged[number, ::step, ::step])
+        if not len(row):
+            continue
+        pixel = (number * size + row * step) * size + column * step
+        points = SurfacePoints(*texel_points(sides.a, pixel.astype(np.int64), size, seed))
+        other = match(sides, points)
+        met = other.triangle >= 0
+        row, column, points, other = row[met], column[met], points[met], other[met]
+        owner = sides.a.instance[points.triangle]
+        for i, name in enumerate(names):
+            report(progress, "pictures", (number + i / len(names)) / pages)
+            side = -(-size // step)
+            stored = np.zeros((side, side, a.maps[name].shape[3]), np.float32)
+            reference = np.zeros((side, side, b.maps[name].shape[3]), np.float32)
+            stored[row, column] = read(a, sides.a, points, name)
+            reference[row, column] = read(b, sides.b, other, name)
+            if np.array_equal(stored, reference):
+                error = np.zeros((side, side), np.float32)
+            else:
+                error = flip_error(reference, stored)[0]
+            count = len(a.scene.instances)
+            total[name][0] += np.bincount(owner, error[row, column].astype(np.float64), count)
+            total[name][1] += np.bincount(owner, minlength=count)
+    return FlipMeans(
+        {name: float(s.sum() / n.sum()) if n.any() else None for name, (s, n) in total.items()},
+        {(name, int(i)): float(s[i] / n[i]) for name, (s, n) in total.items() for i in np.flatnonzero(n)},
+    )

@@ -1,0 +1,1 @@
+"""One bake, or many, on a dask.distributed cluster."""

@@ -1,0 +1,220 @@
+"""Connects to a dask.distributed cluster; the only file that knows it.
+
+The scheduler moves what tasks need to each worker once, and has others do again what a lost worker had not
+handed over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from baker.core.errors import BakerError, ResourceError, SettingsError
+from baker.distributed.tile_worker import Result, Span, TileWorker
+from baker.io.bake.manifest import library_versions
+
+# Seconds to find a scheduler; seconds without any worker after which the work is given up.
+_CONNECT = 10
+_ALONE = 30.0
+# Seconds between two looks at the workers.
+_LOOK = 1.0
+
+
+class Cluster:
+    """Many workers of one or more machines.
+
+    Parameters
+    ----------
+    address : str
+        "tcp://HOST:8786" of a scheduler, or "local:N" for N worker processes of this machine.
+    threads : int
+        Threads of all workers of "local:N" together.
+
+    Raises
+    ------
+    SettingsError
+        If the address is neither.
+    ResourceError
+        If dask.distributed is not installed, there is no scheduler or worker, or a worker has other versions.
+    """
+
+    def __init__(self, address: str, *, threads: int = 1) -> None:
+        kind, _, rest = address.partition(":")
+        if kind not in ("tcp", "tls", "local") or (kind == "local" and not rest.isdigit()):
+            message = f"the cluster '{address}' is no address; write tcp://HOST:8786, or local:N"
+            raise SettingsError(message, object="cluster")
+        try:
+            import distributed
+        except ImportError:
+            message = "a cluster needs dask.distributed; install it with: pip install distributed"
+            raise ResourceError(message) from None
+        dask: Any = distributed  # its functions carry no types
+        # What happens to workers is told here, in sentences.
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        self._local: Any = None
+        if kind == "local":
+            n = int(rest)
+            if not 1 <= n <= 1024:
+                raise SettingsError(f"local:{n} is no number of workers from 1 to 1024", object="cluster")
+            self._local = dask.LocalCluster(
+                n_workers=n,
+                threads_per_worker=max(threads // n, 1),
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address=None,
+                worker_dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+                memory_limit=0,
+            )
+        try:
+            self._client: Any = dask.Client(self._local or address, timeout=_CONNECT, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=_CONNECT)
+        except (OSError, TimeoutError):
+            self.close()
+            message = f"no scheduler with workers answers at {address}; start them, or check the address"
+            raise ResourceError(message) from None
+        try:
+            self._check_versions()
+        except BaseException:
+            self.close()
+            raise
+
+    def workers(self) -> dict[str, int]:
+        """Return the threads of each worker, by its address."""
+        found: dict[str, int] = dict(self._client.nthreads())
+        return found
+
+    def send(self, value: Any) -> Any:
+        """Give a value to all workers and return what stands for it in `submit`."""
+        return self._client.scatter([value], broadcast=True, hash=False)[0]
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
+        """Have `work(*arguments)` done by some worker."""
+        return self._client.submit(_checked, library_versions(), work, *arguments, pure=False)
+
+    def finished(self, tasks: Sequence[Any]) -> list[Any]:
+        """Return those tasks that came to an end."""
+        return [task for task in tasks if task.status != "pending"]
+
+    def result(self, task: Any) -> Any:
+        """Return what a finished task gave.
+
+        Raises
+        ------
+        BakerError
+            What it raised, or that its workers died.
+        KeyError
+            If what it needs was lost with the worker that held it: send and submit again.
+        """
+        try:
+            if task.status == "finished":
+                return self._client.gather(task)
+            error = task.exception() if task.status == "error" else None
+        except Exception as lost:
+            error = lost
+        if isinstance(error, BakerError):
+            raise error
+        if error is None or type(error).__name__ in ("FutureCancelledError", "CancelledError"):
+            raise KeyError(task.key)
+        if type(error).__name__ == "KilledWorker":
+            message = "workers of the cluster died of it again and again, most likely for want of memory"
+            raise ResourceError(f"{message}; lower resolution, or use workers with more")
+        raise error
+
+    def alive(self) -> bool:
+        """Tell whether any worker is there."""
+        return bool(self._client.scheduler_info()["workers"])
+
+    def close(self) -> None:
+        """Leave the cluster; workers of "local:N" end."""
+        for part in (getattr(self, "_client", None), self._local):
+            if part is not None:
+                # A worker that does not answer is killed by the cluster's own helpers.
+                with contextlib.suppress(TimeoutError, OSError):
+                    part.close(timeout=_CONNECT)
+
+    def _check_versions(self) -> None:
+        here = library_versions()
+        for address, there in self._client.run(library_versions, on_error="return").items():
+            if not isinstance(there, dict):
+                message = f"the worker {address} has no baker that can be used ({type(there).__name__})"
+                raise ResourceError(f"{message}; install baker {here['baker']} there")
+            _compare(address, here, there)
+
+
+def _compare(address: str, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
+    for name in here:
+        if there.get(name) != here[name]:
+            message = f"the worker {address} has {name} {there.get(name)}, here it is {name} {here[name]}"
+            raise ResourceError(f"{message}; install the same version on both, else results would differ")
+
+
+def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any) -> Any:
+    """Run in a worker: refuse if it has other versions (it may have joined later)."""
+    from distributed import get_worker
+
+    _compare(get_worker().address, versions, library_versions())
+    return work(*arguments)
+
+
+class Waiting:
+    """Notices that a cluster has had no worker for too long."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self.cluster = cluster
+        self.seen = self.looked = time.monotonic()
+
+    def check(self) -> None:
+        """Look, now and then.
+
+        Raises
+        ------
+        ResourceError
+            After half a minute without any worker.
+        """
+        now = time.monotonic()
+        if now - self.looked < _LOOK:
+            return
+        self.looked = now
+        if self.cluster.alive():
+            self.seen = now
+        elif now - self.seen > _ALONE:
+            raise ResourceError("the cluster has had no worker for half a minute; start workers, try again")
+
+
+def held_bakes() -> dict[str, TileWorker]:
+    """Run in a worker: return the bakes that it works for."""
+    from distributed import get_worker
+
+    held: dict[str, TileWorker] = vars(get_worker()).setdefault("baker_bakes", {})
+    return held
+
+
+def worker_threads() -> int:
+    """Run in a worker: return how many threads it has."""
+    from distributed import get_worker
+
+    return int(get_worker().state.nthreads)
+
+
+def work_on_tiles(
+    key: str,
+    parts: tuple[Any, Any, Any],
+    stage: str,
+    arrays: Mapping[str, NDArray[Any]],
+    spans: list[Span],
+) -> Result:
+    """Run in a worker: work on tiles of the bake with this hash."""
+    held = held_bakes()
+    if key not in held:
+        scene, atlas, settings = parts
+        # One bake at a time: the last one's ray tree is of no use any more.
+        held.clear()
+        threads = {"threads": worker_threads()}
+        held.setdefault(key, TileWorker(scene, atlas, settings.model_copy(update=threads)))
+    return held[key].work(stage, arrays, spans)

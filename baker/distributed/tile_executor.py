@@ -1,0 +1,125 @@
+"""Spreads the tiles of one bake over a cluster."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas
+from baker.core.parallel import Part, TileRunner
+from baker.core.progress import Progress, report
+from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
+from baker.distributed.connection import Cluster, Waiting, work_on_tiles
+from baker.distributed.tile_worker import Span
+
+# Tasks for each thread of a stage: few enough to cost little, enough that all end at the same time.
+_TASKS_PER_THREAD = 8
+# Most tiles in a task: what a lost worker costs.
+_MOST_TILES = 64
+_LOOK = 0.02
+
+
+class ClusterFarm:
+    """Is a `core.executor.Farm` of many machines.
+
+    Parameters
+    ----------
+    cluster : Cluster
+    """
+
+    def __init__(self, cluster: Cluster) -> None:
+        self.cluster = cluster
+        self._parts: tuple[Scene, Atlas, BakeSettings] | None = None
+        self._key = ""
+        self._sent: Any = None
+
+    def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
+        """Send scene, atlas and settings to each worker, once."""
+        # What only the writer needs stays here.
+        self._parts = (replace(scene, source=None, path=None), atlas, settings)
+        self._key = hashlib.sha256(pickle.dumps(self._parts, 5)).hexdigest()
+        self._sent = self.cluster.send(self._parts)
+
+    def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
+        """Return what has the tiles of a stage worked on by the cluster."""
+
+        def run(
+            n: int,
+            tile: int,
+            work: Callable[[int, int], Part],
+            *,
+            keep: Callable[[int, int, Part], object],
+            threads: int,
+            stage: str = stage,
+            progress: Progress,
+            rays_per_item: float = 0.0,
+        ) -> None:
+            report(progress, stage, 0.0)
+            spans = [(begin, min(begin + tile, n)) for begin in range(0, n, tile)]
+            _Stage(self.cluster, self._submitter(stage, dict(arrays))).run(
+                spans, n, keep, stage, progress, rays_per_item
+            )
+
+        return run
+
+    def close(self) -> None:
+        """Let the workers forget the scene."""
+        self._parts = self._sent = None
+
+    def _submitter(self, stage: str, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:
+        sent = self.cluster.send(arrays)
+
+        def submit(spans: list[Span], again: bool) -> Any:
+            nonlocal sent
+            if again:
+                # The worker that held them is lost, and nobody else had them.
+                self._sent, sent = self.cluster.send(self._parts), self.cluster.send(arrays)
+            return self.cluster.submit(work_on_tiles, self._key, self._sent, stage, sent, spans)
+
+        return submit
+
+
+class _Stage:
+    """The tasks of one stage."""
+
+    def __init__(self, cluster: Cluster, submit: Callable[[list[Span], bool], Any]) -> None:
+        self.cluster = cluster
+        self.submit = submit
+
+    def run(
+        self,
+        spans: list[Span],
+        n: int,
+        keep: Callable[[int, int, Part], object],
+        stage: str,
+        progress: Progress,
+        rays_per_item: float,
+    ) -> None:
+        slots = max(sum(self.cluster.workers().values()), 1)
+        size = max(min(-(-len(spans) // (_TASKS_PER_THREAD * slots)), _MOST_TILES), 1)
+        tasks = [(spans[k : k + size]) for k in range(0, len(spans), size)]
+        pending = {self.submit(task, False): task for task in tasks}
+        waiting, start, done = Waiting(self.cluster), time.perf_counter(), 0
+        while pending:
+            for task in self.cluster.finished(list(pending)):
+                part_of = pending.pop(task)
+                try:
+                    result = self.cluster.result(task)
+                except KeyError:
+                    pending[self.submit(part_of, True)] = part_of
+                    continue
+                for begin, end, part in result:
+                    keep(begin, end, part)
+                    done += end - begin
+            elapsed = max(time.perf_counter() - start, 1e-9)
+            rate = f"{done * rays_per_item / elapsed / 1e6:.1f} Mrays/s" if rays_per_item else ""
+            report(progress, stage, done / max(n, 1), rate)
+            waiting.check()
+            time.sleep(_LOOK)

@@ -1,0 +1,239 @@
+"""Makes `bake.json`, which says what a bake is: its files, where each object lies in them, how it was made.
+
+The same bake gives the same text, `created` and `timings` aside.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from datetime import UTC, datetime
+from importlib import metadata, resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baker.core.lightmap import BakeResult
+from baker.core.scene import SceneWarning
+from baker.core.settings import BakeSettings
+
+# The layout of the manifest; it changes when a key changes its name or meaning.
+VERSION = 1
+
+# Distributions whose version can change the numbers of a bake, with the name users know them by.
+_LIBRARIES = {
+    "baker": "baker", "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
+    "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
+}  # fmt: skip
+
+
+def make_manifest(
+    result: BakeResult,
+    out: Path,
+    *,
+    pages: list[dict[str, Any]],
+    files: list[dict[str, Any]],
+    instance_mesh: tuple[int, ...],
+    warnings: tuple[SceneWarning, ...] = (),
+    created: datetime | None = None,
+) -> dict[str, Any]:
+    """Return the manifest of a bake as plain JSON values.
+
+    Parameters
+    ----------
+    result : BakeResult
+    out : Path
+        The folder that the input's path is relative to.
+    pages : list of dict
+        One entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of a channel.
+    files : list of dict
+        Every file of the folder but the manifest: {file, sha256}.
+    instance_mesh : tuple of int
+        Mesh of each instance in `scene.glb`.
+    warnings : tuple of SceneWarning
+        What writing the maps found.
+    created : datetime or None
+        Time of writing; None is now.
+
+    Returns
+    -------
+    dict
+    """
+    scene = result.scene
+    moment = (created or datetime.now(UTC)).astimezone(UTC)
+    manifest = {
+        "version": VERSION,
+        "settings": _settings(result),
+        "versions": library_versions(),
+        "input": {"path": _relative(scene.path, out), "sha256": scene.sha256 or None},
+        "created": moment.isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "pages": pages,
+        "instances": _instances(result, instance_mesh),
+        "lights": _lights(result),
+        "timings": result.timings,
+        "rays": result.rays,
+        "solve": result.solve,
+        "statistics": {
+            channel: {
+                **_statistics(result, channel),
+                "clipped": sum(int(page["clipped"]) for page in pages if page["channel"] == channel),
+            }
+            for channel in result.lightmaps
+        },
+        "warnings": _warnings(result, warnings),
+        "denoise": result.denoise,
+        "files": files,
+    }
+    plain: dict[str, Any] = _plain(manifest)
+    return plain
+
+
+def manifest_text(manifest: dict[str, Any]) -> str:
+    """Return the manifest as the text of `bake.json`."""
+    return json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def manifest_schema() -> dict[str, Any]:
+    """Return the JSON schema (draft 2020-12) of `bake.json`."""
+    text = resources.files("baker.io.bake").joinpath("manifest_schema.json").read_text("utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
+
+
+def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
+    """Return every setting with its default filled in, but the number of threads: it changes nothing."""
+    values = settings.model_dump(mode="json", exclude={"threads"})
+    samples = settings.hemisphere_samples
+    values["samples"] = samples
+    values["light_samples"] = settings.light_samples or samples
+    values["ao_samples"] = settings.ao_samples or samples
+    return values
+
+
+def _settings(result: BakeResult) -> dict[str, Any]:
+    reach = result.settings.ao_reach(_diagonal(result))
+    return {**resolved_settings(result.settings), "ao_distance_metres": reach}
+
+
+def _diagonal(result: BakeResult) -> float:
+    """Return the diagonal of the box around all baked surfaces, metres."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for instance, layout in zip(result.scene.instances, result.atlas.layouts, strict=True):
+        matrix = instance.world_from_object
+        vertex = np.unique(layout.vertex[layout.triangle])
+        local = result.scene.meshes[instance.mesh].position[vertex].astype(np.float64)
+        world = (local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+        if len(world):
+            low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+    return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
+
+
+def library_versions() -> dict[str, str | None]:
+    """Return the versions of baker, Python and the libraries that can change the numbers of a bake."""
+    versions: dict[str, str | None] = {}
+    for name, distribution in _LIBRARIES.items():
+        try:
+            versions[name] = metadata.version(distribution)
+        except metadata.PackageNotFoundError:
+            versions[name] = None
+    return {"baker": versions.pop("baker"), "python": platform.python_version(), **versions}
+
+
+def _relative(path: Path | None, out: Path) -> str | None:
+    if path is None:
+        return None
+    try:
+        return Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
+    except ValueError:
+        # Another drive: there is no way from one to the other.
+        return path.resolve().as_posix()
+
+
+def _instances(result: BakeResult, instance_mesh: tuple[int, ...]) -> list[dict[str, Any]]:
+    rows = zip(result.scene.instances, result.atlas.layouts, instance_mesh, result.texel_count, strict=True)
+    return [
+        {
+            "node": instance.node,
+            "name": instance.name,
+            "mesh": mesh,
+            "page": layout.page,
+            "uv_offset": [0.0, 0.0],
+            "uv_scale": [1.0, 1.0],
+            "texels": texels,
+            "density": layout.texels_per_metre,
+            "uv": "kept" if layout.kept else "unwrapped",
+        }
+        for instance, layout, mesh, texels in rows
+    ]
+
+
+def _lights(result: BakeResult) -> list[dict[str, Any]]:
+    """List punctual lights, emissive materials in use and the sky."""
+    lights: list[dict[str, Any]] = []
+    for light in result.scene.lights:
+        entry: dict[str, Any] = {"kind": light.kind, "name": light.name, "node": light.node}
+        entry["intensity"] = light.intensity
+        entry["unit"] = "lx" if light.kind == "directional" else "cd"
+        if light.kind != "directional":
+            entry["position"] = light.position
+            if math.isfinite(light.range):
+                entry["range"] = light.range
+        if light.kind != "point":
+            entry["direction"] = light.direction
+        if light.kind == "spot":
+            entry |= {"inner_cone": light.inner_cone, "outer_cone": light.outer_cone}
+        lights.append(entry)
+    used = {int(m) for i in result.scene.instances for m in np.unique(result.scene.meshes[i.mesh].material)}
+    for index in sorted(used):
+        material = result.scene.materials[index]
+        if any(material.emission):
+            entry = {"kind": "emissive", "name": material.name, "material": index}
+            lights.append({**entry, "radiance": material.emission, "unit": "cd/m2"})
+    if any(result.settings.sky_radiance):
+        sky = {"kind": "sky", "name": "sky", "radiance": result.settings.sky_radiance, "unit": "cd/m2"}
+        lights.append(sky)
+    return lights
+
+
+def _statistics(result: BakeResult, channel: str) -> dict[str, Any]:
+    """Return what the bake found out, or the plain figures of the covered texels."""
+    if channel in result.statistics:
+        return result.statistics[channel]
+    covered = np.isin(result.status, (1, 3, 4))
+    value = result.lightmaps[channel].value[covered]
+    figures = (
+        {"min": value.min(), "max": value.max(), "mean": value.mean(dtype=np.float64)} if value.size else {}
+    )
+    return {
+        "min": 0.0,
+        "max": 0.0,
+        "mean": 0.0,
+        **figures,
+        "clipped": 0,
+        "invalid": (result.status == 3).sum(),
+    }
+
+
+def _warnings(result: BakeResult, more: tuple[SceneWarning, ...]) -> list[dict[str, str]]:
+    found = [*result.scene.warnings, *result.atlas.warnings, *result.warnings, *more]
+    return [{"code": w.code, "message": w.message, "object": w.object} for w in dict.fromkeys(found)]
+
+
+def _plain(value: Any) -> Any:
+    """Return `value` made of plain JSON types; numbers that JSON cannot say become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return str(value)

@@ -1,0 +1,174 @@
+"""Reads a finished output folder back: scene, lightmap uv, maps, status, manifest.
+
+Whatever judges or shows a bake starts here; it sees the files as they are, not as they were written.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.encoding import encoding_of
+from baker.core.errors import InputError
+from baker.core.scene import Scene, SceneWarning
+from baker.core.settings import make_settings
+from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state, own_files
+from baker.io.choose import choose_objects
+from baker.io.load import load_scene
+from baker.io.png import decode_palette_png
+
+SCENE_NAME = "scene.glb"
+
+
+@dataclass(frozen=True)
+class StoredBake:
+    """A bake as its folder holds it.
+
+    Attributes
+    ----------
+    folder : Path
+    manifest : dict
+        The content of `bake.json`.
+    scene : Scene
+        `scene.glb`; the sky is in `manifest["settings"]`.
+    atlas : Atlas
+        From TEXCOORD_1, page numbers from the manifest; `chart` is the instance's number.
+    maps : dict of channel to (P, H, W, C) float32
+    status : (P, H, W) uint8, `core.lightmap.TexelStatus`
+    warnings : tuple of SceneWarning
+        Files that are not as they were baked.
+    """
+
+    folder: Path
+    manifest: dict[str, Any]
+    scene: Scene
+    atlas: Atlas
+    maps: dict[str, NDArray[np.float32]]
+    status: NDArray[np.uint8]
+    warnings: tuple[SceneWarning, ...]
+
+    @property
+    def sky(self) -> tuple[float, float, float]:
+        """Return the radiance of the sky that it was baked under, cd/m2."""
+        baked = self.manifest.get("settings", {})
+        known = {key: baked[key] for key in ("sky", "sky_strength") if baked.get(key) is not None}
+        return make_settings(known).sky_radiance
+
+
+def read_bake(folder: Path | str) -> StoredBake:
+    """Read the output folder of a bake.
+
+    Parameters
+    ----------
+    folder : Path or str
+        The folder, or its `bake.json`.
+
+    Returns
+    -------
+    StoredBake
+
+    Raises
+    ------
+    InputError
+        If the folder holds no bake, a file of it is missing or unreadable, or its parts do not fit together.
+    """
+    folder = Path(folder)
+    if folder.name == MANIFEST_NAME:
+        folder = folder.parent
+    if not folder.exists():
+        raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
+    if own_files(folder) is None:
+        raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
+    manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+    warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
+    scene = load_scene(_present(folder, SCENE_NAME))
+    told = manifest.get("settings", {})
+    scene = choose_objects(scene, told.get("include", ()), told.get("exclude", ()))
+    try:
+        pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
+        maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
+        resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
+        layouts = tuple(
+            _layout(folder, scene, index, rows.get(instance.node))
+            for index, instance in enumerate(scene.instances)
+        )
+    except (KeyError, IndexError, TypeError) as error:
+        message = f"the manifest lacks {error}; bake the scene again"
+        raise InputError(message, file=str(folder / MANIFEST_NAME)) from None
+    padding = int(manifest.get("settings", {}).get("padding", 0))
+    atlas = Atlas(resolution, n_pages, layouts, len(layouts), padding)
+    status = np.stack([_status(folder, page, resolution) for page in range(n_pages)])
+    return StoredBake(folder, manifest, scene, atlas, maps, status, warnings)
+
+
+def _present(folder: Path, name: str) -> Path:
+    path = folder / name
+    if not path.is_file():
+        raise InputError("this file of the bake is missing; bake the scene again", file=str(path))
+    return path
+
+
+def _differs(folder: Path, entry: dict[str, Any]) -> bool:
+    return file_state(folder / entry["file"], str(entry["sha256"])) != AS_BAKED
+
+
+def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:
+    name = str(entry["file"])
+    if (folder / name).is_file():
+        return SceneWarning("changed-file", f"{name} is not as it was baked; it is judged as it is", name)
+    return SceneWarning("missing-file", f"{name} is missing", name)
+
+
+def _pages(folder: Path, pages: list[dict[str, Any]], channel: str) -> NDArray[np.float32]:
+    """Return (P, H, W, C) float32: the pages of a channel, one above the other."""
+    images = []
+    for entry in sorted((p for p in pages if p["channel"] == channel), key=lambda p: int(p["page"])):
+        path = _present(folder, entry["file"])
+        encoding = encoding_of(path.name)
+        if encoding is None:
+            raise InputError(f"'{path.suffix}' is not a known image format", file=str(path))
+        pixels = encoding.decode(path).pixels
+        if pixels.shape[:2] != (entry["height"], entry["width"]):
+            height, width = pixels.shape[:2]
+            message = f"the map is {width} x {height}, the manifest says {entry['width']} x {entry['height']}"
+            raise InputError(message, file=str(path))
+        images.append(pixels)
+    return np.stack(images)
+
+
+def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) -> InstanceLayout:
+    instance = scene.instances[index]
+    mesh = scene.meshes[instance.mesh]
+    uv = mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
+    if row is None or uv is None:
+        message = "the object has no lightmap uv or is not in the manifest; bake the scene again"
+        raise InputError(message, file=str(folder / SCENE_NAME), object=instance.name)
+    placed = uv.astype(np.float64) * row["uv_scale"] + row["uv_offset"]
+    return InstanceLayout(
+        instance=index,
+        page=int(row["page"]),
+        vertex=np.arange(len(mesh.position), dtype=np.int32),
+        uv=placed.astype(np.float32),
+        triangle=mesh.triangle,
+        chart=np.full(len(mesh.triangle), index, np.int32),
+        kept=row.get("uv") == "kept",
+        texels_per_metre=float(row["density"]),
+    )
+
+
+def _status(folder: Path, page: int, resolution: int) -> NDArray[np.uint8]:
+    path = _present(folder, f"status_{page}.png")
+    try:
+        status = decode_palette_png(path.read_bytes())
+    except (OSError, ValueError):
+        raise InputError("the file is not a readable PNG; bake the scene again", file=str(path)) from None
+    if status.shape != (resolution, resolution):
+        message = f"the picture is not {resolution} x {resolution} palette numbers; bake the scene again"
+        raise InputError(message, file=str(path))
+    return status

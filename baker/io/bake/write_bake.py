@@ -1,0 +1,275 @@
+"""Writes a finished bake to its folder: maps, status, scene, manifest."""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from baker.core.encoding import ENCODINGS, EncodeOptions, Encoding, Loss, measure_loss
+from baker.core.errors import ResourceError, SettingsError
+from baker.core.export import EXPORTS
+from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import SceneWarning
+from baker.io.bake.manifest import make_manifest, manifest_text
+from baker.io.bake.output_folder import MANIFEST_NAME, OutputFolder, check_out, remove_leftovers
+from baker.io.gltf.write_baked import make_glb
+from baker.io.png import encode_palette_png, encode_png, grey_levels
+
+__all__ = ["OutputFolder", "check_out", "remove_leftovers", "write_bake"]
+
+# Colours told apart in grey and by eyes that mix red and green.
+STATUS_COLOURS = {
+    TexelStatus.EMPTY: (16, 16, 16),
+    TexelStatus.COVERED: (86, 180, 233),
+    TexelStatus.DILATED: (0, 80, 130),
+    TexelStatus.INVALID: (230, 159, 0),
+    TexelStatus.UNCONVERGED: (240, 228, 66),
+}
+
+# Fewer banded texels than this share of a page are told in the manifest, but not warned of.
+BANDED_SHARE = 0.01
+
+_QUANTITY = {
+    "irradiance": "irradiance E on the surface, direct and indirect, without the receiver's albedo",
+    "ao": "ambient occlusion: cosine-weighted open share of the hemisphere, 1 = open",
+}
+
+
+def write_bake(
+    result: BakeResult,
+    out: Path,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+    created: datetime | None = None,
+    open_folders: list[OutputFolder] | None = None,
+) -> dict[str, Any]:
+    """Write a bake to `out`, all of it or nothing.
+
+    Parameters
+    ----------
+    result : BakeResult
+    out : Path
+        The output folder. A bake there is replaced; files that baker did not write are kept.
+    force : bool
+        Also write into a folder that is not a bake.
+    progress : Progress
+        Is told of each file; may cancel.
+    created : datetime or None
+        Time to write into the manifest; None is now.
+    open_folders : list of OutputFolder or None
+        The folder at work is appended here while it is open, so that a program that has to stop at once can
+        call `abort` on it.
+
+    Returns
+    -------
+    dict
+        The manifest, as in `bake.json`.
+
+    Raises
+    ------
+    SettingsError
+        If `out` is not a place to write to, see `check_out`.
+    ResourceError
+        If the disk is full or not writable; the folder is then as it was.
+    Cancelled
+        If `progress` says so; the folder is then as it was.
+    """
+    check_out(out, force=force, scene_path=result.scene.path)
+    folder = OutputFolder(out)
+    if open_folders is not None:
+        open_folders.append(folder)
+    try:
+        with folder:
+            manifest = _write_files(result, folder, progress, created)
+            folder.commit()
+    except OSError as error:
+        why = error.strerror or str(error)
+        message = f"the bake cannot be written ({why}); free some space or name another folder"
+        raise ResourceError(message, file=str(out)) from error
+    except ResourceError as error:
+        # The file named by the error lay in the temporary folder, which is gone.
+        raise ResourceError(error.message, file=str(out)) from error
+    finally:
+        if open_folders is not None:
+            open_folders.remove(folder)
+    return manifest
+
+
+def _write_files(
+    result: BakeResult, folder: OutputFolder, progress: Progress, created: datetime | None
+) -> dict[str, Any]:
+    n_pages = result.atlas.n_pages
+    steps = n_pages * (len(result.lightmaps) + 1) + 1
+    pages: list[dict[str, Any]] = []
+    files: list[dict[str, Any]] = []
+    warnings: list[SceneWarning] = []
+    for lightmap in result.lightmaps.values():
+        for page in range(len(lightmap.value)):
+            entry, found = _write_page(result, lightmap, page, folder.path)
+            warnings += found
+            pages.append(entry)
+            files += [{"file": e["file"], "sha256": e["sha256"]} for e in (entry, *entry["encodings"])]
+            report(progress, "write", len(pages) / steps, entry["file"])
+    for page in range(n_pages):
+        legend = ", ".join(f"{status.value} {status.name.lower()}" for status in TexelStatus)
+        colours = {status.value: colour for status, colour in STATUS_COLOURS.items()}
+        data = encode_palette_png(result.status[page], colours, {"Legend": legend, "Software": _signature()})
+        files.append(_write_data(folder.path, f"status_{page}.png", data))
+        report(progress, "write", (len(pages) + page + 1) / steps, files[-1]["file"])
+    ao = result.lightmaps.get("ao")
+    ao_png = {p: encode_png(grey_levels(ao.value[p, :, :, 0])) for p in range(len(ao.value))} if ao else None
+    glb = make_glb(result.scene, result.atlas, ao_png)
+    files.append(_write_data(folder.path, "scene.glb", glb.data))
+    report(progress, "write", 1.0, "scene.glb")
+    manifest = make_manifest(
+        result,
+        folder.out,
+        pages=pages,
+        files=files,
+        instance_mesh=glb.instance_mesh,
+        warnings=tuple(warnings),
+        created=created,
+    )
+    _write_manifest(folder.path, manifest)
+    # An export reads a bake that is whole but for the exports themselves.
+    for name in result.settings.export:
+        report(progress, "write", 1.0, f"export {name}")
+        manifest["files"] += _write_export(folder.path, name)
+    if result.settings.export:
+        _write_manifest(folder.path, manifest)
+    return manifest
+
+
+def _write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
+    (folder / MANIFEST_NAME).write_text(manifest_text(manifest), "utf-8", newline="\n")
+
+
+def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
+    """Write one export into a folder of its name; return its files for the manifest."""
+    export = EXPORTS.get(name)
+    if export is None:
+        raise SettingsError(f"there is no export '{name}'; known are {', '.join(EXPORTS.names())}")
+    target = folder / name
+    target.mkdir()
+    export.write(folder, target)
+    found = []
+    for path in sorted(p for p in target.rglob("*") if p.is_file()):
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        found.append({"file": path.relative_to(folder).as_posix(), "sha256": digest})
+    return found
+
+
+def _write_page(
+    result: BakeResult, lightmap: Lightmap, page: int, folder: Path
+) -> tuple[dict[str, Any], list[SceneWarning]]:
+    """Write one page of a channel in all formats; return its manifest entry and what got lost."""
+    value = lightmap.value[page]
+    height, width, components = value.shape
+    quantity = _QUANTITY.get(lightmap.channel, lightmap.channel)
+    colour_space = "linear Rec.709, D65" if components == 3 else "none"
+    header = {
+        "quantity": quantity,
+        "unit": lightmap.unit,
+        "colourSpace": colour_space,
+        "software": _signature(),
+    }
+    settings = result.settings
+    surface = result.status[page] != TexelStatus.EMPTY
+    entries: list[dict[str, Any]] = []
+    warnings: list[SceneWarning] = []
+    for name in ("exr", *settings.encode):
+        encoding = encoding_named(name)
+        if components not in encoding.components:
+            continue
+        top = settings.rgbm_top(float(lightmap.value.max(initial=0.0)))
+        options = EncodeOptions(settings.dtype == "half", settings.exr_compression, top)
+        file = f"{lightmap.channel}_{page}{encoding.suffix}"
+        encoding.encode(folder / file, value, options=options, header=header)
+        with (folder / file).open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        loss = measure_loss(encoding, value, surface, options)
+        warnings += _told(loss, file, lightmap.channel, name)
+        low, high = encoding.limits(options)
+        entry: dict[str, Any] = {"encoding": name, "file": file, "sha256": digest}
+        entries.append({**entry, "min": low, "max": high, "clipped": loss.clipped, "banded": loss.banded})
+    exr, *others = entries
+    page_entry: dict[str, Any] = {"channel": lightmap.channel, "page": page, **exr}
+    for key in ("encoding", "min", "max"):
+        del page_entry[key]
+    page_entry |= {"width": width, "height": height, "unit": lightmap.unit}
+    page_entry |= {"quantity": quantity, "colour_space": colour_space, "encodings": others}
+    return page_entry, warnings
+
+
+def encoding_named(name: str) -> Encoding:
+    """Return the encoding of that name.
+
+    Raises
+    ------
+    SettingsError
+        If there is none.
+    """
+    encoding = ENCODINGS.get(name)
+    if encoding is None:
+        known = ", ".join(other for other in ENCODINGS.names() if other != "exr")
+        raise SettingsError(f"there is no encoding '{name}'; known are {known}", object="encode")
+    return encoding
+
+
+def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
+    """Make sure, before the long work, that each encoding asked for has a channel to hold.
+
+    Parameters
+    ----------
+    names : tuple of str
+    components : dict of channel to its number of components
+
+    Raises
+    ------
+    SettingsError
+    """
+    for name in names:
+        encoding = encoding_named(name)
+        if name == "exr":
+            raise SettingsError("exr is written in any case; name further formats only", object="encode")
+        if not set(encoding.components) & set(components.values()):
+            number = "three" if encoding.components == (3,) else "one"
+            message = f"'{name}' holds maps of {number} component(s), and no such channel is baked"
+            raise SettingsError(message, object="encode")
+
+
+_REMEDY = {
+    "exr": "use --dtype float",
+    "rgbm": "raise --rgbm-range or set it to auto",
+    "png8": "use png16 or the EXR",
+}
+
+
+def _told(loss: Loss, file: str, channel: str, encoding: str) -> list[SceneWarning]:
+    """Return the warnings that a page's loss deserves."""
+    warnings = []
+    remedy = _REMEDY.get(encoding, "use the EXR")
+    if loss.clipped:
+        message = f"{file}: {loss.clipped} texels are outside the range of the format and were clipped"
+        warnings.append(SceneWarning("clipped", f"{message}; {remedy}", channel))
+    if loss.banded > BANDED_SHARE * loss.surface:
+        share = 100.0 * loss.banded / loss.surface
+        message = f"{file}: steps of the format show in {share:.1f} % of the texels"
+        remedy = "lower --rgbm-range or use the EXR" if encoding == "rgbm" else remedy
+        warnings.append(SceneWarning("banding", f"{message}; {remedy}", channel))
+    return warnings
+
+
+def _write_data(folder: Path, name: str, data: bytes) -> dict[str, Any]:
+    (folder / name).write_bytes(data)
+    return {"file": name, "sha256": hashlib.sha256(data).hexdigest()}
+
+
+def _signature() -> str:
+    return f"baker {version('baker')}"

@@ -1,0 +1,111 @@
+"""Chooses the objects that take part in a bake, by patterns of their names.
+
+A pattern (`*`, `?`, `[abc]`, case matters) matches the name of a node, or its path from the root,
+like `House/Floor 1/*`. What is said of a node holds for all nodes below it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+from baker.core.errors import InputError
+from baker.core.scene import Scene, SceneWarning
+from baker.core.source_mesh import RawScene
+
+
+def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str]) -> Scene:
+    """Return the scene with the objects that the patterns leave.
+
+    Parameters
+    ----------
+    scene : Scene
+    include : sequence of str
+        Only objects that one of these matches are kept; all if it is empty. Lights are kept.
+    exclude : sequence of str
+        Objects and lights that one of these matches are left out.
+
+    Returns
+    -------
+    Scene
+        With a warning for each pattern that matches nothing.
+
+    Raises
+    ------
+    InputError
+        If no object is left.
+    """
+    if not include and not exclude:
+        return scene
+    names = _Names(scene)
+
+    def left_out(node: int, name: str) -> bool:
+        return any(names.match(pattern, node, name) for pattern in exclude)
+
+    def kept(node: int, name: str) -> bool:
+        wanted = not include or any(names.match(pattern, node, name) for pattern in include)
+        return wanted and not left_out(node, name)
+
+    instances = [i for i in scene.instances if kept(i.node, i.name)]
+    if scene.instances and not instances:
+        message = "include and exclude leave no object to bake; look at the names with `baker inspect`"
+        raise InputError(message, file=str(scene.path) if scene.path else None)
+    lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
+    used = sorted({i.mesh for i in instances})
+    number = {old: new for new, old in enumerate(used)}
+    raw = scene.raw
+    if raw is not None:
+        shown = [i for i in raw.instances if kept(i.node, i.name)]
+        filled = sorted({i.mesh for i in shown})
+        at = {old: new for new, old in enumerate(filled)}
+        raw = RawScene(
+            tuple(raw.meshes[k] for k in filled), tuple(replace(i, mesh=at[i.mesh]) for i in shown)
+        )
+    idle = [p for p in (*include, *exclude) if p not in names.matched]
+    return replace(
+        scene,
+        meshes=tuple(scene.meshes[k] for k in used),
+        instances=tuple(replace(i, mesh=number[i.mesh]) for i in instances),
+        lights=lights,
+        raw=raw,
+        warnings=(
+            *scene.warnings,
+            *(SceneWarning("no-match", f"the pattern '{p}' matches no object and no light", p) for p in idle),
+        ),
+    )
+
+
+class _Names:
+    """The names and paths that patterns are held against."""
+
+    def __init__(self, scene: Scene) -> None:
+        document = scene.source.json if scene.source is not None else {}
+        self._nodes = document.get("nodes", [])
+        self._parent: dict[int, int] = {}
+        for index, node in enumerate(self._nodes):
+            children = node.get("children", []) if isinstance(node, dict) else []
+            for child in children if isinstance(children, list) else []:
+                if isinstance(child, int):
+                    self._parent[child] = index
+        self._known: dict[tuple[int, str], list[str]] = {}
+        self.matched: set[str] = set()
+
+    def match(self, pattern: str, node: int, name: str) -> bool:
+        """Tell whether a pattern matches a node or one above it."""
+        found = any(fnmatchcase(text, pattern) for text in self._texts(node, name))
+        if found:
+            self.matched.add(pattern)
+        return found
+
+    def _texts(self, node: int, name: str) -> list[str]:
+        if (node, name) not in self._known:
+            chain = [name]
+            at, steps = self._parent.get(node), 0
+            while at is not None and steps < len(self._nodes):
+                chain.append(str(self._nodes[at].get("name", f"node_{at}")))
+                at, steps = self._parent.get(at), steps + 1
+            chain.reverse()
+            paths = ["/".join(chain[: k + 1]) for k in range(len(chain))]
+            self._known[node, name] = list(dict.fromkeys([*chain, *paths]))
+        return self._known[node, name]

@@ -1,0 +1,116 @@
+"""Reads accessors as raw element bytes, so that vertices can be put in another order and nothing converted.
+
+Based on: Khronos Group, glTF 2.0 specification, 3.6.2 Accessors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.io.gltf.packer import COMPONENT, Json
+
+_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_MATRIX = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
+
+
+def element_size(accessor: Json) -> int:
+    """Return the bytes of one element; matrix columns start at multiples of four bytes."""
+    component = COMPONENT[accessor["componentType"]].itemsize
+    if accessor["type"] in _MATRIX:
+        side = _MATRIX[accessor["type"]]
+        return side * (-(-side * component // 4) * 4)
+    return _WIDTH[accessor["type"]] * component
+
+
+def gather_rows(
+    document: Json, buffers: tuple[bytes, ...], index: int, rows: NDArray[np.int32]
+) -> NDArray[np.uint8]:
+    """Return the raw bytes of some elements of an accessor, sparse ones included.
+
+    Parameters
+    ----------
+    document : dict, glTF JSON
+    buffers : tuple of bytes
+    index : int
+        The accessor.
+    rows : (N,) int32
+        Element numbers; any may come several times.
+
+    Returns
+    -------
+    (N, B) uint8
+
+    Raises
+    ------
+    InputError
+        If the accessor is malformed, points outside its buffer or has too few elements.
+    """
+    name = f"accessor {index}"
+    if not isinstance(index, int) or not 0 <= index < len(document.get("accessors", [])):
+        raise InputError("its data cannot be read: there is no such accessor", object=name)
+    try:
+        accessor = document["accessors"][index]
+        size, count = element_size(accessor), accessor["count"]
+        if len(rows) and int(rows.max()) >= count:
+            raise InputError(f"it has {count} elements where {int(rows.max()) + 1} are needed", object=name)
+        if "bufferView" in accessor:
+            offset = accessor.get("byteOffset", 0)
+            data = _elements(document, buffers, accessor["bufferView"], offset, count, size)[rows]
+        else:
+            data = np.zeros((len(rows), size), np.uint8)
+        if "sparse" in accessor:
+            _substitute(document, buffers, accessor, rows, data)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+        raise InputError(f"its data cannot be read ({error!r}); repair the file", object=name) from None
+    return data
+
+
+def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int) -> InputError | None:
+    """Return why an accessor does not give `n_rows` rows, or None if it does."""
+    try:
+        # Its first and last row, for the window on the buffer is checked as a whole.
+        gather_rows(document, buffers, index, np.array([0, max(n_rows - 1, 0)], np.int32))
+    except InputError as error:
+        return error
+    return None
+
+
+def _elements(
+    document: Json, buffers: tuple[bytes, ...], view_index: int, offset: int, count: int, size: int
+) -> NDArray[np.uint8]:
+    """Return a (count, size) window on a buffer view."""
+    view = document["bufferViews"][view_index]
+    stride = view.get("byteStride", size)
+    start = view.get("byteOffset", 0) + offset
+    span = stride * (count - 1) + size
+    buffer = buffers[view["buffer"]]
+    if start < 0 or offset + span > view["byteLength"] or start + span > len(buffer):
+        raise InputError("it reaches beyond its buffer", object=f"buffer view {view_index}")
+    flat = np.frombuffer(buffer, np.uint8, span, start)
+    return np.lib.stride_tricks.as_strided(flat, (count, size), (stride, 1), writeable=False)
+
+
+def _substitute(
+    document: Json,
+    buffers: tuple[bytes, ...],
+    accessor: Json,
+    rows: NDArray[np.int32],
+    data: NDArray[np.uint8],
+) -> None:
+    """Put the sparse values over those rows of `data` that they replace."""
+    sparse: dict[str, Any] = accessor["sparse"]
+    count, size = sparse["count"], element_size(accessor)
+    dtype = COMPONENT[sparse["indices"]["componentType"]]
+    where, what = sparse["indices"], sparse["values"]
+    indices = _elements(
+        document, buffers, where["bufferView"], where.get("byteOffset", 0), count, dtype.itemsize
+    )
+    values = _elements(document, buffers, what["bufferView"], what.get("byteOffset", 0), count, size)
+    replaced = np.full(accessor["count"], -1, np.int64)
+    replaced[np.ascontiguousarray(indices).view(dtype).ravel()] = np.arange(count)
+    found = replaced[rows]
+    data[found >= 0] = values[found[found >= 0]]

@@ -1,0 +1,212 @@
+"""Builds a glTF document for a scene that came from another format.
+
+Node i is instance i of the scene, in the order of `Instance.node`; lights come after. World matrices stand on
+the nodes, colours stay linear, textures are embedded as PNG.
+
+Based on: Khronos Group, glTF 2.0 specification; KHR_lights_punctual, KHR_materials_emissive_strength,
+KHR_texture_transform.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, Texture
+from baker.io.gltf.ao_materials import BakedUse
+from baker.io.gltf.packer import Json, Packer
+from baker.io.png import encode_png, srgb_levels
+
+_WRAP = {"repeat": 10497, "mirror": 33648, "clamp": 33071}
+_NEAREST = 9728
+
+
+def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], list[int]]:
+    """Return a document with lightmap uv, its baked primitives, and each instance's mesh."""
+    document: Json = {"asset": {"version": "2.0", "generator": "baker"}}
+    packer = Packer(document)
+    extensions: set[str] = set()
+    images: dict[int, int] = {}
+    if scene.materials:
+        document["materials"] = [material_json(packer, m, images, extensions) for m in scene.materials]
+    order = sorted(range(len(scene.instances)), key=lambda i: (scene.instances[i].node, i))
+    uses: list[BakedUse] = []
+    instance_mesh = [0] * len(order)
+    nodes, meshes = document.setdefault("nodes", []), document.setdefault("meshes", [])
+    for index in order:
+        instance, layout = scene.instances[index], atlas.layouts[index]
+        mesh = scene.meshes[instance.mesh]
+        node, shown = _node(instance, mesh)
+        primitives = _primitives(packer, shown, layout, mirrored=shown is not mesh and _mirrors(instance))
+        uses += [BakedUse(primitive, layout.page) for primitive in primitives]
+        instance_mesh[index] = len(meshes)
+        nodes.append({**node, "mesh": len(meshes)})
+        meshes.append({"name": mesh.name, "primitives": primitives})
+    if scene.lights:
+        extensions.add("KHR_lights_punctual")
+        document["extensions"] = {
+            "KHR_lights_punctual": {"lights": [_light(light) for light in scene.lights]}
+        }
+        for number, light in enumerate(scene.lights):
+            nodes.append(
+                {
+                    "name": light.name,
+                    "translation": list(light.position),
+                    "rotation": _turn_from_minus_z(light.direction),
+                    "extensions": {"KHR_lights_punctual": {"light": number}},
+                }
+            )
+    document["scenes"] = [{"name": scene.name, "nodes": list(range(len(nodes)))}]
+    document["scene"] = 0
+    if extensions:
+        document["extensionsUsed"] = sorted(extensions)
+    return packer, uses, instance_mesh
+
+
+def _mirrors(instance: Instance) -> bool:
+    return bool(np.linalg.det(instance.world_from_object[:3, :3]) < 0)
+
+
+def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
+    """Return the node and the mesh to put under it."""
+    matrix = np.asarray(instance.world_from_object, np.float64)
+    if np.array_equal(matrix, np.eye(4)):
+        return {"name": instance.name}, mesh
+    linear = matrix[:3, :3]
+    product = linear.T @ linear
+    if np.abs(product - np.diag(np.diag(product))).max() <= 1e-6 * np.abs(product).max():
+        return {"name": instance.name, "matrix": matrix.T.ravel().tolist()}, mesh
+    # glTF nodes cannot shear, so the mesh itself goes into the world.
+    position = mesh.position.astype(np.float64) @ linear.T + matrix[:3, 3]
+    normal = mesh.normal.astype(np.float64) @ np.linalg.inv(linear)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    moved = replace(mesh, position=position.astype(np.float32), normal=normal.astype(np.float32))
+    return {"name": instance.name}, moved
+
+
+def _primitives(packer: Packer, mesh: Mesh, layout: InstanceLayout, *, mirrored: bool) -> list[Json]:
+    """Return one primitive for each material of an instance; `mirrored` turns the faces over."""
+    primitives = []
+    for material in np.unique(mesh.material).tolist():
+        used, corner = np.unique(layout.triangle[mesh.material == material], return_inverse=True)
+        vertex = layout.vertex[used]
+        attributes = {
+            "POSITION": packer.add_floats(mesh.position[vertex], bounds=True),
+            "NORMAL": packer.add_floats(mesh.normal[vertex]),
+            "TEXCOORD_1": packer.add_floats(layout.uv[used]),
+        }
+        first = mesh.texcoord[0] if mesh.texcoord else None
+        attributes["TEXCOORD_0"] = (
+            attributes["TEXCOORD_1"] if first is None else packer.add_floats(first[vertex])
+        )
+        if mesh.colour is not None:
+            attributes["COLOR_0"] = packer.add_floats(mesh.colour[vertex])
+        triangle = corner.reshape(-1, 3)
+        indices = packer.add_indices(triangle[:, ::-1] if mirrored else triangle)
+        primitives.append({"attributes": attributes, "indices": indices, "material": material})
+    return primitives
+
+
+def material_json(packer: Packer, material: Material, images: dict[int, int], extensions: set[str]) -> Json:
+    """Return a material as glTF has it.
+
+    Parameters
+    ----------
+    packer : Packer
+        Takes the material's images.
+    material : Material
+    images : dict
+        Image index by the identity of its array, of those that are embedded already; added to.
+    extensions : set of str
+        Extensions in use; added to.
+    """
+    surface: Json = {
+        "baseColorFactor": [min(max(float(v), 0.0), 1.0) for v in material.base_colour],
+        "metallicFactor": min(max(float(material.metallic), 0.0), 1.0),
+        "roughnessFactor": min(max(float(material.roughness), 0.0), 1.0),
+    }
+    result: Json = {"name": material.name, "pbrMetallicRoughness": surface}
+    if material.base_colour_texture is not None:
+        surface["baseColorTexture"] = _texture(packer, material.base_colour_texture, images, extensions)
+    if any(material.emission):
+        # Factors end at 1; what is brighter goes into the strength.
+        strength = max(1.0, *map(float, material.emission))
+        result["emissiveFactor"] = [max(float(v), 0.0) / strength for v in material.emission]
+        if strength > 1.0:
+            extensions.add("KHR_materials_emissive_strength")
+            result["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+        if material.emission_texture is not None:
+            result["emissiveTexture"] = _texture(packer, material.emission_texture, images, extensions)
+    if material.double_sided:
+        result["doubleSided"] = True
+    if material.alpha_mode != "OPAQUE":
+        result["alphaMode"] = material.alpha_mode
+    if material.alpha_mode == "MASK":
+        result["alphaCutoff"] = float(material.alpha_cutoff)
+    return result
+
+
+def _texture(packer: Packer, texture: Texture, images: dict[int, int], extensions: set[str]) -> Json:
+    """Embed a texture and return what a material says of it."""
+    document = packer.document
+    if id(texture.image) not in images:
+        pixels = texture.image
+        if pixels.dtype != np.uint8:
+            alpha = np.rint(np.clip(pixels[..., 3:], 0, 1) * 255).astype(np.uint8)
+            pixels = np.concatenate([srgb_levels(pixels[..., :3]), alpha], axis=-1)
+        view = packer.add_bytes(encode_png(pixels))
+        document.setdefault("images", []).append({"bufferView": view, "mimeType": "image/png"})
+        images[id(texture.image)] = len(document["images"]) - 1
+    sampler = {"wrapS": _WRAP[texture.wrap[0]], "wrapT": _WRAP[texture.wrap[1]]}
+    if texture.nearest:
+        sampler["magFilter"] = _NEAREST
+    samplers = document.setdefault("samplers", [])
+    if sampler not in samplers:
+        samplers.append(sampler)
+    document.setdefault("textures", []).append(
+        {"sampler": samplers.index(sampler), "source": images[id(texture.image)]}
+    )
+    info: Json = {"index": len(document["textures"]) - 1}
+    if texture.texcoord:
+        info["texCoord"] = texture.texcoord
+    if not np.array_equal(texture.transform, np.eye(2, 3)):
+        extensions.add("KHR_texture_transform")
+        info["extensions"] = {"KHR_texture_transform": _texture_transform(texture.transform)}
+    return info
+
+
+def _texture_transform(matrix: NDArray[np.float64]) -> Json:
+    """Split (2, 3) into offset, rotation and scale: the matrix is T R S with R = [[c, s], [-s, c]]."""
+    (a, b, x), (c, d, y) = matrix.tolist()
+    angle = math.atan2(-c, a)
+    scale = [math.hypot(a, c), d * math.cos(angle) + b * math.sin(angle)]
+    return {"offset": [x, y], "rotation": angle, "scale": scale}
+
+
+def _light(light: PunctualLight) -> Json:
+    strength = max(*light.intensity, 1e-30)
+    result: Json = {
+        "type": light.kind,
+        "name": light.name,
+        "color": [float(v) / strength for v in light.intensity],
+        "intensity": float(strength),
+    }
+    if math.isfinite(light.range):
+        result["range"] = light.range
+    if light.kind == "spot":
+        result["spot"] = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
+    return result
+
+
+def _turn_from_minus_z(direction: tuple[float, float, float]) -> list[float]:
+    """Return the quaternion x, y, z, w that turns -Z, where glTF lights shine, into `direction`."""
+    x, y, z = (float(v) for v in np.asarray(direction) / np.linalg.norm(direction))
+    if z > 1.0 - 1e-12:
+        return [0.0, 1.0, 0.0, 0.0]
+    # Half-way quaternion: (u x v, 1 + u.v) with u = (0, 0, -1), normalised.
+    quaternion = np.array([y, -x, 0.0, 1.0 - z])
+    return [float(v) for v in quaternion / np.linalg.norm(quaternion)]

@@ -1,0 +1,243 @@
+"""Opens glTF 2.0 documents: JSON, buffers, and the bytes of images.
+
+A buffer or image that cannot be read is no error before something needs it.
+
+Based on: Khronos Group, glTF 2.0 Specification, sections 3.2 (asset) and 3.6 (buffers).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from baker.core.errors import InputError
+from baker.core.scene import SceneWarning
+from baker.io.gltf.chunks import MAGIC, Chunks, split_glb
+from baker.io.gltf.json import JsonObject
+from baker.io.gltf.uri import UriError, is_data, read_uri
+
+UNDERSTOOD = frozenset(
+    {
+        "KHR_lights_punctual",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_unlit",
+        "KHR_mesh_quantization",
+        "KHR_texture_transform",
+        "KHR_node_visibility",
+        "EXT_mesh_gpu_instancing",
+        "EXT_texture_webp",
+    }
+)
+# Change neither geometry nor base colour nor emission, which is all that a bake reads: safe to pass by.
+IRRELEVANT = frozenset(
+    {
+        "KHR_animation_pointer",
+        "KHR_materials_anisotropy",
+        "KHR_materials_clearcoat",
+        "KHR_materials_dispersion",
+        "KHR_materials_ior",
+        "KHR_materials_iridescence",
+        "KHR_materials_sheen",
+        "KHR_materials_specular",
+        "KHR_materials_variants",
+        "KHR_xmp_json_ld",
+    }
+)
+# The lists that scene.glb may add to, whether a bake reads them or not.
+_LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
+# Not applied, and told of each material that has it.
+_TOLD = frozenset({"KHR_materials_transmission"})
+_COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+@dataclass(frozen=True)
+class GltfDocument:
+    """A parsed document with its outside files read.
+
+    Attributes
+    ----------
+    root : JsonObject
+    buffers : tuple of bytes
+        Each cut to its `byteLength`; what there is of those in `buffer_faults`.
+    image_files : dict of int to bytes
+        Content of the images that have a URI, by image index.
+    buffer_faults, image_faults : dict of int to InputError
+        Why a buffer or an image's file cannot be used.
+    chunks : tuple of (int, bytes)
+        GLB chunks other than JSON and BIN.
+    sha256 : str
+        Over the scene file, then its outside buffers, then its outside images.
+    warnings : tuple of SceneWarning
+    """
+
+    root: JsonObject
+    buffers: tuple[bytes, ...]
+    image_files: dict[int, bytes]
+    buffer_faults: dict[int, InputError]
+    image_faults: dict[int, InputError]
+    chunks: tuple[tuple[int, bytes], ...]
+    folder: Path
+    sha256: str
+    warnings: tuple[SceneWarning, ...]
+
+    def view(self, index: int) -> tuple[bytes, int, int, int]:
+        """Return (buffer, byte offset, byte length, byte stride or 0) of a buffer view.
+
+        Raises
+        ------
+        InputError
+            If the view leaves its buffer, is compressed by an extension, or the buffer cannot be used.
+        """
+        view = self.root.children("bufferViews")[index]
+        for name in _COMPRESSED_VIEW:
+            if view.extension(name) is not None:
+                buffer = self.root.children("buffers")[view.index("buffer", len(self.buffers), "buffers")]
+                fallback = buffer.extension(name)
+                if fallback is not None and fallback.boolean("fallback", False):
+                    view.fail(
+                        f"the data is compressed with {name}, which is not understood; export without it"
+                    )
+        number = view.index("buffer", len(self.buffers), "buffers")
+        if number in self.buffer_faults:
+            raise self.buffer_faults[number]
+        data = self.buffers[number]
+        offset, length = view.integer("byteOffset", 0), view.integer("byteLength", minimum=1)
+        if offset + length > len(data):
+            view.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {len(data)} bytes")
+        return data, offset, length, view.integer("byteStride", 0)
+
+
+def open_document(path: Path, data: bytes) -> GltfDocument:
+    """Parse a .glb or .gltf file and read every file that it names.
+
+    Parameters
+    ----------
+    path : Path
+        For messages, and as the folder where relative URIs begin.
+    data : bytes
+        The file's content.
+
+    Raises
+    ------
+    InputError
+        For a broken container, JSON that is none, another version than 2.x, and a required extension that
+        is not understood.
+    """
+    file, folder = str(path), path.parent
+    chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
+    root = JsonObject(_parse_json(chunks.json, file), "", file)
+    _check_version(root)
+    for key in _LISTS:
+        root.children(key)
+    warnings = _check_extensions(root)
+    digest = hashlib.sha256(data)
+    buffers: list[bytes] = []
+    buffer_faults: dict[int, InputError] = {}
+    for i, buffer in enumerate(root.children("buffers")):
+        own = chunks.binary if i == 0 else None
+        content, fault = _read_buffer(buffer, own, folder, digest)
+        buffers.append(content)
+        if fault is not None:
+            buffer_faults[i] = fault
+    images: dict[int, bytes] = {}
+    image_faults: dict[int, InputError] = {}
+    for i, image in enumerate(root.children("images")):
+        try:
+            if "uri" in image:
+                images[i] = _read_file(image, folder, digest)
+        except InputError as error:
+            image_faults[i] = error
+    return GltfDocument(
+        root=root,
+        buffers=tuple(buffers),
+        image_files=images,
+        buffer_faults=buffer_faults,
+        image_faults=image_faults,
+        chunks=chunks.others,
+        folder=folder,
+        sha256=digest.hexdigest(),
+        warnings=tuple(warnings),
+    )
+
+
+def _parse_json(text: bytes, file: str) -> dict[str, Any]:
+    def no_constant(name: str) -> NoReturn:
+        raise ValueError(f"{name} is not a JSON number")
+
+    try:
+        value = json.loads(text.decode("utf-8-sig"), parse_constant=no_constant)
+    except RecursionError:
+        raise InputError("the JSON is nested too deeply", file=file) from None
+    except ValueError as error:  # JSONDecodeError and UnicodeDecodeError are ValueErrors
+        raise InputError(f"the file is not glTF: its JSON is broken ({error})", file=file) from None
+    if not isinstance(value, dict):
+        raise InputError("the file is not glTF: its JSON is not an object", file=file)
+    return value
+
+
+def _check_version(root: JsonObject) -> None:
+    if "asset" not in root:
+        root.fail("the file has no 'asset' member, so it is not glTF 2.0")
+    asset = root.child("asset")
+    for key in ("version", "minVersion"):
+        version = asset.string(key, "2.0") if key == "minVersion" else asset.string(key)
+        major, _, minor = version.partition(".")
+        if major != "2" or (key == "minVersion" and minor not in ("", "0")):
+            asset.fail(f"this is glTF {version}; only glTF 2.0 is read, so convert it first", key)
+
+
+def _check_extensions(root: JsonObject) -> list[SceneWarning]:
+    known = UNDERSTOOD | IRRELEVANT
+    for name in root.strings("extensionsRequired"):
+        if name not in known:
+            raise InputError(
+                f"the file requires the extension {name}, which is not understood; export without it",
+                file=root.file,
+                object=name,
+            )
+    return [
+        SceneWarning("extension-ignored", f"the extension {name} is not understood and was ignored", name)
+        for name in root.strings("extensionsUsed")
+        if name not in known | _TOLD
+    ]
+
+
+def _read_buffer(
+    buffer: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash
+) -> tuple[bytes, InputError | None]:
+    """Return a buffer's bytes, as many as there are, and why they cannot be used."""
+    data = b""
+    try:
+        length = buffer.integer("byteLength", minimum=1)
+        if "uri" in buffer:
+            data = _read_file(buffer, folder, digest)
+        elif chunk is not None:
+            data = chunk
+        else:
+            for name in _COMPRESSED_VIEW:
+                if buffer.extension(name) is not None:
+                    buffer.fail(
+                        f"the data is compressed with {name}, which is not understood; export without it"
+                    )
+            buffer.fail("the buffer has neither a uri nor a BIN chunk; export the file again")
+        if len(data) < length:
+            buffer.fail(f"the buffer is too short: byteLength is {length}, its data has {len(data)} bytes")
+    except InputError as error:
+        return data, error
+    return (data if len(data) == length else data[:length]), None
+
+
+def _read_file(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
+    """Return the bytes behind `holder`'s "uri"; those of a file are also added to `digest`."""
+    uri = holder.string("uri")
+    try:
+        data = read_uri(uri, folder)
+    except UriError as error:
+        holder.fail(str(error), "uri")
+    if not is_data(uri):
+        digest.update(data)
+    return data

@@ -1,0 +1,96 @@
+"""Makes nodes of EXT_mesh_gpu_instancing: each of its instances gets texels, and so a node, of its own.
+
+The nodes are appended to the document, below the node that has the extension; no index changes.
+
+Based on: EXT_mesh_gpu_instancing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from baker.core.errors import InputError
+from baker.io.gltf.accessor import read_accessor
+from baker.io.gltf.document import GltfDocument
+from baker.io.gltf.json import JsonObject
+
+INSTANCING = "EXT_mesh_gpu_instancing"
+_MEMBERS = {
+    "TRANSLATION": ("VEC3", "translation"),
+    "ROTATION": ("VEC4", "rotation"),
+    "SCALE": ("VEC3", "scale"),
+}
+
+
+def spread_instances(document: GltfDocument) -> None:
+    """Replace the extension by child nodes, in the document itself; nodes whose data is broken keep it."""
+    root = document.root.value
+    if INSTANCING not in root.get("extensionsUsed", []) and INSTANCING not in root.get(
+        "extensionsRequired", []
+    ):
+        return
+    nodes = document.root.children("nodes")
+    left = False
+    for index, node in enumerate(nodes):
+        try:
+            if "mesh" in node and node.extension(INSTANCING) is not None:
+                _spread(document, node, index)
+        except InputError:
+            left = True
+    document.root.forget("nodes")
+    if not left:
+        for key in ("extensionsUsed", "extensionsRequired"):
+            if INSTANCING in root.get(key, []):
+                root[key] = [name for name in root[key] if name != INSTANCING]
+                if not root[key]:
+                    del root[key]
+
+
+def refuse_broken(document: GltfDocument, node: JsonObject) -> None:
+    """Raise `InputError` for a node whose instances could not be read."""
+    if "mesh" in node and node.extension(INSTANCING) is not None:
+        _members(document, node)
+
+
+def _members(document: GltfDocument, node: JsonObject) -> list[dict[str, Any]]:
+    """Return the translation, rotation and scale of each instance of a node, as members of nodes."""
+    extension = node.extension(INSTANCING)
+    assert extension is not None
+    attributes, accessors = extension.child("attributes"), document.root.children("accessors")
+    columns = {}
+    for key, (kind, member) in _MEMBERS.items():
+        if key in attributes:
+            at = attributes.index(key, len(accessors), "accessors")
+            value = read_accessor(document, at, types=(kind,)).astype(np.float64)
+            if not np.isfinite(value).all():
+                attributes.fail("a number is not finite", key)
+            columns[member] = value
+    counts = {len(value) for value in columns.values()}
+    if len(counts) > 1:
+        attributes.fail("its accessors have different numbers of rows")
+    count = counts.pop() if counts else _count(document, attributes)
+    return [{member: value[k].tolist() for member, value in columns.items()} for k in range(count)]
+
+
+def _count(document: GltfDocument, attributes: JsonObject) -> int:
+    """Return the number of instances that only have attributes of an application."""
+    accessors = document.root.children("accessors")
+    for key in attributes.value:
+        return accessors[attributes.index(key, len(accessors), "accessors")].integer("count", minimum=1)
+    return 0
+
+
+def _spread(document: GltfDocument, node: JsonObject, index: int) -> None:
+    members = _members(document, node)
+    value, nodes = node.value, document.root.value["nodes"]
+    name = node.string("name", f"node_{index}")
+    first = len(nodes)
+    for k, place in enumerate(members):
+        nodes.append({"name": f"{name}_{k}", "mesh": value["mesh"], **place})
+    value["children"] = [*node.indices("children", first, "nodes"), *range(first, len(nodes))]
+    del value["mesh"]
+    del value["extensions"][INSTANCING]
+    if not value["extensions"]:
+        del value["extensions"]

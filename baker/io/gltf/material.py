@@ -1,0 +1,214 @@
+"""Reads glTF materials: base colour, emission, metallic and roughness, sidedness, alpha, and textures.
+
+uv_image = T R S uv, KHR_texture_transform; L = emissiveFactor x texture x emissiveStrength.
+
+Based on: Khronos Group, glTF 2.0 Specification, section 3.9; KHR_texture_transform; KHR_materials_unlit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Material, SceneWarning, Texture
+from baker.io.gltf.document import GltfDocument
+from baker.io.gltf.json import JsonObject
+from baker.io.gltf.surface import read_surface
+from baker.io.gltf.unread import image_bytes, unreadable_textures
+from baker.io.images import decode_image
+
+DEFAULT_MATERIAL = Material(name="default")
+# Sets above this number are a broken file, not a mesh that somebody made.
+MOST_TEXCOORDS = 16
+_WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+# Values of a sampler's magFilter.
+_NEAREST, _LINEAR = 9728, 9729
+_ALPHA = ("OPAQUE", "MASK", "BLEND")
+
+
+class MaterialReader:
+    """Reads the materials of a file when a surface needs them.
+
+    Parameters
+    ----------
+    document : GltfDocument
+    reflections : bool
+        Also decode textures that only say how mirror-like a surface is.
+
+    Attributes
+    ----------
+    materials : list of Material
+        In the file's order. Those that no surface has needed so far are plain.
+    warnings : list of SceneWarning
+    told : set of int
+        Images that the warnings name.
+    """
+
+    def __init__(self, document: GltfDocument, *, reflections: bool = False) -> None:
+        self._document = document
+        self._reflections = reflections
+        self._images: dict[int, NDArray[np.uint8]] = {}
+        self._unread = document.root.children("materials")
+        self.materials = [Material(name=_name(m, i)) for i, m in enumerate(self._unread)]
+        self._read: set[int] = set()
+        self.warnings: list[SceneWarning] = []
+        self.told: set[int] = set()
+
+    def need(self, number: int) -> Material:
+        """Return a material; the number behind the last one is glTF's default material.
+
+        Raises
+        ------
+        InputError
+            For values of a wrong type or out of range, and textures of base colour or emission that cannot
+            be read.
+        """
+        if number == len(self._unread):
+            if len(self.materials) == number:
+                self.materials.append(DEFAULT_MATERIAL)
+        elif number not in self._read:
+            self._read.add(number)
+            self.materials[number] = self._material(self._unread[number], number)
+        return self.materials[number]
+
+    def _material(self, material: JsonObject, number: int) -> Material:
+        name = material.string("name", f"material_{number}")
+        unlit = material.extension("KHR_materials_unlit") is not None
+        surface = read_surface(material, name, self.warnings)
+        emission = material.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))
+        if min(surface.colour) < 0 or min(emission) < 0:
+            material.fail("a colour factor is negative")
+        glow = material.extension("KHR_materials_emissive_strength")
+        strength = glow.number("emissiveStrength", 1.0, low=0.0) if glow is not None else 1.0
+        # An unlit surface shows its base colour and nothing else; here that colour reflects.
+        strength = 0.0 if unlit else strength
+        mode = material.string("alphaMode", "OPAQUE")
+        if mode not in _ALPHA:
+            material.fail(f"'{mode[:20]}' is none of {', '.join(_ALPHA)}", "alphaMode")
+        through = material.extension("KHR_materials_transmission")
+        if mode == "OPAQUE" and through is not None and through.number("transmissionFactor", 0.0) > 0:
+            message = (
+                f"the material '{name}' transmits light (KHR_materials_transmission), which a bake does not "
+                "read: it blocks light; let light through with alphaMode BLEND and an alpha below 1"
+            )
+            self.warnings.append(SceneWarning("transmission", message, name))
+        read = {(surface.holder.where, surface.texture)}
+        needs_glow = strength > 0 and max(emission) > 0
+        if needs_glow:
+            read.add((material.where, "emissiveTexture"))
+        self.warnings += unreadable_textures(self._document, material, name, read, self.told)
+        return Material(
+            name=name,
+            base_colour=surface.colour,
+            base_colour_texture=self._texture(surface.holder, surface.texture),
+            emission=(emission[0] * strength, emission[1] * strength, emission[2] * strength),
+            emission_texture=(
+                None if unlit else self._texture(material, "emissiveTexture", needed=needs_glow)
+            ),
+            double_sided=material.boolean("doubleSided", False),
+            alpha_mode=mode,
+            alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0),
+            metallic=surface.metallic,
+            roughness=surface.roughness,
+            metallic_roughness_texture=(
+                self._texture(surface.holder, "metallicRoughnessTexture", needed=False)
+                if self._reflections
+                else None
+            ),
+        )
+
+    def _texture(self, holder: JsonObject, key: str, *, needed: bool = True) -> Texture | None:
+        try:
+            return _texture(self._document, holder, key, self._images)
+        except InputError:
+            if needed:
+                raise
+            return None
+
+
+def _name(material: JsonObject, number: int) -> str:
+    """Return the name of a material that may be broken: nothing may need it."""
+    try:
+        return material.string("name", f"material_{number}")
+    except InputError:
+        return f"material_{number}"
+
+
+def _texture(
+    document: GltfDocument, holder: JsonObject, key: str, images: dict[int, NDArray[np.uint8]]
+) -> Texture | None:
+    if key not in holder:
+        return None
+    info = holder.child(key)
+    textures = document.root.children("textures")
+    texture = textures[info.index("index", len(textures), "textures")]
+    image = _image(document, texture, images)
+    texcoord = info.integer("texCoord", 0)
+    transform = np.eye(2, 3)
+    moved = info.extension("KHR_texture_transform")
+    if moved is not None:
+        texcoord = moved.integer("texCoord", texcoord)
+        transform = texture_transform(
+            moved.numbers("offset", 2, (0.0, 0.0)),
+            moved.number("rotation", 0.0),
+            moved.numbers("scale", 2, (1.0, 1.0)),
+        )
+    if texcoord >= MOST_TEXCOORDS:
+        info.fail(f"set {texcoord} is not read; there may be {MOST_TEXCOORDS}", "texCoord")
+    return Texture(image, texcoord, transform, *_sampler(document, texture))
+
+
+def texture_transform(
+    offset: tuple[float, ...], rotation: float, scale: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Return KHR_texture_transform as a (2, 3) matrix, image uv from mesh uv.
+
+    Parameters
+    ----------
+    offset, scale : (2,) tuple
+    rotation : float
+        Radians, counter-clockwise as seen on the image, whose v points down.
+
+    Notes
+    -----
+    The extension's text, its example of a turned quadrant and its test model agree on
+    u' = u cos + v sin, v' = -u sin + v cos; its GLSL lines, read as column-major, turn the other way.
+    """
+    c, s = math.cos(rotation), math.sin(rotation)
+    return np.array(
+        [[c * scale[0], s * scale[1], offset[0]], [-s * scale[0], c * scale[1], offset[1]]], np.float64
+    )
+
+
+def _sampler(document: GltfDocument, texture: JsonObject) -> tuple[tuple[str, str], bool]:
+    """Return wrap modes along u and v, and whether magnified texels are not interpolated."""
+    if "sampler" not in texture:
+        return ("repeat", "repeat"), False
+    samplers = document.root.children("samplers")
+    sampler = samplers[texture.index("sampler", len(samplers), "samplers")]
+    modes = []
+    for key in ("wrapS", "wrapT"):
+        code = sampler.integer(key, 10497)
+        if code not in _WRAP:
+            sampler.fail(f"{code} is not a wrap mode; known are {', '.join(map(str, _WRAP))}", key)
+        modes.append(_WRAP[code])
+    return (modes[0], modes[1]), sampler.integer("magFilter", _LINEAR) == _NEAREST
+
+
+def _image(
+    document: GltfDocument, texture: JsonObject, images: dict[int, NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
+    known = document.root.children("images")
+    source = texture.extension("EXT_texture_webp") or texture
+    if "source" not in source:
+        names = ", ".join(texture.child_or_empty("extensions").value)
+        texture.fail(f"the texture has no image that can be read ({names or 'source is missing'})")
+    number = source.index("source", len(known), "images")
+    if number not in images:
+        images[number] = decode_image(
+            image_bytes(document, number), file=known[number].file, object=known[number].where
+        )
+    return images[number]

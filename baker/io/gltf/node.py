@@ -1,0 +1,117 @@
+"""Walks a glTF node hierarchy and gives every node its world matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.io.gltf.json import JsonObject
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A node of the chosen scene.
+
+    Attributes
+    ----------
+    index : int
+    json : JsonObject
+    matrix : (4, 4) float64, world from node
+    """
+
+    index: int
+    json: JsonObject
+    matrix: NDArray[np.float64]
+
+
+def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Placed]:
+    """Return all nodes below `roots`, parents first, in the file's order of children.
+
+    Nodes that KHR_node_visibility hides are left out with all that is below them.
+
+    Parameters
+    ----------
+    nodes : sequence of JsonObject
+        All nodes of the file; those that no root leads to may be broken.
+    roots : sequence of int
+        The scene's own nodes.
+
+    Raises
+    ------
+    InputError
+        If nodes form a cycle, a node has two places, or a matrix is not a finite affine map.
+    """
+    placed: list[Placed] = []
+    parent: dict[int, int | None] = {}
+    waiting: list[tuple[int, int | None, NDArray[np.float64]]] = [
+        (k, None, np.eye(4)) for k in reversed(roots)
+    ]
+    while waiting:
+        index, above, outer = waiting.pop()
+        if index in parent:
+            _refuse_second_place(nodes, parent, index, above)
+        parent[index] = above
+        visibility = nodes[index].extension("KHR_node_visibility")
+        if visibility is not None and not visibility.boolean("visible", True):
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix = outer @ local_matrix(nodes[index])
+        if not np.isfinite(matrix).all():
+            nodes[index].fail("the node's place in the world is not finite")
+        placed.append(Placed(index, nodes[index], matrix))
+        children = nodes[index].indices("children", len(nodes), "nodes")
+        waiting += [(k, index, matrix) for k in reversed(children)]
+    return placed
+
+
+def _refuse_second_place(
+    nodes: Sequence[JsonObject], parent: dict[int, int | None], index: int, above: int | None
+) -> NoReturn:
+    """Say whether a node is met again because nodes form a cycle, or because two others hold it."""
+    ring: list[int] = []
+    at = above
+    while at is not None:
+        ring.append(at)
+        if at == index:
+            downwards = [str(k) for k in (*reversed(ring), index)]
+            shown = " -> ".join(downwards if len(downwards) < 9 else [*downwards[:7], "..."])
+            nodes[index].fail(f"the nodes form a cycle ({shown}); a node may not be below itself")
+        at = parent[at]
+    first = parent[index]
+    if first is None or above is None:
+        nodes[index].fail("the node is used twice in the scene; a node may have one place only")
+    nodes[index].fail(f"the node is used twice: below node {first} and below node {above}")
+
+
+def local_matrix(node: JsonObject) -> NDArray[np.float64]:
+    """Return a node's own (4, 4) float64 matrix, from `matrix` or from T R S.
+
+    Raises
+    ------
+    InputError
+        For a rotation of no length, or a matrix that is not affine.
+    """
+    if "matrix" in node:
+        matrix = np.array(node.numbers("matrix", 16), np.float64).reshape(4, 4).T
+        if np.abs(matrix[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-6:
+            node.fail("the matrix is not affine: its last row must be 0 0 0 1", "matrix")
+        matrix[3] = (0.0, 0.0, 0.0, 1.0)
+        return matrix
+    turn = np.array(node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0)), np.float64)
+    length = float(np.sqrt((turn * turn).sum()))
+    if not 1e-6 < length < 1e6:
+        node.fail("the rotation is not a unit quaternion", "rotation")
+    x, y, z, w = (float(v) for v in turn / length)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= node.numbers("scale", 3, (1.0, 1.0, 1.0))
+    matrix[:3, 3] = node.numbers("translation", 3, (0.0, 0.0, 0.0))
+    return matrix

@@ -1,0 +1,372 @@
+"""Packs a glTF document and all its data into one GLB file.
+
+No accessor or buffer view is ever renumbered, because an extension that baker does not know may name it
+by its index. Data that is replaced frees its place in the lists, and new data takes the free places first.
+
+Based on: Khronos Group, glTF 2.0 specification, 3.6 Binary Data Storage and 4 GLB File Format.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import math
+import struct
+import sys
+from collections.abc import Iterator
+from typing import Any, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import ResourceError
+from baker.io.gltf.chunks import CHUNK_BIN, CHUNK_JSON
+
+Json = dict[str, Any]
+
+ARRAY_BUFFER = 34962
+ELEMENT_ARRAY_BUFFER = 34963
+
+COMPONENT: dict[int, np.dtype[Any]] = {
+    5120: np.dtype("<i1"), 5121: np.dtype("<u1"), 5122: np.dtype("<i2"),
+    5123: np.dtype("<u2"), 5125: np.dtype("<u4"), 5126: np.dtype("<f4"),
+}  # fmt: skip
+
+# Extensions that are known to name no accessor and no buffer view.
+_NO_DATA = (
+    "KHR_materials_", "KHR_lights_punctual", "KHR_texture_", "EXT_texture_", "MSFT_texture_dds",
+    "KHR_mesh_quantization", "KHR_xmp",
+)  # fmt: skip
+
+
+def is_index(value: object) -> TypeGuard[int]:
+    """Tell whether a JSON value may be an index."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def objects(document: Json, key: str) -> Iterator[tuple[int, Json]]:
+    """List the objects under `key` with their numbers; a document may be broken where nothing is baked."""
+    items = document.get(key)
+    if isinstance(items, list):
+        yield from ((number, item) for number, item in enumerate(items) if isinstance(item, dict))
+
+
+class Packer:
+    """Holds a document under construction and the bytes of its one buffer.
+
+    Parameters
+    ----------
+    document : dict
+        glTF JSON; it is changed in place. Its primitives no longer name the accessors in `replaced`.
+    buffers : tuple of bytes
+        The buffers that the document's views point into.
+    replaced : set of int
+        Accessors that primitives have given up; those that nothing else may use are dropped.
+    missing : set of int
+        Buffers that cannot be read: they stay beside the one buffer as the document names them.
+
+    Attributes
+    ----------
+    chunks : tuple of (int, bytes)
+        Further GLB chunks, kind and content, that follow the buffer.
+    """
+
+    def __init__(
+        self,
+        document: Json,
+        buffers: tuple[bytes, ...] = (),
+        replaced: frozenset[int] = frozenset(),
+        *,
+        missing: frozenset[int] = frozenset(),
+    ) -> None:
+        self.document = document
+        self.chunks: tuple[tuple[int, bytes], ...] = ()
+        self._missing = [item for k, item in enumerate(document.get("buffers", [])) if k in missing]
+        self._accessors: list[Json] = document.get("accessors", [])
+        self._views: list[Json] = document.get("bufferViews", [])
+        self._cache: dict[tuple[bytes, str], int] = {}
+        self._free_accessors, self._free_views = _unused(document, replaced)
+        self._chunks, self._length = _merge(self._views, buffers, self._free_views, sorted(missing))
+
+    def add_bytes(self, data: bytes, **keys: Any) -> int:
+        """Append `data` in a buffer view of its own and return the view's index."""
+        view = {"buffer": 0, "byteOffset": self._length, "byteLength": len(data), **keys}
+        padded = data + b"\0" * (-len(data) % 4)
+        self._chunks.append(padded)
+        self._length += len(padded)
+        return _place(self._views, self._free_views, view)
+
+    def add_rows(self, rows: NDArray[np.uint8], like: Json, *, bounds: bool = False) -> int:
+        """Add a vertex attribute and return its accessor.
+
+        Parameters
+        ----------
+        rows : (N, B) uint8
+            The raw bytes of each element.
+        like : dict
+            Accessor whose component type, type, normalisation, name and extras the new one takes over.
+        bounds : bool
+            Write `min` and `max` even if `like` has none.
+
+        Returns
+        -------
+        int
+        """
+        size = rows.shape[1]
+        # Vertex data must start at multiples of four bytes.
+        padded = np.pad(rows, ((0, 0), (0, -size % 4)))
+        keep = {key: value for key, value in like.items() if key not in _OWN_KEYS}
+        accessor: Json = {**copy.deepcopy(keep), "count": len(rows)}
+        if (bounds or "min" in like) and not like["type"].startswith("MAT"):
+            accessor.update(_bounds(rows, COMPONENT[like["componentType"]]))
+        stride = {"byteStride": padded.shape[1]} if size % 4 else {}
+        return self._add(padded.tobytes(), accessor, {"target": ARRAY_BUFFER, **stride})
+
+    def add_floats(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
+        """Add a float vertex attribute (N, 2 to 4) and return its accessor."""
+        like = {"componentType": 5126, "type": f"VEC{values.shape[1]}"}
+        data = np.ascontiguousarray(values, "<f4")
+        return self.add_rows(data.view(np.uint8).reshape(len(data), -1), like, bounds=bounds)
+
+    def add_indices(self, triangle: NDArray[np.integer[Any]]) -> int:
+        """Add triangle corners (T, 3) in the smallest type that all engines read, return the accessor.
+
+        Eight bit indices are legal but slow or refused on current graphics interfaces, and the type's
+        highest number means "restart" to them, so 16 bit goes up to 65534.
+        """
+        kind = 5123 if int(triangle.max(initial=0)) < 65535 else 5125
+        data = triangle.ravel().astype(COMPONENT[kind]).tobytes()
+        accessor = {"componentType": kind, "count": triangle.size, "type": "SCALAR"}
+        return self._add(data, accessor, {"target": ELEMENT_ARRAY_BUFFER})
+
+    def glb(self) -> bytes:
+        """Return the whole file; the packer is not to be used afterwards.
+
+        Raises
+        ------
+        ResourceError
+            If it is too large for the format.
+        """
+        _tidy(self._accessors, self._free_accessors, {"componentType": 5126, "count": 1, "type": "SCALAR"})
+        _tidy(self._views, self._free_views, {"buffer": 0, "byteOffset": 0, "byteLength": 4})
+        for key, items in (("accessors", self._accessors), ("bufferViews", self._views)):
+            if items:
+                self.document[key] = items
+            else:
+                self.document.pop(key, None)
+        binary = b"".join(self._chunks) or b"\0" * (4 * bool(self._missing))
+        if binary:
+            whole = [b for _, b in objects(self.document, "buffers") if b not in self._missing]
+            first = whole[0] if whole else {}
+            kept = {key: value for key, value in first.items() if key not in ("uri", "byteLength")}
+            self.document["buffers"] = [{**kept, "byteLength": len(binary)}, *self._missing]
+        else:
+            self.document.pop("buffers", None)
+        text = _dump(self.document)
+        text += b" " * (-len(text) % 4)
+        parts = [struct.pack("<II", len(text), CHUNK_JSON), text]
+        if binary:
+            parts += [struct.pack("<II", len(binary), CHUNK_BIN), binary]
+        for kind, data in self.chunks:
+            padded = data + b"\0" * (-len(data) % 4)
+            parts += [struct.pack("<II", len(padded), kind), padded]
+        total = 12 + sum(map(len, parts))
+        if total >= 2**32:
+            raise ResourceError(
+                f"the scene takes {total / 2**30:.1f} GiB, but GLB files end at 4; split the scene"
+            )
+        return struct.pack("<III", 0x46546C67, 2, total) + b"".join(parts)
+
+    def _add(self, data: bytes, accessor: Json, keys: Json) -> int:
+        """Add an accessor with a view of its own, or return an equal one added before."""
+        name = (hashlib.sha256(data).digest(), json.dumps([accessor, keys], sort_keys=True))
+        if name not in self._cache:
+            view = self.add_bytes(data, **keys)
+            self._cache[name] = _place(
+                self._accessors, self._free_accessors, {"bufferView": view, **accessor}
+            )
+        return self._cache[name]
+
+
+def _dump(document: Json) -> bytes:
+    try:
+        return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    except ValueError:
+        # Numbers like 1e999 in extras: legal JSON, but beyond what Python can say again.
+        return json.dumps(_finite(document), separators=(",", ":"), allow_nan=False).encode()
+
+
+def _finite(node: Any) -> Any:
+    """Return a JSON value with infinite numbers replaced by the largest ones."""
+    if isinstance(node, dict):
+        return {key: _finite(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_finite(value) for value in node]
+    if isinstance(node, float) and math.isinf(node):
+        return math.copysign(sys.float_info.max, node)
+    return node
+
+
+_OWN_KEYS = {"bufferView", "byteOffset", "count", "sparse", "min", "max"}
+
+
+def primitive_accessors(primitive: Json) -> Iterator[int]:
+    """List the accessors that a primitive names."""
+    targets = primitive.get("targets")
+    holders = [primitive.get("attributes"), *(targets if isinstance(targets, list) else [])]
+    for holder in holders:
+        if isinstance(holder, dict):
+            yield from filter(is_index, holder.values())
+    if is_index(primitive.get("indices")):
+        yield primitive["indices"]
+
+
+def _bounds(rows: NDArray[np.uint8], dtype: np.dtype[Any]) -> Json:
+    """Return the accessor's min and max, nothing if it holds numbers that JSON cannot."""
+    values = np.ascontiguousarray(rows).view(dtype)
+    if not len(values) or not np.isfinite(values).all():
+        return {}
+    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+
+
+def _place(items: list[Json], free: list[int], item: Json) -> int:
+    """Put `item` in the first free place of the list, or at its end."""
+    if free:
+        index = free.pop(0)
+        items[index] = item
+        return index
+    items.append(item)
+    return len(items) - 1
+
+
+def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
+    """Take free places off the end of the list and put a harmless item in those between."""
+    while free and free[-1] == len(items) - 1:
+        free.pop()
+        items.pop()
+    for index in free:
+        items[index] = dict(blank)
+
+
+def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
+    """Find which replaced accessors, and which views of theirs, nothing else may name."""
+    used: set[int] = set()
+    for _, mesh in objects(document, "meshes"):
+        for _, primitive in objects(mesh, "primitives"):
+            used.update(primitive_accessors(primitive))
+    for _, skin in objects(document, "skins"):
+        used.update(filter(is_index, [skin.get("inverseBindMatrices")]))
+    for _, animation in objects(document, "animations"):
+        for _, sampler in objects(animation, "samplers"):
+            used.update(filter(is_index, [sampler.get("input"), sampler.get("output")]))
+    named = set(_numbers(document, False))
+    accessors = document.get("accessors", [])
+    free = sorted(index for index in replaced - used - named if index < len(accessors))
+    gone = set(free)
+    views = {view for index in free for view in _views_of(accessors[index])}
+    kept = {
+        view
+        for index, item in objects(document, "accessors")
+        if index not in gone
+        for view in _views_of(item)
+    }
+    kept.update(
+        image["bufferView"] for _, image in objects(document, "images") if is_index(image.get("bufferView"))
+    )
+    extended = {index for index, view in objects(document, "bufferViews") if view.get("extensions")}
+    known = len(document.get("bufferViews", []))
+    return free, sorted(view for view in views - kept - named - extended if view < known)
+
+
+def _views_of(accessor: Any) -> Iterator[int]:
+    if not isinstance(accessor, dict):
+        return
+    sparse = accessor.get("sparse")
+    holders = [accessor]
+    if isinstance(sparse, dict):
+        holders += [sparse.get("indices", {}), sparse.get("values", {})]
+    for holder in holders:
+        if isinstance(holder, dict) and is_index(holder.get("bufferView")):
+            yield holder["bufferView"]
+
+
+def _numbers(node: Any, collect: bool) -> Iterator[int]:
+    """List every whole number inside extensions that might be the index of an accessor or a view."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key == "extensions" and isinstance(value, dict):
+                for name, extension in value.items():
+                    yield from _numbers(extension, not name.startswith(_NO_DATA))
+            else:
+                yield from _numbers(value, collect)
+    elif isinstance(node, list):
+        for value in node:
+            yield from _numbers(value, collect)
+    elif collect and isinstance(node, int) and not isinstance(node, bool):
+        yield node
+
+
+def _merge(
+    views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
+) -> tuple[list[bytes], int]:
+    """Join all buffers without the bytes that only free views cover, and move the views along.
+
+    Views of missing buffers follow theirs, which come behind the joined one.
+    """
+    gone = set(free)
+    chunks: list[bytes] = []
+    length = 0
+    holders = [(index, view) for index, view in enumerate(views) if isinstance(view, dict)]
+    # Compressed views say once more, in their extension, where their bytes are.
+    holders += [
+        (-1, extension)
+        for _, view in holders
+        for extension in _extensions(view)
+        if isinstance(extension, dict) and "buffer" in extension
+    ]
+    moved: list[tuple[Json, int]] = []
+    for number, data in enumerate(buffers):
+        if number in missing:
+            continue
+        words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
+        drop = np.zeros(len(words), bool)
+        # A view that is no part of its buffer is one that nothing needs: it is left as it is.
+        mine = [
+            (index, holder, span)
+            for index, holder in holders
+            if holder.get("buffer") == number and (span := _span(holder, len(data))) is not None
+        ]
+        for index, _, (start, end) in mine:
+            if index in gone:
+                drop[-(-start // 4) : end // 4] = True
+        for index, _, (start, end) in mine:
+            if index not in gone:
+                drop[start // 4 : -(-end // 4)] = False
+        before = np.concatenate([[0], np.cumsum(drop, dtype=np.int64)])
+        for index, holder, (start, _) in mine:
+            if index not in gone:
+                moved.append((holder, length + start - 4 * int(before[start // 4])))
+        chunks.append(words[~drop].tobytes() if drop.any() else words.tobytes())
+        length += len(chunks[-1])
+    for _, holder in holders:
+        if holder.get("buffer") in missing:
+            holder["buffer"] = 1 + missing.index(holder["buffer"])
+    for holder, offset in moved:
+        holder["buffer"] = 0
+        if offset or "byteOffset" in holder:
+            holder["byteOffset"] = offset
+    return chunks, length
+
+
+def _extensions(holder: Json) -> list[Any]:
+    extensions = holder.get("extensions")
+    return list(extensions.values()) if isinstance(extensions, dict) else []
+
+
+def _span(view: Json, size: int) -> tuple[int, int] | None:
+    """Return the first and the last byte (exclusive) of a view, or None if it is not within its buffer."""
+    start, length = view.get("byteOffset", 0), view.get("byteLength")
+    if not is_index(start) or not is_index(length) or start + length > size:
+        return None
+    return start, start + length

@@ -1,0 +1,90 @@
+"""Reads the vertices of glTF primitives as raw bytes, and says which primitives must not be written anew.
+
+A primitive is written anew only if every byte of it is understood: its vertices may be put in another order,
+and nothing else in the file may count them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import SourceDocument
+from baker.io.gltf.accessor_bytes import gather_rows
+from baker.io.gltf.packer import Json, objects
+
+# Extensions of primitives and meshes that neither hold nor count vertices.
+_HARMLESS = frozenset({"KHR_materials_variants"})
+_FLOAT = 5126
+_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
+    """Return each vertex attribute of a primitive, (V, B) uint8 by name, for comparison.
+
+    They are the bytes of the file, but for -0 among floats, which has become 0. An attribute with fewer
+    elements than POSITION is left out.
+
+    Raises
+    ------
+    InputError
+        If an accessor's data cannot be read.
+    """
+    accessors = source.json["accessors"]
+    rows = np.arange(accessors[primitive["attributes"]["POSITION"]]["count"], dtype=np.int32)
+    column = {}
+    for name, index in primitive["attributes"].items():
+        if accessors[index]["count"] < len(rows):
+            continue
+        data = gather_rows(source.json, source.buffers, index, rows)
+        if accessors[index]["componentType"] == _FLOAT and not name.startswith("_"):
+            data = (np.ascontiguousarray(data).view("<f4") + np.float32(0.0)).view(np.uint8)
+        column[name] = data
+    return column
+
+
+def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
+    """Say why a primitive must stay as it is, as the end of a sentence; empty if it may be written anew.
+
+    Parameters
+    ----------
+    source : SourceDocument
+    mesh : int
+        Index of its mesh in the file.
+    primitive : dict
+    """
+    document = source.json
+    holder = document["meshes"][mesh]
+    for name in _COMPRESSED:
+        if name in primitive.get("extensions", {}) or _views_have(document, primitive, name):
+            return f"it is compressed with {name}"
+    if primitive.get("targets"):
+        return "it has morph targets"
+    skinned = any("skin" in node and node.get("mesh") == mesh for _, node in objects(document, "nodes"))
+    if skinned or any(name.startswith("JOINTS_") for name in primitive["attributes"]):
+        return "it is skinned"
+    count = document["accessors"][primitive["attributes"]["POSITION"]]["count"]
+    for name, index in primitive["attributes"].items():
+        if document["accessors"][index]["count"] < count:
+            return f"its attribute {name} has fewer elements than POSITION; export it again"
+    named = [*primitive["attributes"].values(), *([primitive["indices"]] if "indices" in primitive else [])]
+    if any("sparse" in document["accessors"][index] for index in named):
+        return "it is stored as a sparse accessor"
+    extended = [document["accessors"][index] for index in named]
+    for thing in (primitive, holder, *extended):
+        unknown = [name for name in thing.get("extensions", {}) if name not in _HARMLESS]
+        if unknown:
+            return f"its extension {unknown[0]} is not understood"
+    return ""
+
+
+def _views_have(document: dict[str, Any], primitive: Json, name: str) -> bool:
+    views = document.get("bufferViews", [])
+    indices = [primitive["indices"]] if "indices" in primitive else []
+    for index in (*primitive["attributes"].values(), *indices):
+        view = document["accessors"][index].get("bufferView")
+        if view is not None and name in views[view].get("extensions", {}):
+            return True
+    return False

@@ -1,0 +1,105 @@
+"""Finds what gives a glTF material its base colour: metallic-roughness, specular-glossiness, or neither.
+
+base colour = baseColorFactor x baseColorTexture, or diffuseFactor x diffuseTexture where
+KHR_materials_pbrSpecularGlossiness stands: by its text it takes the place of pbrMetallicRoughness for whoever
+understands it.
+
+Based on: Khronos Group, glTF 2.0 Specification, section 3.9.2; KHR_materials_pbrSpecularGlossiness.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from baker.core.scene import SceneWarning
+from baker.io.gltf.document import IRRELEVANT, UNDERSTOOD
+from baker.io.gltf.json import JsonObject
+
+# What a material reflects whose model is not understood.
+UNKNOWN_ALBEDO = 0.5
+_GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+# Extensions that add to pbrMetallicRoughness: without a base colour theirs is glTF's white.
+_LAYERS = (
+    UNDERSTOOD
+    | IRRELEVANT
+    | {
+        "ADOBE_materials_clearcoat_specular",
+        "ADOBE_materials_clearcoat_tint",
+        "ADOBE_materials_thin_transparency",
+        "KHR_materials_diffuse_transmission",
+        "KHR_materials_subsurface",
+        "KHR_materials_transmission",
+        "KHR_materials_volume",
+        "KHR_materials_volume_scatter",
+        "MSFT_lod",
+        "MSFT_packing_normalRoughnessMetallic",
+        "MSFT_packing_occlusionRoughnessMetallic",
+        "VRMC_materials_hdr_emissiveMultiplier",
+    }
+)
+
+
+class Surface(NamedTuple):
+    """Base colour and reflection of a material.
+
+    Attributes
+    ----------
+    colour : (4,) tuple, linear RGB and alpha
+    holder : JsonObject
+        The object that holds the base colour's texture.
+    texture : str
+        The texture's key there.
+    metallic, roughness : float
+    """
+
+    colour: tuple[float, float, float, float]
+    holder: JsonObject
+    texture: str
+    metallic: float
+    roughness: float
+
+
+def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) -> Surface:
+    """Return what a material reflects; an unknown model gets albedo 0.5 and a warning.
+
+    Parameters
+    ----------
+    material : JsonObject
+    name : str
+        For the warning.
+    warnings : list of SceneWarning
+        Added to.
+    """
+    plain = material.child_or_empty("pbrMetallicRoughness")
+    unlit = material.extension("KHR_materials_unlit") is not None
+    glossy = material.extension(_GLOSSY)
+    if glossy is not None and not unlit:
+        return Surface(
+            _four(glossy.numbers("diffuseFactor", 4, (1.0, 1.0, 1.0, 1.0))),
+            glossy,
+            "diffuseTexture",
+            0.0,
+            1.0 - glossy.number("glossinessFactor", 1.0, low=0.0, high=1.0),
+        )
+    colour = _four(plain.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0)))
+    if "baseColorFactor" not in plain and "baseColorTexture" not in plain:
+        unknown = sorted(set(material.child_or_empty("extensions").value) - _LAYERS)
+        if unknown:
+            message = (
+                f"the material '{name}' has no base colour but {unknown[0]}, which is not understood; "
+                f"it reflects {UNKNOWN_ALBEDO}: export it with a baseColorFactor or baseColorTexture"
+            )
+            warnings.append(SceneWarning("unknown-material", message, name))
+            colour = (UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, 1.0)
+    return Surface(
+        colour,
+        plain,
+        "baseColorTexture",
+        plain.number("metallicFactor", 1.0, low=0.0, high=1.0),
+        plain.number("roughnessFactor", 1.0, low=0.0, high=1.0),
+    )
+
+
+def _four(value: tuple[float, ...]) -> tuple[float, float, float, float]:
+    red, green, blue, alpha = value
+    return red, green, blue, alpha

@@ -1,0 +1,300 @@
+"""Writes a baked scene as GLB: the input with TEXCOORD_1 and AO, all else kept.
+
+Every index of the input stays valid: nodes, meshes, materials, accessors. What has to be new is appended.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.errors import InputError
+from baker.core.scene import Instance, Mesh, Scene, SourceDocument
+from baker.io.gltf.accessor_bytes import gather_rows
+from baker.io.gltf.ao_materials import BakedUse, add_ao_textures, assign_materials, reads_texcoord_1
+from baker.io.gltf.build_document import new_document
+from baker.io.gltf.packer import Json, Packer, is_index, objects, primitive_accessors
+from baker.io.gltf.uri import UriError, is_data, read_uri
+
+_COMPRESSED_PRIMITIVE = "KHR_draco_mesh_compression"
+_COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+_IMAGE_HEADS = {
+    b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg",
+    b"\xabKTX 20": "image/ktx2", b"DDS ": "image/vnd-ms.dds",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class GlbFile:
+    """A finished file, and where its instances are.
+
+    Attributes
+    ----------
+    data : bytes
+        The whole GLB.
+    instance_mesh : tuple of int
+        Mesh index in the file of each instance, in the order of `Scene.instances`.
+    """
+
+    data: bytes
+    instance_mesh: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """The part of one instance that comes from one primitive of its mesh."""
+
+    primitive: Json
+    source: Json
+    page: int
+    row: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    triangle: NDArray[np.int64]
+    kept: bool
+
+
+def write_glb(path: Path, scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None) -> None:
+    """Write the baked scene to `path`; see `make_glb`."""
+    path.write_bytes(make_glb(scene, atlas, ao_png).data)
+
+
+def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None) -> GlbFile:
+    """Build the GLB of a baked scene in memory.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `source`, that document is kept and only what baking concerns changes. Without, a new
+        document is made.
+    atlas : Atlas
+        One layout for each instance, in order.
+    ao_png : dict of page to bytes, or None
+        AO pages as PNG files; they become occlusion textures on TEXCOORD_1.
+
+    Returns
+    -------
+    GlbFile
+
+    Raises
+    ------
+    InputError
+        If the source's data cannot be read or an image file it names is gone.
+    """
+    if scene.source is None:
+        packer, uses, instance_mesh = new_document(scene, atlas)
+    else:
+        packer, uses, instance_mesh = _rewrite(scene, scene.source, atlas, ao=bool(ao_png))
+    assign_materials(packer.document, uses, add_ao_textures(packer, ao_png or {}))
+    _sign(packer.document)
+    return GlbFile(packer.glb(), tuple(instance_mesh))
+
+
+def _rewrite(
+    scene: Scene, source: SourceDocument, atlas: Atlas, *, ao: bool
+) -> tuple[Packer, list[BakedUse], list[int]]:
+    """Return the source's document with lightmap uv; the AO is still to come."""
+    document = copy.deepcopy(source.json)
+    _decompress_views(document, source)
+    instance_mesh = _own_meshes(document, source.json, scene.instances)
+    pieces = [
+        piece
+        for instance, layout, mesh_index in zip(scene.instances, atlas.layouts, instance_mesh, strict=True)
+        for piece in _split(
+            scene.meshes[instance.mesh],
+            layout,
+            document["meshes"][mesh_index]["primitives"],
+            source.json["meshes"][source.json["nodes"][instance.node]["mesh"]]["primitives"],
+        )
+    ]
+    replaced: set[int] = set()
+    for piece in pieces:
+        if not piece.kept:
+            replaced.update(primitive_accessors(piece.source))
+            for key in ("attributes", "targets", "indices"):
+                piece.primitive.pop(key, None)
+    packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
+    packer.chunks = source.chunks
+    uses = []
+    for piece in pieces:
+        moved = None if piece.kept else _rewrite_primitive(packer, source, piece, ao=ao)
+        uses.append(BakedUse(piece.primitive, piece.page, moved))
+    embed_images(packer, source)
+    for name in (_COMPRESSED_PRIMITIVE, *_COMPRESSED_VIEW):
+        if not _mentions(document, name):
+            _forget_extension(document, name)
+    return packer, uses, instance_mesh
+
+
+def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -> list[int]:
+    """Give every baked node a mesh of its own and return the mesh of each instance.
+
+    The first instance keeps the mesh's index; the others get appended copies. A mesh that is also used by
+    a node that is not baked (in another scene) stays as it is for that node.
+    """
+    baked = {instance.node for instance in instances}
+    if len(baked) < len(instances):
+        raise InputError("a node stands for several instances; baking them apart is not possible")
+    taken = {
+        node["mesh"] for i, node in objects(source, "nodes") if i not in baked and is_index(node.get("mesh"))
+    }
+    result = []
+    for instance in instances:
+        mesh = source["nodes"][instance.node]["mesh"]
+        if mesh in taken:
+            document["meshes"].append(copy.deepcopy(source["meshes"][mesh]))
+            document["nodes"][instance.node]["mesh"] = len(document["meshes"]) - 1
+        taken.add(mesh)
+        result.append(document["nodes"][instance.node]["mesh"])
+    return result
+
+
+def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[Json]) -> list[_Piece]:
+    """Cut an instance's lightmap mesh into the primitives it came from."""
+    pieces = []
+    for number in np.unique(mesh.primitive).tolist():
+        used, corner = np.unique(layout.triangle[mesh.primitive == number], return_inverse=True)
+        vertex, uv = layout.vertex[used], layout.uv[used]
+        old = mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
+        has_old = "TEXCOORD_1" in source[number]["attributes"] and old is not None
+        kept = has_old and old is not None and np.array_equal(old[vertex], uv)
+        row, triangle = mesh.source_vertex[vertex], corner.reshape(-1, 3)
+        pieces.append(_Piece(output[number], source[number], layout.page, row, uv, triangle, kept))
+    return pieces
+
+
+def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *, ao: bool) -> int | None:
+    """Write the primitive's vertices in lightmap order; return where an old TEXCOORD_1 went, if kept."""
+    attributes = dict(piece.source["attributes"])
+    moved = None
+    old = attributes.pop("TEXCOORD_1", None)
+    if old is not None and reads_texcoord_1(source.json, piece.source, occlusion=not ao):
+        sets = [int(name[9:]) for name in attributes if name.startswith("TEXCOORD_") and name[9:].isdigit()]
+        moved = max([1, *sets]) + 1
+        attributes[f"TEXCOORD_{moved}"] = old
+    compressed = _COMPRESSED_PRIMITIVE in piece.source.get("extensions", {})
+    written = {}
+    for name, index in attributes.items():
+        try:
+            written[name] = _rewrite_accessor(
+                packer, source, index, piece.row, name == "POSITION", compressed
+            )
+        except InputError:
+            # The importer has told that this attribute cannot be read and is left out.
+            if name in ("POSITION", "NORMAL", "COLOR_0"):
+                raise
+    written["TEXCOORD_1"] = packer.add_floats(piece.uv)
+    # glTF wants the sets numbered without a gap, so a primitive without uv gets the lightmap's twice.
+    written.setdefault("TEXCOORD_0", written["TEXCOORD_1"])
+    piece.primitive["attributes"] = written
+    piece.primitive["indices"] = packer.add_indices(piece.triangle)
+    if "targets" in piece.source:
+        piece.primitive["targets"] = [
+            {name: _rewrite_target(packer, source, index, piece.row, name) for name, index in target.items()}
+            for target in piece.source["targets"]
+        ]
+    # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
+    if piece.primitive.get("mode", 4) != 4:
+        del piece.primitive["mode"]
+    if compressed:
+        del piece.primitive["extensions"][_COMPRESSED_PRIMITIVE]
+        if not piece.primitive["extensions"]:
+            del piece.primitive["extensions"]
+    return moved
+
+
+def _rewrite_accessor(
+    packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], bounds: bool, compressed: bool
+) -> int:
+    data = gather_rows(source.json, source.buffers, index, row)
+    accessor = source.json["accessors"][index]
+    if compressed and "bufferView" not in accessor:
+        message = "its data is only there Draco-compressed; decompress the file first"
+        raise InputError(message, object=f"accessor {index}")
+    return packer.add_rows(data, accessor, bounds=bounds)
+
+
+def _rewrite_target(
+    packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], name: str
+) -> int:
+    """Write one attribute of a morph target; one that cannot be read moves nothing."""
+    bounds = name == "POSITION"
+    try:
+        return _rewrite_accessor(packer, source, index, row, bounds, False)
+    except InputError:
+        return packer.add_floats(np.zeros((len(row), 3), np.float32), bounds=bounds)
+
+
+def _decompress_views(document: Json, source: SourceDocument) -> None:
+    """Point views away from meshopt data, to the plain copy if there is one; what is baked has one."""
+    for _, view in objects(document, "bufferViews"):
+        for name in _COMPRESSED_VIEW:
+            if name in view.get("extensions", {}):
+                number = view.get("buffer")
+                if not is_index(number) or number in source.missing or number >= len(source.buffers):
+                    continue
+                if view.get("byteOffset", 0) + view["byteLength"] > len(source.buffers[number]):
+                    continue
+                del view["extensions"][name]
+                if not view["extensions"]:
+                    del view["extensions"]
+
+
+def embed_images(packer: Packer, source: SourceDocument) -> None:
+    """Move image files and data URIs into the buffer, so that the GLB stands alone.
+
+    An image that could not be read keeps its URI: nothing that is baked needs it.
+
+    Raises
+    ------
+    InputError
+        If an image file has gone since the scene was read.
+    """
+    for number, image in objects(packer.document, "images"):
+        uri = image.get("uri")
+        if number in source.missing_images or not isinstance(uri, str):
+            continue
+        try:
+            data = read_uri(uri, source.folder or Path())
+        except UriError as error:
+            raise InputError(str(error), object=f"image {number}") from None
+        if not is_data(uri):
+            image.setdefault("name", Path(unquote(uri).replace("\\", "/")).stem)
+        del image["uri"]
+        image["mimeType"] = _mime_type(data) or image.get("mimeType", "image/png")
+        image["bufferView"] = packer.add_bytes(data)
+
+
+def _mime_type(data: bytes) -> str | None:
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "image/webp"
+    return next((mime for head, mime in _IMAGE_HEADS.items() if data.startswith(head)), None)
+
+
+def _sign(document: Json) -> None:
+    """Note the version in `asset.extras.baker`, if extras can take a key."""
+    extras = document.setdefault("asset", {"version": "2.0"}).setdefault("extras", {})
+    if isinstance(extras, dict):
+        extras["baker"] = {"version": version("baker")}
+
+
+def _mentions(node: Any, name: str) -> bool:
+    if isinstance(node, dict):
+        return name in node or any(_mentions(value, name) for value in node.values())
+    return isinstance(node, list) and any(_mentions(value, name) for value in node)
+
+
+def _forget_extension(document: Json, name: str) -> None:
+    for key in ("extensionsUsed", "extensionsRequired"):
+        if name in document.get(key, []):
+            document[key] = [other for other in document[key] if other != name]
+            if not document[key]:
+                del document[key]

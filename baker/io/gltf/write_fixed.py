@@ -1,0 +1,107 @@
+"""Writes a glTF document with some of its primitives made anew; everything else is kept as it is."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import SourceDocument
+from baker.io.gltf.accessor_bytes import gather_rows
+from baker.io.gltf.edited_primitive import MendedPrimitive, RemadePrimitive
+from baker.io.gltf.packer import COMPONENT, Json, Packer, primitive_accessors
+from baker.io.gltf.write_baked import embed_images
+
+
+def write_mended(
+    source: SourceDocument, mended: Mapping[tuple[int, int], MendedPrimitive | RemadePrimitive]
+) -> bytes:
+    """Return the document as GLB.
+
+    Parameters
+    ----------
+    source : SourceDocument
+        Not changed.
+    mended : mapping of (mesh, primitive) to MendedPrimitive or RemadePrimitive
+        The primitives that are made anew, by their places in the file.
+
+    Raises
+    ------
+    InputError
+        If data of the source cannot be read.
+    ResourceError
+        If the result is too large for the format.
+    """
+    document = copy.deepcopy(source.json)
+    replaced: set[int] = set()
+    for mesh, number in mended:
+        primitive = document["meshes"][mesh]["primitives"][number]
+        replaced.update(primitive_accessors(primitive))
+        for key in ("attributes", "indices"):
+            primitive.pop(key, None)
+    packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
+    packer.chunks = source.chunks
+    for (mesh, number), new in mended.items():
+        primitive = document["meshes"][mesh]["primitives"][number]
+        if isinstance(new, RemadePrimitive):
+            _remake(packer, primitive, new)
+        else:
+            _rewrite(packer, source, source.json["meshes"][mesh]["primitives"][number], primitive, new)
+        primitive["indices"] = packer.add_indices(new.triangle)
+        # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
+        if primitive.get("mode", 4) != 4:
+            del primitive["mode"]
+    embed_images(packer, source)
+    return packer.glb()
+
+
+def _rewrite(
+    packer: Packer, source: SourceDocument, old: Json, primitive: Json, new: MendedPrimitive
+) -> None:
+    """Write the vertices of one primitive."""
+    own: dict[str, NDArray[np.float32]] = {}
+    if new.normal is not None:
+        own["NORMAL"] = new.normal
+    if new.uv is not None:
+        own["TEXCOORD_1"] = new.uv
+        if "TEXCOORD_0" not in old["attributes"]:
+            # glTF wants the sets numbered without a gap.
+            own["TEXCOORD_0"] = new.uv
+    row = new.row.astype(np.int32)
+    attributes = {}
+    for name, index in old["attributes"].items():
+        if name in own:
+            continue
+        accessor = source.json["accessors"][index]
+        data = gather_rows(source.json, source.buffers, index, row)
+        if name == "TANGENT" and new.turned.any():
+            data = _turn_handedness(data, accessor, new.turned)
+        attributes[name] = packer.add_rows(data, accessor, bounds=name == "POSITION")
+    attributes.update({name: packer.add_floats(values) for name, values in own.items()})
+    primitive["attributes"] = attributes
+
+
+def _remake(packer: Packer, primitive: Json, new: RemadePrimitive) -> None:
+    """Write the vertices of one primitive, none of which is an old one."""
+    attributes = {"POSITION": packer.add_floats(new.position, bounds=True)}
+    if new.normal is not None:
+        attributes["NORMAL"] = packer.add_floats(new.normal)
+    if new.colour is not None:
+        attributes["COLOR_0"] = packer.add_floats(new.colour)
+    primitive["attributes"] = attributes
+
+
+def _turn_handedness(data: NDArray[np.uint8], accessor: Json, turned: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return tangents, as raw bytes, with w of other sign where normals were turned, for the same bitangent.
+
+    The bitangent is cross(normal, tangent.xyz) * tangent.w, glTF 2.0, 3.7.2.1.
+    """
+    tangent = (
+        np.ascontiguousarray(data).view(COMPONENT[accessor["componentType"]]).reshape(len(data), 4).copy()
+    )
+    # The lowest integer has no counterpart; it means the same as the one above it.
+    lowest = -1.0 if tangent.dtype.kind == "f" else -np.iinfo(tangent.dtype).max
+    tangent[turned, 3] = -np.maximum(tangent[turned, 3], lowest)
+    return tangent.view(np.uint8).reshape(len(data), -1)

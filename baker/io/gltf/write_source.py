@@ -1,0 +1,73 @@
+"""Writes a scene from another format as GLB with all its triangles, bad ones included.
+
+What mends glTF files then mends it, too. Colour, emission, transparency and their textures come along; what
+the importer does not read (bump maps, reflection) does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baker.core.errors import InputError
+from baker.core.scene import Scene
+from baker.core.source_mesh import PrimitiveArrays, RawScene
+from baker.io.gltf.build_document import material_json
+from baker.io.gltf.packer import Json, Packer
+
+
+def raw_glb(scene: Scene, raw: RawScene) -> bytes:
+    """Return a GLB of every mesh with triangles, without lightmap uv.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its materials are used.
+    raw : RawScene
+
+    Raises
+    ------
+    InputError
+        If there is no triangle.
+    """
+    document: Json = {"asset": {"version": "2.0", "generator": "baker"}}
+    packer = Packer(document)
+    extensions: set[str] = set()
+    images: dict[int, int] = {}
+    if scene.materials:
+        document["materials"] = [material_json(packer, m, images, extensions) for m in scene.materials]
+    filled = [k for k, mesh in enumerate(raw.meshes) if any(len(p.triangle) for p in mesh.primitives)]
+    document["meshes"] = [
+        {
+            "name": raw.meshes[k].name,
+            "primitives": [_primitive(packer, p) for p in raw.meshes[k].primitives if len(p.triangle)],
+        }
+        for k in filled
+    ]
+    nodes: list[Json] = []
+    for instance in raw.instances:
+        if instance.mesh not in filled:
+            continue
+        node: Json = {"name": instance.name, "mesh": filled.index(instance.mesh)}
+        if not np.array_equal(instance.world_from_object, np.eye(4)):
+            node["matrix"] = instance.world_from_object.T.ravel().tolist()
+        nodes.append(node)
+    if not nodes:
+        message = "the file holds no triangles; export it again"
+        raise InputError(message, file=str(scene.path) if scene.path else None)
+    document |= {"nodes": nodes, "scenes": [{"name": scene.name, "nodes": list(range(len(nodes)))}]}
+    document["scene"] = 0
+    if extensions:
+        document["extensionsUsed"] = sorted(extensions)
+    return packer.glb()
+
+
+def _primitive(packer: Packer, arrays: PrimitiveArrays) -> Json:
+    attributes = {"POSITION": packer.add_floats(arrays.position, bounds=True)}
+    if arrays.normal is not None:
+        attributes["NORMAL"] = packer.add_floats(arrays.normal)
+    for number, uv in sorted(arrays.texcoord.items()):
+        attributes[f"TEXCOORD_{number}"] = packer.add_floats(uv)
+    if arrays.colour is not None:
+        attributes["COLOR_0"] = packer.add_floats(arrays.colour)
+    indices = packer.add_indices(arrays.triangle)
+    return {"attributes": attributes, "indices": indices, "material": arrays.material}

@@ -1,0 +1,1 @@
+"""Plugins: one scene format a file."""

@@ -1,0 +1,225 @@
+"""Imports glTF 2.0 scenes (.glb, .gltf): nodes, instances, lights.
+
+world_from_object = product of the node matrices from the root down; M = T R S.
+
+Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
+from baker.core.source_mesh import RawInstance, RawMesh, RawScene
+from baker.io.gltf.camera import read_cameras
+from baker.io.gltf.document import GltfDocument, open_document
+from baker.io.gltf.instancing import refuse_broken, spread_instances
+from baker.io.gltf.json import JsonObject
+from baker.io.gltf.light import read_light
+from baker.io.gltf.material import MaterialReader
+from baker.io.gltf.mesh import read_primitives
+from baker.io.gltf.node import Placed, place_nodes
+from baker.io.gltf.skin import Poser
+from baker.io.gltf.unread import unneeded_faults
+from baker.io.load import SceneFile, importers
+from baker.io.mesh.build import build_mesh
+from baker.topology.triangle_check import LARGEST_COORDINATE
+
+# Smallest over largest stretch of a node: below it a mesh is squashed flat.
+_FLATTEST = 1e-7
+
+
+_Key = tuple[int, int | None]
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A mesh of the file, in the pose of a skin if it has one.
+
+    Attributes
+    ----------
+    number : int, in the order of reading
+    mesh : int or None, index of the mesh that is baked
+    raw : RawMesh
+    extent : (3,) float64, the largest coordinate of that mesh along each axis
+    place : (4, 4) float64 or None, world from the posed mesh
+    """
+
+    number: int
+    mesh: int | None
+    raw: RawMesh
+    extent: NDArray[np.float64]
+    place: NDArray[np.float64] | None
+
+
+@importers.register(".glb")
+@importers.register(".gltf")
+def import_gltf(source: SceneFile) -> Scene:
+    """Read a glTF file.
+
+    Parameters
+    ----------
+    source : SceneFile
+        `up` and `scale` do not apply: glTF is +Y up and in metres.
+
+    Raises
+    ------
+    InputError
+        If the file is malformed, needs what is not understood, or holds nothing to bake.
+    """
+    document = open_document(source.path, source.data)
+    warnings = list(document.warnings)
+    if source.up != "y" or source.scale != 1.0:
+        message = "up axis and scale are not applied: glTF is +Y up and in metres"
+        warnings.append(SceneWarning("up-and-scale-ignored", message))
+    spread_instances(document)
+    number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
+    reader = MaterialReader(document, reflections=source.reflections)
+    meshes, instances, raw = _instances(document, placed, reader, warnings, lenient=source.lenient)
+    lights = _lights(placed, document, warnings, lenient=source.lenient)
+    cameras = read_cameras(placed, document, warnings)
+    warnings += [*reader.warnings, *unneeded_faults(document, reader.told)]
+    if not instances and not source.lenient:
+        where = f"scenes[{number}]" if number is not None else None
+        detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
+        raise InputError(
+            f"there is nothing to bake: the scene holds no usable triangle{f' ({detail})' if detail else ''}",
+            file=str(source.path),
+            object=where,
+        )
+    return Scene(
+        name=source.path.name.split(".")[0],
+        path=source.path,
+        meshes=tuple(meshes),
+        materials=tuple(reader.materials),
+        instances=tuple(instances),
+        lights=tuple(lights),
+        warnings=tuple(warnings),
+        source=SourceDocument(
+            document.root.value,
+            document.buffers,
+            Path(document.folder),
+            missing=frozenset(document.buffer_faults),
+            missing_images=frozenset(document.image_faults),
+            chunks=document.chunks,
+        ),
+        sha256=document.sha256,
+        cameras=tuple(cameras),
+        raw=raw,
+    )
+
+
+def _choose_scene(
+    document: GltfDocument, asked: int | None, warnings: list[SceneWarning], *, lenient: bool
+) -> tuple[int | None, list[Placed]]:
+    """Return the number of the chosen scene (None if the file has none) and its nodes."""
+    root = document.root
+    scenes, nodes = root.children("scenes"), root.children("nodes")
+    if asked is not None and not 0 <= asked < len(scenes):
+        raise InputError(f"there is no scene {asked}: the file has {len(scenes)} scenes", file=root.file)
+    if not scenes:
+        inside = {k for node in nodes for k in node.indices("children", len(nodes), "nodes")}
+        return None, place_nodes(nodes, [k for k in range(len(nodes)) if k not in inside])
+    number = asked if asked is not None else root.index("scene", len(scenes), "scenes", 0)
+    if len(scenes) > 1 and asked is None:
+        message = f"the file has {len(scenes)} scenes; scene {number} is taken"
+        warnings.append(SceneWarning("several-scenes", message, scenes[number].string("name", "")))
+    roots = scenes[number].indices("nodes", len(nodes), "nodes")
+    if not roots and not lenient:
+        scenes[number].fail("there is nothing to bake: the scene has no nodes")
+    return number, place_nodes(nodes, roots)
+
+
+def _instances(
+    document: GltfDocument,
+    placed: list[Placed],
+    reader: MaterialReader,
+    warnings: list[SceneWarning],
+    *,
+    lenient: bool,
+) -> tuple[list[Mesh], list[Instance], RawScene | None]:
+    """Return the meshes that are used, each once, and where they stand."""
+    sources = document.root.children("meshes")
+    poser = Poser(document)
+    built: dict[_Key, _Built] = {}
+    meshes: list[Mesh] = []
+    instances: list[Instance] = []
+    shown: list[RawInstance] = []
+    for node in placed:
+        if "mesh" not in node.json:
+            continue
+        refuse_broken(document, node.json)
+        number = node.json.index("mesh", len(sources), "meshes")
+        name = sources[number].string("name", f"mesh_{number}")
+        # A skinned mesh stands where its joints put it, whatever its node says.
+        key = number, node.index if "skin" in node.json else None
+        if key not in built:
+            arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
+            place = None
+            if key[1] is not None:
+                arrays, place = poser.pose(sources[number], arrays, node)
+            mesh, defects = build_mesh(name, arrays, reader.materials)
+            warnings += found + defects
+            if mesh is None:
+                warnings.append(
+                    SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
+                )
+            raw = RawMesh(name, tuple(arrays) if lenient else ())
+            extent = np.zeros(3) if mesh is None else np.abs(mesh.position).max(axis=0).astype(np.float64)
+            built[key] = _Built(len(built), None if mesh is None else len(meshes), raw, extent, place)
+            meshes += [] if mesh is None else [mesh]
+        made = built[key]
+        label = node.json.string("name", name)
+        if made.place is not None:
+            node = Placed(node.index, node.json, made.place)
+            message = "the mesh is skinned; it is baked in the pose that its joints have in the file"
+            warnings.append(SceneWarning("skinned", message, label))
+        shown.append(RawInstance(node.index, label, made.number, node.matrix))
+        if made.mesh is not None and _stands(node, made.extent, label, warnings):
+            instances.append(Instance(node.index, label, made.mesh, node.matrix))
+    kept = RawScene(tuple(made.raw for made in built.values()), tuple(shown)) if lenient else None
+    return *_drop_unused(meshes, instances), kept
+
+
+def _stands(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
+    """Tell whether an instance can be baked; `extent` is its mesh's largest coordinate along each axis."""
+    stretch = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
+    if not stretch[2] > _FLATTEST * stretch[0]:
+        message = "the node's scale is zero along an axis; the instance is left out"
+        warnings.append(SceneWarning("flat-instance", message, label))
+        return False
+    with np.errstate(over="ignore"):
+        reach = np.abs(node.matrix[:3, :3]) @ extent + np.abs(node.matrix[:3, 3])
+    if not (reach <= LARGEST_COORDINATE).all():
+        node.json.fail(f"the node places its mesh further than {LARGEST_COORDINATE:g} m away")
+    return True
+
+
+def _drop_unused(meshes: list[Mesh], instances: list[Instance]) -> tuple[list[Mesh], list[Instance]]:
+    used = sorted({instance.mesh for instance in instances})
+    if len(used) == len(meshes):
+        return meshes, instances
+    renumbered = {old: new for new, old in enumerate(used)}
+    moved = [Instance(i.node, i.name, renumbered[i.mesh], i.world_from_object) for i in instances]
+    return [meshes[k] for k in used], moved
+
+
+def _lights(
+    placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning], *, lenient: bool
+) -> list[PunctualLight]:
+    extension = document.root.extension("KHR_lights_punctual")
+    known: list[JsonObject] = extension.children("lights") if extension is not None else []
+    lights = []
+    for node in placed:
+        reference = node.json.extension("KHR_lights_punctual")
+        if reference is None:
+            continue
+        light = known[reference.index("light", len(known), "lights")]
+        made = read_light(light, node, warnings, lenient=lenient)
+        lights += [] if made is None else [made]
+    return lights

@@ -1,0 +1,118 @@
+"""Imports single meshes: PLY, STL and OFF; the only file that knows trimesh.
+
+Only its parsers are used, not its mesh class, which would merge, reorder and drop vertices.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import logging
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.colour import linear_from_srgb
+from baker.core.errors import InputError
+from baker.core.scene import Material, Scene
+from baker.core.source_mesh import PrimitiveArrays
+from baker.io.load import SceneFile, importers
+from baker.io.mesh.scene import scene_of_meshes, to_world
+
+# It logs what it could not read with a traceback, which Python prints where no program asked for logs.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
+
+_GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
+
+
+@importers.register(".ply")
+@importers.register(".stl")
+@importers.register(".off")
+def import_mesh_file(source: SceneFile) -> Scene:
+    """Read a PLY, STL or OFF file as a grey mesh, with its vertex colours if it has any.
+
+    Parameters
+    ----------
+    source : SceneFile
+        `up` and `scale` bring the positions to metres, +Y up.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be parsed, an index is out of range, or no triangle is left.
+    """
+    file, kind = str(source.path), source.path.suffix.lower()[1:]
+    try:
+        solids = _parse(source.data, kind)
+        arrays = [_arrays(solid) for solid in solids]
+    except MemoryError:
+        raise
+    except Exception as error:  # the parsers raise nearly anything on broken data
+        why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:160]
+        raise InputError(f"the file cannot be parsed as {kind.upper()} ({why})", file=file) from None
+    name = source.path.name.split(".")[0]
+    primitives = []
+    for number, (position, face, normal, colour) in enumerate(arrays):
+        if not source.lenient and len(face) and not (face.min() >= 0 and face.max() < len(position)):
+            worst = face.max() if face.max() >= len(position) else face.min()
+            raise InputError(
+                f"face index {worst} is out of range: there are {len(position)} vertices", file=file
+            )
+        primitives.append(
+            PrimitiveArrays(
+                index=number,
+                material=0,
+                position=to_world(position, source.up, source.scale),
+                triangle=face,
+                normal=None if normal is None else to_world(normal, source.up, 1.0),
+                colour=colour,
+            )
+        )
+    sha256 = hashlib.sha256(source.data).hexdigest()
+    return scene_of_meshes(source, [(name, primitives)], [_GREY], [], sha256)
+
+
+def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
+    from trimesh.exchange.off import load_off
+    from trimesh.exchange.ply import load_ply
+    from trimesh.exchange.stl import load_stl
+
+    stream = io.BytesIO(data)
+    if kind == "ply":
+        found = load_ply(stream, fix_texture=False, skip_materials=True)
+    elif kind == "stl":
+        found = load_stl(stream)
+    else:
+        found = load_off(stream)
+    if found.get("geometry") == {} and b"facet" not in data:
+        # A binary file that is cut off is taken for text without a single solid.
+        raise ValueError("it is neither text nor as long as its header says; it may be cut off")
+    # A text STL with several solids comes as a dictionary of them.
+    return list(found["geometry"].values()) if "geometry" in found else [found]
+
+
+def _arrays(
+    solid: dict[str, Any],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None, NDArray[np.float32] | None]:
+    """Return (position, face, normal, colour) of what a parser found."""
+    position = np.array(solid["vertices"], np.float64).reshape(-1, 3)
+    faces = solid.get("faces")
+    face = np.zeros((0, 3), np.int64) if faces is None or not len(faces) else np.array(faces, np.int64)
+    if face.shape[1] == 4:
+        face = face[:, [0, 1, 2, 0, 2, 3]]
+    normal = solid.get("vertex_normals")
+    given = None if normal is None else np.array(normal, np.float64).reshape(len(position), 3)
+    return position, face.reshape(-1, 3), given, _colour(solid.get("vertex_colors"), len(position))
+
+
+def _colour(value: Any, count: int) -> NDArray[np.float32] | None:
+    if value is None or len(value) != count:
+        return None
+    stored = np.array(value)
+    colour: NDArray[np.float32] = stored.astype(np.float32)
+    if stored.dtype.kind in "iu":
+        colour /= np.float32(np.iinfo(stored.dtype).max)
+    rgb = linear_from_srgb(np.clip(colour[:, :3], 0.0, 1.0))
+    alpha = colour[:, 3:4] if colour.shape[1] > 3 else np.ones((count, 1), np.float32)
+    return np.concatenate([rgb, alpha], axis=1)

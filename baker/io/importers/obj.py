@@ -1,0 +1,278 @@
+"""Imports Wavefront OBJ scenes with their MTL libraries; the only file that knows tinyobjloader.
+
+Each object or group becomes a mesh with one instance, each material of it a primitive. OBJ's v = 0 is the
+last image row; it is turned over here, so that v = 0 is the first row as everywhere in baker.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.colour import linear_from_srgb
+from baker.core.errors import IndexRangeError, InputError
+from baker.core.scene import Material, Scene, SceneWarning
+from baker.core.source_mesh import PrimitiveArrays
+from baker.io.images import decode_image
+from baker.io.load import SceneFile, importers
+from baker.io.mesh.mtl import read_mtl
+from baker.io.mesh.scene import scene_of_meshes, to_world
+
+# Grey instead of the white of glTF: a white room would never let go of its light.
+GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
+_NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
+
+
+@importers.register(".obj")
+def import_obj(source: SceneFile) -> Scene:
+    """Read an OBJ file and the MTL files and images that it names.
+
+    Parameters
+    ----------
+    source : SceneFile
+        `up` and `scale` bring the positions to metres, +Y up.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be parsed, an index is out of range, an image is missing, or no triangle is left.
+    """
+    file = str(source.path)
+    digest = hashlib.sha256(source.data)
+    warnings: list[SceneWarning] = []
+    text = _decode(source.data)
+    materials = _read_libraries(text, source.path, digest, warnings)
+    reader = _parse(text, materials, file)
+    attributes = reader.GetAttrib()
+    position = np.array(attributes.vertices, np.float64).reshape(-1, 3)
+    position = _restore_nan(source.data, position)
+    corners = _Corners(
+        position=to_world(position, source.up, source.scale),
+        normal=to_world(np.array(attributes.normals, np.float64).reshape(-1, 3), source.up, 1.0),
+        texcoord=np.array(attributes.texcoords, np.float64).reshape(-1, 2),
+        colour=_colours(attributes, len(position)),
+    )
+    groups: list[tuple[str, list[PrimitiveArrays]]] = []
+    for number, shape in enumerate(reader.GetShapes()):
+        name = shape.name or f"shape_{number}"
+        groups.append((name, _primitives(shape.mesh, corners, len(materials))))
+    if any(p.material == len(materials) for _, primitives in groups for p in primitives):
+        if materials:
+            message = f"faces without a known material are grey; MTL names {len(materials)}"
+            warnings.append(SceneWarning("no-material", message, source.path.name))
+        materials.append(GREY)
+    return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
+
+
+def obj_sha256(path: Path, data: bytes) -> str:
+    """Return the hash that `import_obj` would find, without looking at geometry or pixels.
+
+    Raises
+    ------
+    InputError
+        If a material library is malformed or an image is missing.
+    """
+    digest = hashlib.sha256(data)
+    nothing = np.zeros((1, 1, 4), np.uint8)
+    _read_libraries(_decode(data), path, digest, [], lambda content, **where: nothing)
+    return digest.hexdigest()
+
+
+def _decode(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _read_libraries(
+    text: str,
+    path: Path,
+    digest: hashlib._Hash,
+    warnings: list[SceneWarning],
+    decode: Callable[..., NDArray[np.uint8]] = decode_image,
+) -> list[Material]:
+    def read_file(file: Path) -> bytes:
+        data = file.read_bytes()
+        digest.update(data)
+        return data
+
+    materials: list[Material] = []
+    # The parser takes the first word after usemtl, some exporters mean the rest of the line.
+    named = re.findall(r"^[ \t]*usemtl[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
+    used = {*named, *(name.split()[0] for name in named if name)}
+    lines = re.findall(r"^[ \t]*mtllib[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
+    for line in dict.fromkeys(lines):
+        # The rest of the line is one name with blanks, or several names.
+        names = [line] if (path.parent / line).is_file() else line.split()
+        for name in names:
+            file = path.parent / name.replace("\\", "/")
+            try:
+                content = _decode(read_file(file))
+            except (OSError, ValueError):
+                message = f"the material library '{name}' is missing or unreadable; its surfaces are grey"
+                warnings.append(SceneWarning("missing-mtl", message, path.name))
+                continue
+            materials += read_mtl(
+                content,
+                file=str(file),
+                folder=file.parent,
+                read_file=read_file,
+                used=used,
+                decode=decode,
+            )
+    return materials
+
+
+def _parse(text: str, materials: list[Material], file: str) -> Any:
+    """Return the parser with all faces cut to triangles and every index known to be in range."""
+    # Ear clipping reads vertices without a check and crashes on a wrong index: look at the faces first.
+    reader = _run_parser(text, materials, file, triangulate=False)
+    attributes = reader.GetAttrib()
+    counts = tuple(
+        len(v) // k for v, k in ((attributes.vertices, 3), (attributes.normals, 3), (attributes.texcoords, 2))
+    )
+    polygons = False
+    for number, shape in enumerate(reader.GetShapes()):
+        _check_indices(shape.mesh, counts, file, shape.name or f"shape_{number}")
+        corners = np.array(shape.mesh.num_face_vertices, np.int64)
+        polygons |= bool((corners != 3).any())
+    return _run_parser(text, materials, file, triangulate=True) if polygons else reader
+
+
+def _run_parser(text: str, materials: list[Material], file: str, *, triangulate: bool) -> Any:
+    import tinyobjloader
+
+    config = tinyobjloader.ObjReaderConfig()
+    config.triangulate = triangulate
+    reader = tinyobjloader.ObjReader()
+    # The binding does not show `Ke`: our own reader takes the values, and this one only needs the names.
+    names = "".join(f"newmtl {material.name}\n" for material in materials)
+    if not reader.ParseFromString(text, names, config):
+        why = " ".join(reader.Error().split()).rstrip(".") or "it is not an OBJ file"
+        raise InputError(f"the file cannot be parsed: {why[:200]}", file=file)
+    return reader
+
+
+def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) -> None:
+    # The numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13), so lists it is.
+    kinds = (
+        (mesh.vertex_indices(), "vertex"),
+        (mesh.normal_indices(), "normal"),
+        (mesh.texcoord_indices(), "texture vertex"),
+    )
+    for (index, what), count in zip(kinds, counts, strict=True):
+        if index and max(index) >= count:
+            message = f"a face names {what} {max(index) + 1}, but the file has {count}"
+            raise IndexRangeError(message, file=file, object=shape)
+    if kinds[0][0] and min(kinds[0][0]) < 0:
+        raise IndexRangeError("a face has an index of zero or less", file=file, object=shape)
+
+
+def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put NaN where a `v` line holds no numbers: the parser reads such words as 0 and says nothing."""
+    if _NOT_NUMBERS.search(data) is None:
+        return position
+    position = position.copy()
+    for row, match in enumerate(_VERTEX.finditer(data)):
+        if row < len(position) and not all(_is_number(word) for word in match.group(1).split()[:3]):
+            position[row] = np.nan
+    return position
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
+
+
+def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
+    """Return the vertex colours if the file has any: the parser makes up white ones."""
+    colour = np.array(attributes.colors, np.float32).reshape(-1, 3)
+    if len(colour) != count or (colour == 1).all():
+        return None
+    return np.concatenate([linear_from_srgb(colour), np.ones((count, 1), np.float32)], axis=1)
+
+
+class _Corners:
+    """The arrays that all shapes of the file share."""
+
+    def __init__(
+        self,
+        *,
+        position: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        texcoord: NDArray[np.float64],
+        colour: NDArray[np.float32] | None,
+    ) -> None:
+        self.position = position
+        self.normal = normal
+        self.texcoord = (texcoord * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32)
+        self.colour = colour
+
+
+def _primitives(mesh: Any, corners: _Corners, grey: int) -> list[PrimitiveArrays]:
+    """Split a shape by material and give each part its own vertices."""
+    vertex, normal, texcoord = (
+        np.array(values, np.int64)
+        for values in (mesh.vertex_indices(), mesh.normal_indices(), mesh.texcoord_indices())
+    )
+    n = len(vertex) // 3
+    material = np.array(mesh.material_ids, np.int64)[:n]
+    material = np.where((material < 0) | (material >= grey), grey, material)
+    primitives = []
+    for number, used in enumerate(np.unique(material)):
+        mine = np.repeat(material == used, 3)
+        primitives.append(
+            _primitive(
+                number,
+                int(used),
+                vertex[: 3 * n][mine],
+                normal[: 3 * n][mine],
+                texcoord[: 3 * n][mine],
+                corners,
+            )
+        )
+    return primitives
+
+
+def _primitive(
+    number: int,
+    material: int,
+    vertex: NDArray[np.int64],
+    normal: NDArray[np.int64],
+    texcoord: NDArray[np.int64],
+    corners: _Corners,
+) -> PrimitiveArrays:
+    # One vertex for each combination of indices that occurs; two steps keep the key within 64 bits.
+    _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
+    _, row, index = np.unique(
+        first * (len(corners.normal) + 1) + normal + 1, return_index=True, return_inverse=True
+    )
+    v, n, t = vertex[row], normal[row], texcoord[row]
+    given = None
+    if (n >= 0).any():
+        given = np.full((len(n), 3), np.nan, np.float32)
+        given[n >= 0] = corners.normal[n[n >= 0]]
+    uv = {}
+    if (t >= 0).any():
+        uv[0] = np.zeros((len(t), 2), np.float32)
+        uv[0][t >= 0] = corners.texcoord[t[t >= 0]]
+    return PrimitiveArrays(
+        index=number,
+        material=material,
+        position=corners.position[v],
+        triangle=index.reshape(-1, 3),
+        normal=given,
+        texcoord=uv,
+        colour=None if corners.colour is None else corners.colour[v],
+    )

@@ -1,0 +1,1 @@
+"""Scenes made of plain meshes, for formats without nodes; OBJ materials."""

@@ -1,0 +1,199 @@
+"""Makes a `Mesh` from the raw arrays of its primitives: bad triangles out, normals in, vertices compact.
+
+Every importer ends here, so that all formats are held to the same rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import Material, Mesh, SceneWarning
+from baker.core.source_mesh import PrimitiveArrays
+from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
+
+
+def build_mesh(
+    name: str, primitives: Sequence[PrimitiveArrays], materials: Sequence[Material]
+) -> tuple[Mesh | None, list[SceneWarning]]:
+    """Join primitives to a mesh that holds only good triangles.
+
+    Parameters
+    ----------
+    name : str
+    primitives : sequence of PrimitiveArrays
+    materials : sequence of Material
+        The scene's; says which are double-sided and which texture coordinates they read.
+
+    Returns
+    -------
+    mesh : Mesh or None
+        None if no good triangle is left. A texture coordinate set that only some primitives have, or
+        that a material reads and its primitive lacks, is zero there.
+    warnings : list of SceneWarning
+        One for each kind of defect, with its count.
+    """
+    primitives = [p for p in primitives if len(p.triangle)]
+    if not primitives:
+        return None, []
+    warnings: list[SceneWarning] = []
+    kept = _good_triangles(name, primitives, materials, warnings)
+    parts = [_Part(p, t) for p, t in zip(primitives, kept, strict=True) if len(t)]
+    if not parts:
+        return None, warnings
+
+    sets = _texcoord_sets(name, parts, materials, warnings)
+    start = np.cumsum([0] + [len(part.row) for part in parts[:-1]])
+    colour = None
+    if any(part.source.colour is not None for part in parts):
+        colour = np.concatenate([part.colour() for part in parts])
+    mesh = Mesh(
+        name=name,
+        position=np.concatenate([part.source.position[part.row] for part in parts]),
+        normal=np.concatenate([part.normal(name, warnings) for part in parts]),
+        triangle=np.concatenate([part.triangle + s for part, s in zip(parts, start, strict=True)]).astype(
+            np.int32
+        ),
+        material=np.concatenate([np.full(len(p.triangle), p.source.material, np.int32) for p in parts]),
+        primitive=np.concatenate([np.full(len(p.triangle), p.source.index, np.int32) for p in parts]),
+        vertex_primitive=np.concatenate([np.full(len(p.row), p.source.index, np.int32) for p in parts]),
+        source_vertex=np.concatenate([part.row for part in parts]).astype(np.int32),
+        texcoord=tuple(
+            np.concatenate([part.texcoord(k) for part in parts]) if k in sets else None
+            for k in range(max(2, max(sets, default=0) + 1))
+        ),
+        colour=colour,
+    )
+    return mesh, warnings
+
+
+def _good_triangles(
+    name: str,
+    primitives: Sequence[PrimitiveArrays],
+    materials: Sequence[Material],
+    warnings: list[SceneWarning],
+) -> list[NDArray[np.int64]]:
+    """Return the triangles of each primitive that are worth baking, and count the others."""
+    start = np.cumsum([0] + [len(p.position) for p in primitives])
+    position = np.concatenate([p.position for p in primitives])
+    triangle = np.concatenate([p.triangle + s for p, s in zip(primitives, start, strict=False)])
+    owner = np.repeat(np.arange(len(primitives)), [len(p.triangle) for p in primitives])
+    stitched = np.array([p.stitched for p in primitives])[owner]
+    repeats = (
+        (triangle[:, 0] == triangle[:, 1])
+        | (triangle[:, 1] == triangle[:, 2])
+        | (triangle[:, 2] == triangle[:, 0])
+    )
+
+    def keep(good: NDArray[np.bool_], code: str, what: str) -> None:
+        nonlocal triangle, owner
+        bad = len(good) - int(good.sum())
+        if not bad:
+            return
+        triangle, owner = triangle[good], owner[good]
+        if code:
+            some = "1 triangle" if bad == 1 else f"{bad} triangles"
+            warnings.append(SceneWarning(code, f"{some} {what} left out", name))
+
+    keep(~(stitched & repeats), "", "")
+    within = in_range(triangle, start[owner], start[owner + 1])
+    if not within.all():
+        keep(within, "index-range", "that name a vertex which does not exist")
+    usable = usable_vertices(position)
+    if not usable.all():
+        keep(usable[triangle].all(axis=1), "bad-vertices", "with NaN, infinite or huge coordinates")
+    keep(~zero_area(position, triangle), "zero-area", "without area")
+    material = np.array([p.material for p in primitives], np.int32)[owner]
+    double_sided = np.array([m.double_sided for m in materials], bool)
+    keep(
+        ~duplicates(position, triangle, material, double_sided), "duplicate-faces", "that repeat another face"
+    )
+    return [triangle[owner == i] - start[i] for i in range(len(primitives))]
+
+
+class _Part:
+    """The good triangles of a primitive with the rows of its arrays that they use."""
+
+    def __init__(self, source: PrimitiveArrays, triangle: NDArray[np.int64]) -> None:
+        self.source = source
+        if source.normal is None:
+            # Flat normals differ at each corner, so nothing is shared (glTF 2.0, section 3.7.2.1).
+            self.row = triangle.reshape(-1)
+            self.triangle = np.arange(len(self.row)).reshape(-1, 3)
+            return
+        used = np.zeros(len(source.position), bool)
+        used[triangle] = True
+        self.row = np.flatnonzero(used)
+        self.triangle = triangle if len(self.row) == len(used) else (np.cumsum(used) - 1)[triangle]
+
+    def normal(self, name: str, warnings: list[SceneWarning]) -> NDArray[np.float32]:
+        position = self.source.position[self.row]
+        if self.source.normal is None:
+            flat = face_normal(position, self.triangle)
+            return np.repeat(_unit(flat), 3, axis=0).astype(np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            given = self.source.normal[self.row].astype(np.float64)
+            length = np.sqrt((given * given).sum(axis=1))
+            bad = ~(np.isfinite(length) & (length > 1e-12))
+        if bad.any():
+            some = f"{int(bad.sum())} vertex normals"
+            warnings.append(
+                SceneWarning("bad-normals", f"{some} of no length or not finite were made anew", name)
+            )
+            smooth = np.zeros_like(given)
+            face = face_normal(position, self.triangle)
+            for axis in range(3):
+                smooth[:, axis] = np.bincount(
+                    self.triangle.reshape(-1), np.repeat(face[:, axis], 3), minlength=len(smooth)
+                )
+            # Faces that cancel out leave no direction: the vertex takes the normal of its first face.
+            lost = bad & (np.abs(smooth).max(axis=1) == 0)
+            first = np.zeros(len(smooth), np.int64)
+            first[self.triangle.reshape(-1)[::-1]] = np.repeat(np.arange(len(face)), 3)[::-1]
+            smooth[lost] = face[first[lost]]
+            given[bad] = smooth[bad]
+        return _unit(given).astype(np.float32)
+
+    def texcoord(self, number: int) -> NDArray[np.float32]:
+        value = self.source.texcoord.get(number)
+        if value is None:
+            return np.zeros((len(self.row), 2), np.float32)
+        return np.nan_to_num(value[self.row], nan=0.0, posinf=0.0, neginf=0.0)
+
+    def colour(self) -> NDArray[np.float32]:
+        if self.source.colour is None:
+            return np.ones((len(self.row), 4), np.float32)
+        # glTF clamps vertex colours to 0..1 (section 3.7.2.1); NaN counts as white.
+        return np.clip(np.nan_to_num(self.source.colour[self.row], nan=1.0), 0.0, 1.0)
+
+
+def _texcoord_sets(
+    name: str, parts: Sequence[_Part], materials: Sequence[Material], warnings: list[SceneWarning]
+) -> set[int]:
+    """Return the numbers of the sets that the mesh must have."""
+    sets: set[int] = set()
+    for part in parts:
+        sets.update(part.source.texcoord)
+        material = materials[part.source.material]
+        for texture in (material.base_colour_texture, material.emission_texture):
+            if texture is not None and texture.texcoord not in part.source.texcoord:
+                sets.add(texture.texcoord)
+                lacks = f"which primitive {part.source.index} lacks"
+                message = f"material '{material.name}' reads TEXCOORD_{texture.texcoord}, {lacks}"
+                warnings.append(SceneWarning("missing-texcoord", message, name))
+    for number in sorted(sets):
+        values = [part.source.texcoord[number] for part in parts if number in part.source.texcoord]
+        if not all(np.isfinite(value).all() for value in values):
+            message = f"TEXCOORD_{number} holds NaN or infinite values, read as 0"
+            warnings.append(SceneWarning("bad-texcoord", message, name))
+    return sets
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    # By the largest component first, so that squares of tiny or huge vectors stay in range.
+    scaled: NDArray[np.float64] = vector / np.maximum(np.abs(vector).max(axis=1, keepdims=True), 1e-300)
+    length = np.sqrt((scaled * scaled).sum(axis=1, keepdims=True))
+    scaled /= np.maximum(length, 1e-300)
+    return scaled

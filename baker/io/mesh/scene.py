@@ -1,0 +1,82 @@
+"""Makes a `Scene` of plain meshes for formats that have neither nodes nor metres nor a fixed up axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
+from baker.io.load import SceneFile
+from baker.io.mesh.build import build_mesh
+
+
+def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.float32]:
+    """Return (N, 3) vectors with +Y up and times `scale`, float32.
+
+    Parameters
+    ----------
+    vector : (N, 3) float64
+    up : str
+        "z" turns the vectors by -90 degrees about x: (x, y, z) becomes (x, z, -y).
+    scale : float
+        Metres per unit.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        turned = np.stack([vector[:, 0], vector[:, 2], -vector[:, 1]], axis=1) if up == "z" else vector
+        scaled: NDArray[np.float32] = (turned * scale).astype(np.float32)
+    return scaled
+
+
+def scene_of_meshes(
+    source: SceneFile,
+    groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]],
+    materials: Sequence[Material],
+    warnings: Sequence[SceneWarning],
+    sha256: str,
+) -> Scene:
+    """Return a scene with one mesh and one instance for each named group, nodes numbered from 0.
+
+    Raises
+    ------
+    InputError
+        If no triangle is left, unless the source is read leniently.
+    """
+    found = list(warnings)
+    meshes: list[Mesh] = []
+    instances: list[Instance] = []
+    for name, primitives in groups:
+        mesh, defects = build_mesh(name, primitives, materials)
+        found += defects
+        if mesh is not None:
+            instances.append(Instance(len(meshes), name, len(meshes), np.eye(4)))
+            meshes.append(mesh)
+        elif any(len(p.triangle) for p in primitives):
+            found.append(
+                SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
+            )
+    if not meshes and not source.lenient:
+        detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in found[:3])
+        message = (
+            f"there is nothing to bake: the file holds no usable triangle{f' ({detail})' if detail else ''}"
+        )
+        raise InputError(message, file=str(source.path))
+    return Scene(
+        name=source.path.name.split(".")[0],
+        path=source.path,
+        meshes=tuple(meshes),
+        materials=tuple(materials),
+        instances=tuple(instances),
+        warnings=tuple(found),
+        sha256=sha256,
+        raw=_raw(groups) if source.lenient else None,
+    )
+
+
+def _raw(groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]]) -> RawScene:
+    meshes = tuple(RawMesh(name, tuple(primitives)) for name, primitives in groups)
+    stand = tuple(RawInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
+    return RawScene(meshes, stand)

@@ -1,1 +1,0 @@
-"""Findings about a scene before any light is computed."""

@@ -1,1 +1,0 @@
-"""Mends scenes where that cannot change their look."""

@@ -1,0 +1,69 @@
+"""The texels at which a bake is furthest from its reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.scene import Instance
+from baker.metrics.error_metrics import dark_floor, relative_error
+
+_WORST = 10
+
+
+def worst_texels(
+    instances: Sequence[Instance],
+    size: int,
+    pixel: NDArray[np.int64],
+    owner: NDArray[np.int32],
+    position: NDArray[np.float64],
+    channels: Mapping[str, Any],
+) -> list[dict[str, Any]]:
+    """Return the texels of the largest error, beyond three standard errors of the reference, worst first.
+
+    Parameters
+    ----------
+    instances : sequence of Instance
+    size : int
+        Width and height of a page.
+    pixel : (n,) int64
+        (page * size + row) * size + column.
+    owner : (n,) int32
+        Instance of each texel.
+    position : (n, 3) float64
+        World.
+    channels : mapping of name to an object with `value`, `reference`, `standard_error`, (n, C) each
+    """
+    found = []
+    for name, check in channels.items():
+        floor = dark_floor(check.reference)
+        error = relative_error(check.value, check.reference, floor)
+        noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
+        sure = error - 3.0 * noise / np.maximum(check.reference.mean(axis=1), max(floor, 1e-12))
+        for i in np.argsort(-sure, kind="stable")[:_WORST]:
+            page, rest = divmod(int(pixel[i]), size * size)
+            instance = instances[int(owner[i])]
+            found.append(
+                {
+                    "object": instance.name,
+                    "node": instance.node,
+                    "channel": name,
+                    "page": page,
+                    "row": rest // size,
+                    "column": rest % size,
+                    "position": position[i].tolist(),
+                    "value": check.value[i].tolist(),
+                    "reference": check.reference[i].tolist(),
+                    "standard_error": noise[i],
+                    "error": error[i],
+                    "sure": float(sure[i]),
+                }
+            )
+    found.sort(key=lambda entry: -entry["sure"])
+    for entry in found:
+        entry["standard_error"], entry["error"] = float(entry["standard_error"]), float(entry["error"])
+        del entry["sure"]
+    return found[:_WORST]

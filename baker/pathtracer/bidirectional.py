@@ -1,0 +1,453 @@
+"""Paths from lamps and paths from the eye, connected in all ways, many at once in packets.
+
+Each sample starts a subpath at a lamp, keeps its vertices, then walks from the eye; every vertex there looks
+at a lamp and at all kept vertices. With a camera, kept vertices look at its pinhole as well: what they send
+there is a *splat* on whatever pixel they are seen through. Weights: `bidirectional_weights`.
+
+A lamp's subpath has at most `MOST_FROM_LAMP` vertices, the eye's as many as Russian roulette lets live. The
+weights count exactly the ways that are there: what is too long for the lamp's side is made from the eye's.
+
+Based on: Lafortune and Willems, Bi-directional path tracing, 1993; Veach and Guibas, Bidirectional estimators
+for light transport, 1994; Dutre, Lafortune and Willems, Monte Carlo light tracing with direct computation of
+pixel intensities, 1993.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baker.kernels.emitters import emitter_at
+from baker.kernels.transmittance import follow_packet, light_kept, trace_shadow_packet
+from baker.pathtracer.bidirectional_lights import (
+    aim_both_ways,
+    fade,
+    meet_emitter,
+    meet_sky,
+    range_of_lamp,
+    start_at_lamp,
+)
+from baker.pathtracer.bidirectional_weights import (
+    BACK,
+    CHAIN,
+    MOST_FROM_LAMP,
+    N_ROWS_BOTH,
+    OPEN,
+    leave_vertex,
+    meet,
+    pixel_density,
+    pixel_of,
+    reach_vertex,
+    towards_eye,
+    towards_lamp,
+)
+from baker.pathtracer.bsdf import N_PARAMETERS, bsdf_sample
+from baker.pathtracer.light_table import SHORT, on_whole_triangle
+from baker.pathtracer.light_table import TEXTURED as GLOWS
+from baker.pathtracer.rng import draw, path_state, stratum
+from baker.pathtracer.scene import EMITTER, SHINES, TEXTURED
+from baker.pathtracer.vertex import (
+    BETA,
+    BOUNCES,
+    DENSITY,
+    FRAME,
+    GO,
+    GRAZE,
+    LIGHT,
+    MOST,
+    NORMAL,
+    PLACE,
+    SHADED,
+    SURE,
+    TO,
+    arrive,
+    glow,
+    paint,
+    start_path,
+)
+from baker.trace.jit import inner, kernel, scratch
+from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
+
+_IDLE, _RAY, _VERTEX = 0, 1, 2
+# Working memory of a tile; kept vertices stand in column (vertex * MAX_WIDTH + lane).
+_new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
+_new_row, _new_kept_row = (scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
+_new_numbers, _new_state, _new_flags, _new_first = (
+    scratch((MAX_WIDTH,), kind) for kind in (np.int64, np.uint64, np.bool_, np.float64)
+)
+_new_value, _new_rgba, _new_way, _new_spot = (scratch((n,), np.float64) for n in (3, 4, 6, 2))
+_new_values = scratch((3, MAX_WIDTH), np.float64)
+
+
+@inner
+def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):  # type: ignore[no-untyped-def]
+    """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
+    at_surface = n_subpaths == 0.0
+    start_path(path, row, lane, where, toward, normal, at_surface, sizes)
+    for r in range(BACK, N_ROWS_BOTH):
+        path[r, lane] = 0.0
+    if at_surface:
+        for a in range(3):
+            path[SHADED + a, lane] = toward[a]
+            path[BACK + a, lane] = toward[a]
+    else:
+        path[DENSITY, lane] = pixel_density(camera, toward)
+        path[OPEN, lane] = n_subpaths
+
+
+@inner
+def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ignore[no-untyped-def]
+    """Choose the direction in which a subpath goes on; return False where it ends.
+
+    eye : whether it began at the eye; choice, u, w : uniform numbers; value, spare : (3,) working memory
+    """
+    lx, ly, lz, density, smooth = bsdf_sample(
+        row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], choice, u, w, value
+    )
+    dx = lx * path[FRAME, lane] + ly * path[FRAME + 3, lane] + lz * path[FRAME + 6, lane]
+    dy = lx * path[FRAME + 1, lane] + ly * path[FRAME + 4, lane] + lz * path[FRAME + 7, lane]
+    dz = lx * path[FRAME + 2, lane] + ly * path[FRAME + 5, lane] + lz * path[FRAME + 8, lane]
+    above = dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane]
+    if above <= 0.0 or (density <= 0.0 and not smooth):
+        return False
+    bx, by, bz = path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane]
+    if smooth:
+        density = reverse = 1.0
+        shaded = bx * path[SHADED, lane] + by * path[SHADED + 1, lane] + bz * path[SHADED + 2, lane]
+        if shaded <= GRAZE:
+            # The normal was replaced for this viewer: from the other side it is another mirror.
+            if not eye:
+                return False
+            reverse = 0.0
+        if not eye:
+            back = bx * path[NORMAL, lane] + by * path[NORMAL + 1, lane] + bz * path[NORMAL + 2, lane]
+            for c in range(3):
+                value[c] *= above / max(back, 1.0e-12)
+    elif eye:
+        _, reverse = meet(path, row, lane, bx, by, bz, dx, dy, dz, spare)
+    else:
+        reverse, _ = meet(path, row, lane, dx, dy, dz, bx, by, bz, value)
+        for c in range(3):
+            value[c] *= above / density
+    path[GO, lane], path[GO + 1, lane], path[GO + 2, lane] = dx, dy, dz
+    leave_vertex(path, lane, density, reverse, smooth, MOST_FROM_LAMP if eye else 1)
+    most = 0.0
+    for c in range(3):
+        path[BETA + c, lane] *= value[c]
+        most = max(most, path[BETA + c, lane])
+    return most > 0.0
+
+
+@inner
+def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: ignore[no-untyped-def]
+    """Connect an eye subpath's end to vertex k of `kept`, the s-th of a lamp's; return if that brings light.
+
+    value : (3,) output, the light if nothing is in the way; way : (6,) output, unit direction and reach
+    """
+    dx = kept[PLACE, k] - path[PLACE, lane]
+    dy = kept[PLACE + 1, k] - path[PLACE + 1, lane]
+    dz = kept[PLACE + 2, k] - path[PLACE + 2, lane]
+    square = dx * dx + dy * dy + dz * dz
+    if square <= 0.0:
+        return False
+    length = math.sqrt(square)
+    dx, dy, dz = dx / length, dy / length, dz / length
+    here = dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane]
+    there = -(dx * kept[NORMAL, k] + dy * kept[NORMAL + 1, k] + dz * kept[NORMAL + 2, k])
+    if here <= 0.0 or there <= 0.0:
+        return False
+    eye_here, lamp_here = meet(
+        path, row, lane, path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane], dx, dy, dz, value
+    )
+    eye_there, lamp_there = meet(
+        kept, kept_row, k, -dx, -dy, -dz, kept[BACK, k], kept[BACK + 1, k], kept[BACK + 2, k], spare
+    )
+    less = towards_lamp(kept, k, eye_here * there / square, eye_there)
+    more = towards_eye(path, lane, lamp_there * here / square, lamp_here, MOST_FROM_LAMP - s)
+    scale = here * there / (square * (1.0 + less + more))
+    total = 0.0
+    for c in range(3):
+        value[c] *= path[BETA + c, lane] * kept[BETA + c, k] * spare[c] * scale
+        total += value[c]
+    way[0], way[1], way[2], way[3] = dx, dy, dz, length * SHORT
+    return total > 0.0
+
+
+@inner
+def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-untyped-def]
+    """Connect a lamp's subpath to the camera; return the pixel it is seen through, or -1.
+
+    value : (3,) output, light for the sum over the subpaths of all pixels; way : (6,) output, see `connect`
+    """
+    for a in range(3):
+        way[a] = path[PLACE + a, lane] - camera[a]
+    square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+    if square <= 0.0:
+        return -1
+    length = math.sqrt(square)
+    for a in range(3):
+        way[a] /= length
+    pixel = pixel_of(camera, way)
+    cosine = -(
+        way[0] * path[NORMAL, lane] + way[1] * path[NORMAL + 1, lane] + way[2] * path[NORMAL + 2, lane]
+    )
+    if pixel < 0 or cosine <= 0.0:
+        return -1
+    density = pixel_density(camera, way) * cosine / square
+    way[0], way[1], way[2], way[3] = -way[0], -way[1], -way[2], length * SHORT
+    reverse, _ = meet(
+        path, row, lane, way[0], way[1], way[2], path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane],
+        value,
+    )  # fmt: skip
+    less = towards_lamp(path, lane, density, reverse) / n_subpaths
+    total = 0.0
+    for c in range(3):
+        value[c] *= path[BETA + c, lane] * density / (n_subpaths * (1.0 + less))
+        total += value[c]
+    return pixel if total > 0.0 else -1
+
+
+@kernel
+def trace_both_ways(  # type: ignore[no-untyped-def]
+    where, toward, normal, begin, camera, n_subpaths, surfaces, lamps, shading, sphere, caster, net, how, out,
+    splat_pixel, splat,
+):  # fmt: skip
+    """Do what `trace_paths` does, with paths from both ends.
+
+    where, toward, normal, begin, surfaces, lamps, shading, caster, net, how, out : see `trace_paths`
+    camera : (15,) float64: position, right, up, forward, tangent of half the height, pixels across and down
+    n_subpaths : float, lamps' subpaths that can be seen by one pixel for each of the pixel's own samples,
+        which is the number of pixels; 0 if paths begin at surfaces
+    sphere : (4,) float64, `Reference.sphere`
+    splat_pixel : (q,) int64 and splat : (q, 3) float64 output, sums as in `out` for pixels anywhere; q at
+        least m n (`MOST_FROM_LAMP` - 1) with a camera
+
+    Returns
+    -------
+    tuple of int
+        Closest-hit rays, shadow rays, splats.
+    """
+    width, scene, intersect, occluded = caster.width, caster.scene, caster.intersect, caster.occluded
+    valid, floats, words = caster.valid, caster.floats, caster.words
+    surface, material, least, lambertian = (
+        surfaces.row,
+        surfaces.material,
+        surfaces.least,
+        surfaces.lambertian,
+    )
+    sizes = (least, surfaces.most)
+    triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
+    cumulative, sky = lamps.cumulative, lamps.sky
+    alpha = len(shading.alpha.slot) > 0
+    strata, most_bounces, seed, number_of_pass = how[2], how[4], how[5], how[6]
+    # A path may have so many bounces that a lamp's subpath must end before.
+    most_kept = MOST_FROM_LAMP
+    if most_bounces >= 0:
+        most_kept = min(MOST_FROM_LAMP, most_bounces + (2 if n_subpaths > 0.0 else 1))
+    lit = cumulative[len(cumulative) - 1] > 0.0
+    path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
+    # Vertices of the lane's subpath from a lamp, the lamp among them.
+    count = _new_numbers()
+    # Its brightest colour at the start, and 1 / range^2 of its lamp.
+    eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
+    value, spare, way, rgba, spot = _new_value(), _new_value(), _new_way(), _new_rgba(), _new_spot()
+    values, state = _new_values(), _new_state()
+    pixel, stage, job = _new_numbers(), _new_numbers(), _new_numbers()
+    for lane in range(MAX_WIDTH):
+        job[lane] = -1
+    samples, m, places = len(net), where.shape[0], where.shape[1]
+    following = rays = shadows = splats = 0
+    while True:
+        any_ray = any_path = False
+        for lane in range(width):
+            if stage[lane] == _IDLE and following < m * samples:
+                i, s = following % m, following // m
+                job[lane] = following
+                following += 1
+                state[lane] = path_state(seed, number_of_pass, begin + i, s)
+                count[lane] = 1
+                eye[lane] = True
+                if lit and most_kept > 1:
+                    choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
+                    a, b = draw(state, lane), draw(state, lane)
+                    lamp = start_at_lamp(
+                        path, lane, triangle, point, cumulative, sky, sphere, least, choice, u, w, a, b, spot
+                    )
+                    if lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
+                        for c in range(3):
+                            value[c] = path[BETA + c, lane]
+                        u, v = on_whole_triangle(triangle, lamp, spot[0], spot[1])
+                        glow(shading, number[lamp], u, v, value, rgba, True)
+                        for c in range(3):
+                            path[BETA + c, lane] = value[c]
+                    inverse_range[lane] = range_of_lamp(point, lamp, len(triangle))
+                    first[lane] = max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane])
+                    if first[lane] > 0.0:
+                        eye[lane] = False
+                        stage[lane] = _RAY
+                if eye[lane]:
+                    k = (number_of_pass * samples + s) % places
+                    start_at_eye(
+                        path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
+                    )
+                    stage[lane] = _VERTEX if n_subpaths == 0.0 else _RAY
+            any_path = any_path or stage[lane] != _IDLE
+            valid[lane] = 0
+            if stage[lane] == _RAY:
+                set_ray(
+                    floats, words, width, lane,
+                    path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
+                    path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
+                )  # fmt: skip
+                valid[lane] = -1
+                any_ray = True
+                rays += 1
+        if not any_path:
+            break
+        if any_ray:
+            trace(intersect, scene, valid, floats)
+            follow_packet(caster.tint, occluded, width, valid, floats, True)
+            for lane in range(width):
+                if stage[lane] == _RAY:
+                    for c in range(3):
+                        path[BETA + c, lane] *= light_kept(caster.tint, c, lane)
+        for lane in range(width):
+            if stage[lane] != _RAY:
+                continue
+            alive = words[GEOM_ID * width + lane] != NO_HIT
+            seen = n_subpaths > 0.0 and path[BOUNCES, lane] < 0.0
+            if alive:
+                prim = np.int64(words[PRIM_ID * width + lane])
+                u = np.float64(floats[HIT_U * width + lane])
+                v = np.float64(floats[HIT_V * width + lane])
+                alive = arrive(path, row, lane, surface, material, prim, u, v, least, lambertian)
+                if alive and not eye[lane] and count[lane] == 1 and inverse_range[lane] > 0.0:
+                    distance = np.float64(floats[TFAR * width + lane])
+                    alive = fade(path, lane, distance, inverse_range[lane])
+                if alive:
+                    reach_vertex(
+                        path, lane, np.float64(floats[TFAR * width + lane]),
+                        MOST_FROM_LAMP if eye[lane] else 1,
+                    )  # fmt: skip
+                    if eye[lane] and surface[prim, SHINES] > 0.0:
+                        e = emitter_at(
+                            node, np.int64(surface[prim, EMITTER]),
+                            floats[HIT_U * width + lane], floats[HIT_V * width + lane],
+                        )  # fmt: skip
+                        meet_emitter(path, lane, surface, prim, triangle, e, seen, value)
+                        if surface[prim, SHINES] > 1.0:
+                            glow(shading, prim, u, v, value, rgba, False)
+                        for c in range(3):
+                            path[LIGHT + c, lane] += value[c]
+                    if surface[prim, TEXTURED] > 0.0:
+                        paint(row, lane, shading, prim, u, v, material, rgba)
+            elif eye[lane]:
+                meet_sky(path, lane, sky, sphere, seen, value)
+                for c in range(3):
+                    path[LIGHT + c, lane] += value[c]
+            if eye[lane]:
+                path[BOUNCES, lane] += 1.0
+                alive = alive and not (most_bounces >= 0 and path[BOUNCES, lane] > most_bounces)
+            elif alive:
+                k = count[lane] * MAX_WIDTH + lane
+                count[lane] += 1
+                for r in range(CHAIN + 1):
+                    kept[r, k] = path[r, lane]
+                for r in range(N_PARAMETERS):
+                    kept_row[r, k] = row[r, lane]
+            stage[lane] = _VERTEX if alive else _IDLE
+        # Connection 0 aims at a lamp or, from a lamp's side, at the camera; the others take kept vertices.
+        step = 0
+        while step < MOST_FROM_LAMP:
+            any_shadow = more = False
+            for lane in range(width):
+                valid[lane] = 0
+                if stage[lane] != _VERTEX:
+                    continue
+                found = False
+                if not eye[lane]:
+                    if step == 0 and n_subpaths > 0.0:
+                        pixel[lane] = show(path, row, lane, camera, n_subpaths, value, way)
+                        found = pixel[lane] >= 0
+                elif step == 0:
+                    more = more or count[lane] > 1
+                    if lit:
+                        choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
+                        if strata and path[BOUNCES, lane] == 0.0:
+                            u, w = stratum(
+                                net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 0
+                            )
+                        lamp = aim_both_ways(
+                            path, row, lane, triangle, point, cumulative, sky, sphere, choice, u, w, value,
+                            way,
+                        )  # fmt: skip
+                        if 0 <= lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
+                            u, v = on_whole_triangle(triangle, lamp, way[4], way[5])
+                            glow(shading, number[lamp], u, v, value, rgba, True)
+                        found = lamp >= 0
+                elif step < count[lane]:
+                    more = more or step + 1 < count[lane]
+                    if most_bounces < 0 or step + path[BOUNCES, lane] <= most_bounces:
+                        k = step * MAX_WIDTH + lane
+                        found = connect(path, row, lane, kept, kept_row, k, step + 1, value, spare, way)
+                if found:
+                    set_ray(
+                        floats, words, width, lane,
+                        path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
+                        way[0], way[1], way[2], np.float32(way[3]),
+                    )  # fmt: skip
+                    valid[lane] = -1
+                    any_shadow = True
+                    shadows += 1
+                    for c in range(3):
+                        values[c, lane] = value[c]
+            if any_shadow:
+                trace_shadow_packet(caster.tint, occluded, scene, width, valid, floats)
+                for lane in range(width):
+                    if valid[lane] == 0 or floats[TFAR * width + lane] < np.float32(0.0):
+                        continue
+                    if eye[lane]:
+                        for c in range(3):
+                            path[LIGHT + c, lane] += values[c, lane] * light_kept(caster.tint, c, lane)
+                    else:
+                        splat_pixel[splats] = pixel[lane]
+                        for c in range(3):
+                            splat[splats, c] = values[c, lane] * light_kept(caster.tint, c, lane)
+                        splats += 1
+            if not more:
+                break
+            step += 1
+        for lane in range(width):
+            alive = stage[lane] == _VERTEX
+            if alive and not eye[lane]:
+                alive = count[lane] < most_kept
+            if alive:
+                choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
+                if eye[lane] and strata and path[BOUNCES, lane] == 0.0:
+                    u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1)
+                alive = scatter_both(path, row, lane, eye[lane], choice, u, w, value, spare)
+                length = path[BOUNCES, lane] if eye[lane] else np.float64(count[lane] - 1)
+                if alive and length >= SURE:
+                    survive = max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane])
+                    survive = min(survive if eye[lane] else survive / first[lane], MOST)
+                    alive = draw(state, lane) < survive
+                    for c in range(3):
+                        path[BETA + c, lane] /= survive
+                stage[lane] = _RAY if alive else _IDLE
+            if alive or job[lane] < 0:
+                continue
+            if eye[lane]:
+                for c in range(3):
+                    out[job[lane] % m, c] += path[LIGHT + c, lane]
+                job[lane] = -1
+                stage[lane] = _IDLE
+            else:
+                i, s = job[lane] % m, job[lane] // m
+                k = (number_of_pass * samples + s) % places
+                start_at_eye(
+                    path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
+                )
+                eye[lane] = True
+                stage[lane] = _VERTEX if n_subpaths == 0.0 else _RAY
+    return rays, shadows, splats

@@ -1,0 +1,101 @@
+"""Passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
+
+Splats land anywhere in a picture. Each tile lists its own; the lists are added up tile after tile, so the
+sums do not depend on threads, and block by block, so that not many are in memory at a time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress
+from baker.core.scene import Camera
+from baker.pathtracer.bidirectional import trace_both_ways
+from baker.pathtracer.bidirectional_weights import MOST_FROM_LAMP
+from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.point_estimate import PointEstimate, add_pass
+from baker.pathtracer.scene import Reference
+from baker.trace.packets import new_caster
+
+_TILE = 512
+_BLOCK = 64 * _TILE
+
+
+def surface_tile(
+    reference: Reference,
+    places: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    begin: int,
+    net: NDArray[np.uint32],
+    setting: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Add E / pi of points to `out` (m, 3), see `irradiance_pass`; return closest-hit and shadow rays."""
+    rays, shadows, _ = trace_both_ways(
+        *places, begin, np.zeros(15), 0.0, reference.surfaces, reference.lamps, reference.shading,
+        reference.sphere, new_caster(reference.rays.tracer), net, setting, out, np.zeros(0, np.int64),
+        np.zeros((0, 3)),
+    )  # fmt: skip
+    return int(rays), int(shadows)
+
+
+def picture_pass(
+    reference: Reference,
+    estimate: PointEstimate,
+    camera: Camera,
+    width: int,
+    height: int,
+    net: NDArray[np.uint32],
+    setting: NDArray[np.int64],
+    seed: int,
+    progress: Progress,
+) -> None:
+    """Add one pass of radiance through every pixel; see `radiance_pass`."""
+    n, samples, number = width * height, estimate.samples, estimate.rounds
+    eye = reference.local(camera.position)
+    lens = np.array(
+        [
+            *eye,
+            *camera.right,
+            *camera.up,
+            *camera.forward,
+            math.tan(0.5 * camera.fov),
+            width,
+            height,
+        ]
+    )
+    seen, splatted = np.zeros((n, 3)), np.zeros((n, 3))
+    for block in range(0, n, _BLOCK):
+        span = min(_BLOCK, n - block)
+        found: list[Any] = [None] * -(-span // _TILE)
+
+        def work(begin: int, end: int, block: int = block, found: list[Any] = found) -> None:
+            pixel = np.arange(block + begin, block + end)
+            way = camera_rays(camera, width, height, pixel, samples, seed, number)
+            origin = np.broadcast_to(eye, way.shape).copy()
+            most = len(pixel) * samples * (MOST_FROM_LAMP - 1)
+            splat_pixel, splat = np.zeros(most, np.int64), np.zeros((most, 3))
+            span = slice(block + begin, block + end)
+            cast, shadows, splats = trace_both_ways(
+                origin, way, way, block + begin, lens, float(n), reference.surfaces, reference.lamps,
+                reference.shading, reference.sphere, new_caster(reference.rays.tracer), net, setting,
+                seen[span], splat_pixel, splat,
+            )  # fmt: skip
+            found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast, shadows)
+
+        def told(stage: str, fraction: float, detail: str = "", block: int = block, span: int = span) -> Any:
+            return progress(stage, (block + fraction * span) / n, detail)
+
+        run_tiles(span, _TILE, work, threads=reference.threads, stage="path tracing", progress=told)
+        # The order of tiles, not that of threads.
+        for splat_pixel, splat, cast, shadows in found:
+            for c in range(3):
+                splatted[:, c] += np.bincount(splat_pixel, splat[:, c], n)
+            estimate.segments += int(cast)
+            estimate.rays += int(cast + shadows)
+    add_pass(estimate, np.arange(n), (seen + splatted) / samples)
+    estimate.rounds += 1

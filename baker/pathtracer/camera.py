@@ -1,0 +1,117 @@
+"""A pinhole camera: its rays, and how one is described on a command line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import SettingsError
+from baker.core.scene import Camera
+from baker.kernels.sampling import hash_u32
+from baker.pathtracer.rng import mix64
+from baker.trace.jit import inner, kernel
+
+
+def parse_camera(text: str) -> Camera:
+    """Return the camera of "PX,PY,PZ,TX,TY,TZ,FOV": position, target, vertical field of view in degrees.
+
+    Raises
+    ------
+    SettingsError
+        If that is not what the text says, or it looks nowhere.
+    """
+    try:
+        px, py, pz, tx, ty, tz, fov = (float(part) for part in text.split(","))
+    except ValueError:
+        message = "seven numbers are needed: position x,y,z, target x,y,z, vertical field of view in degrees"
+        raise SettingsError(f"'{text[:60]}' is no camera; {message}", object="--camera") from None
+    if not all(math.isfinite(v) for v in (px, py, pz, tx, ty, tz)):
+        raise SettingsError(f"'{text[:60]}' holds a number that is not finite", object="--camera")
+    if not 0 < fov < 180:
+        raise SettingsError("the field of view must be above 0 and below 180 degrees", object="--camera")
+    return look_at((px, py, pz), (tx, ty, tz), fov)
+
+
+def look_at(position: tuple[float, float, float], target: tuple[float, float, float], fov: float) -> Camera:
+    """Return a camera at `position` towards `target` with +Y up; fov in degrees.
+
+    Raises
+    ------
+    SettingsError
+        If target and position are one, or too far apart.
+    """
+    length = math.dist(target, position)
+    if not length > 0:
+        raise SettingsError("position and target are the same point; move one", object="--camera")
+    if not math.isfinite(length):
+        raise SettingsError("position and target are too far apart", object="--camera")
+    forward = np.subtract(target, position) / length
+    # Straight up or down +Y says nothing about what is up in the picture: -Z is.
+    hint = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.99999 else np.array([0.0, 0.0, -1.0])
+    right = np.cross(forward, hint)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    x, y, z = (tuple(float(v) for v in axis) for axis in (right, up, forward))
+    return Camera("camera", -1, position, x, y, z, math.radians(fov))  # type: ignore[arg-type]
+
+
+def camera_rays(
+    camera: Camera, width: int, height: int, pixel: NDArray[np.int64], samples: int, seed: int, number: int
+) -> NDArray[np.float64]:
+    """Return unit directions (n, samples, 3) through pixels, spread evenly over each pixel's square.
+
+    Parameters
+    ----------
+    pixel : (n,) int64
+        row * width + column, row 0 on top.
+    samples : int
+        Directions of each pixel in this pass: a lattice, shifted at random for each pixel and pass.
+    number : int
+        The pass.
+    """
+    lens = np.array([*camera.right, *camera.up, *camera.forward, math.tan(0.5 * camera.fov)])
+    way = np.zeros((len(pixel), samples, 3))
+    _fill(lens, width, height, pixel, _salt(seed, 2 * number), _salt(seed, 2 * number + 1), way)
+    return way
+
+
+@kernel
+def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-untyped-def]
+    """Write unit directions to `way` (n, samples, 3).
+
+    lens : (10,) float64: right, up, forward, tangent of half the height; first, second : uint64 salts
+    """
+    high = lens[9]
+    for i in range(len(pixel)):
+        row, column = pixel[i] // width, pixel[i] % width
+        u, v = _uniform(pixel[i], first), _uniform(pixel[i], second)
+        for k in range(way.shape[1]):
+            # Kronecker lattice of the plastic number (Roberts 2018): even for any count.
+            x = (k * 0.7548776662466927 + u) % 1.0
+            y = (k * 0.5698402909980532 + v) % 1.0
+            x = (2.0 * (column + x) / width - 1.0) * high * width / height
+            y = (1.0 - 2.0 * (row + y) / height) * high
+            square = 0.0
+            for a in range(3):
+                way[i, k, a] = lens[6 + a] + x * lens[a] + y * lens[3 + a]
+                square += way[i, k, a] * way[i, k, a]
+            scale = 1.0 / math.sqrt(square)
+            for a in range(3):
+                way[i, k, a] *= scale
+
+
+def _salt(seed: int, number: int) -> np.uint64:
+    """Return what makes the numbers of a seed and pass differ from all others."""
+    word = (seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF
+    # An array: arithmetic on single numbers warns of overflow.
+    return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)
+
+
+@inner
+def _uniform(pixel, salt):  # type: ignore[no-untyped-def]
+    """Return a uniform number of a pixel."""
+    return np.float64(mix64(np.uint64(pixel + 1) * np.uint64(0x9E3779B97F4A7C15) ^ salt) >> np.uint64(11)) * (
+        1.0 / 9007199254740992.0
+    )

@@ -1,0 +1,114 @@
+"""What camera rays meet first: where, which triangle, its albedo and normal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.transmittance import follow_packet, light_kept
+from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED, Reference
+from baker.pathtracer.vertex import base_colour
+from baker.trace.jit import kernel, scratch
+from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
+
+_new_colour = scratch((4,), np.float64)
+
+
+@dataclass(frozen=True)
+class FirstHits:
+    """First hits of n rays.
+
+    Attributes
+    ----------
+    triangle : (n,) int32, -1 where nothing is met
+    bary : (n, 2) float64, weights of corners 1 and 2
+    depth : (n,) float64, metres along the ray, inf where nothing is met
+    albedo : (n, 3) float64
+    position : (n, 3) float64
+    normal, face_normal : (n, 3) float64, towards the viewer, 0 where nothing is met
+    front : (n,) bool, the triangle's front is seen
+    lit : (n,) bool, the side seen reflects: a front, or of a two-sided surface
+    kept : (n, 3) float64, what light along the ray is multiplied by where it passes coloured surfaces
+    """
+
+    triangle: NDArray[np.int32]
+    bary: NDArray[np.float64]
+    depth: NDArray[np.float64]
+    albedo: NDArray[np.float64]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    face_normal: NDArray[np.float64]
+    front: NDArray[np.bool_]
+    lit: NDArray[np.bool_]
+    kept: NDArray[np.float64]
+
+
+def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[np.float64]) -> FirstHits:
+    """Trace rays from one point, or each from its own.
+
+    Parameters
+    ----------
+    origin : (3,) or (n, 3) float64
+    way : (n, 3) float64, unit
+    """
+    n = len(way)
+    triangle, bary = np.full(n, -1, np.int32), np.zeros((n, 2))
+    depth, albedo = np.full(n, np.inf), np.zeros((n, 3))
+    surfaces = reference.surfaces
+    origin = np.ascontiguousarray(np.broadcast_to(origin, (n, 3)))
+    caster, kept = new_caster(reference.rays.tracer), np.zeros((n, 3))
+    _meet(
+        origin, way, caster, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
+        albedo, kept,
+    )  # fmt: skip
+    row = surfaces.row[triangle].astype(np.float64)
+    weight = np.stack([1 - bary.sum(axis=1), bary[:, 0], bary[:, 1]], axis=1)
+    met = triangle >= 0
+    position = np.einsum("nk,nka->na", weight, row[:, CORNER : CORNER + 9].reshape(n, 3, 3))
+    normal = np.einsum("nk,nka->na", weight, row[:, SHADING : SHADING + 9].reshape(n, 3, 3))
+    face = row[:, FACE : FACE + 3]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    normal = np.where((normal * face).sum(axis=1, keepdims=True) <= 0, face, normal)
+    front = met & ((face * way).sum(axis=1) < 0)
+    sign = np.where(front, 1.0, -1.0)[:, None] * met[:, None]
+    lit = met & (front | (row[:, TWO_SIDED] > 0))
+    return FirstHits(triangle, bary, depth, albedo, position, sign * normal, sign * face, front, lit, kept)
+
+
+@kernel
+def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
+    width, scene, intersect = caster.width, caster.scene, caster.intersect
+    valid, floats, words = caster.valid, caster.floats, caster.words
+    colour = _new_colour()
+    for group in range(0, len(way), width):
+        for lane in range(width):
+            i = group + lane
+            valid[lane] = -1 if i < len(way) else 0
+            if i < len(way):
+                set_ray(
+                    floats, words, width, lane, origin[i, 0], origin[i, 1], origin[i, 2],
+                    way[i, 0], way[i, 1], way[i, 2],
+                    np.float32(1.0e30),
+                )  # fmt: skip
+        trace(intersect, scene, valid, floats)
+        follow_packet(caster.tint, caster.occluded, width, valid, floats, True)
+        for lane in range(width):
+            i = group + lane
+            if i >= len(way):
+                continue
+            for c in range(3):
+                kept[i, c] = light_kept(caster.tint, c, lane)
+            if words[GEOM_ID * width + lane] == NO_HIT:
+                continue
+            prim = np.int64(words[PRIM_ID * width + lane])
+            u, v = np.float64(floats[HIT_U * width + lane]), np.float64(floats[HIT_V * width + lane])
+            triangle[i], bary[i, 0], bary[i, 1], depth[i] = prim, u, v, floats[TFAR * width + lane]
+            m = np.int64(surface[prim, MATERIAL])
+            for c in range(3):
+                albedo[i, c] = material[m, c]
+            if surface[prim, TEXTURED] > 0.0:
+                base_colour(shading, prim, m, u, v, colour)
+                for c in range(3):
+                    albedo[i, c] *= colour[c]

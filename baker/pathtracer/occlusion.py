@@ -1,0 +1,179 @@
+"""Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
+
+Eight points at a time, each with the same sample: their rays share a packet and their first bits. So rays of
+points that are close together go alike, and Embree follows such a packet through its tree as one. Loops over
+lanes touch one array each, or they would not become vector code (see `path_blocks`).
+
+Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.sampling import cosine_direction, reverse_bits, scramble_reversed
+from baker.pathtracer.path_blocks import (
+    ALIVE,
+    BITANGENT,
+    CHOICE,
+    KEY,
+    LANES,
+    LOBE,
+    NORMAL,
+    SHADED,
+    TANGENT,
+    U_WAY,
+    VALUE,
+    W_WAY,
+)
+from baker.pathtracer.rng import mix4
+from baker.pathtracer.vertex_simd import stand_lanes
+from baker.trace.jit import inner, kernel, larger, smaller
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree_with
+
+_f = np.float32
+_w = np.uint32
+_ZERO, _ONE = _f(0.0), _f(1.0)
+_L = LANES
+# Rays go alike if they start within this share of their reach, or of the scene's size (`_FAR` * least).
+_ALIKE, _FAR = _f(0.125), _f(100.0)
+# Points that are looked at to tell if all are dense.
+_LOOK = 128
+# Numbers of ten bits with two zeros between any two bits.
+_SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
+
+
+def alike_within(reach: np.float32, least: np.float32) -> np.float32:
+    """Return how close together, metres, points are whose rays go alike; `least`, metres: see `Surfaces`."""
+    return np.float32(_ALIKE * min(reach, _FAR * least))
+
+
+def are_dense(position: NDArray[np.float64], alike: float) -> bool:
+    """Tell if most points (n, 3) are close to the next one: if so, sorting them is worth its time."""
+    first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
+    step = abs(position[first + 1] - position[first]).max(axis=1)
+    return bool(2 * np.count_nonzero(step < alike) > len(first))
+
+
+def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return an order (m,) of m > 0 points (m, 3) in which those close together follow each other."""
+    low = position.min(axis=0)
+    side = max(float((position.max(axis=0) - low).max()), 1.0e-30)
+    cell = ((position - low) * ((len(_SPREAD) - 0.5) / side)).astype(np.int64)
+    key = _SPREAD[cell[:, 0]] | _SPREAD[cell[:, 1]] << 1 | _SPREAD[cell[:, 2]] << 2
+    # Numbers are sorted in a fraction of the time that their order is found in.
+    return np.sort(key << 32 | np.arange(len(position))) & 0xFFFFFFFF
+
+
+@inner
+def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
+    """Write the two scramble seeds of points `group` to `group` + 8."""
+    for lane in range(min(LANES, len(name) - group)):
+        words[KEY * _L + lane] = name[group + lane]
+    for lane in range(LANES):
+        x, y, _, _ = mix4(words[KEY * _L + lane], _w(0xFFFFFFFE), _w(number), _w(salt))
+        words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
+
+
+@inner
+def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
+    """Write the lanes' uniform numbers, in [1, 2): the shared bits of (first, second), the rest scrambled."""
+    one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
+    for lane in range(LANES):
+        x = scramble_reversed(first, words[CHOICE * _L + lane])
+        y = scramble_reversed(second, words[LOBE * _L + lane])
+        x = reverse_bits(_w((x & own) | (first & shared)))
+        y = reverse_bits(_w((y & own) | (second & shared)))
+        words[U_WAY * _L + lane], words[W_WAY * _L + lane] = _w((x >> bits) | one), _w((y >> bits) | one)
+
+
+@inner
+def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
+    """Copy place k of points `group` to `group` + 8 into the lanes."""
+    for lane in range(min(LANES, len(position) - group)):
+        for a in range(3):
+            s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
+            s[(SHADED + a) * _L + lane] = normal[group + lane, k, a]
+            s[(NORMAL + a) * _L + lane] = face_normal[group + lane, k, a]
+
+
+@inner
+def extent(s, lanes):  # type: ignore[no-untyped-def]
+    """Return how far apart, along any axis, the first lanes' rays start."""
+    most = _ZERO
+    for a in range(3):
+        low = high = s[(ORG_X + a) * _L]
+        for lane in range(1, lanes):
+            low, high = smaller(low, s[(ORG_X + a) * _L + lane]), larger(high, s[(ORG_X + a) * _L + lane])
+        most = larger(most, high - low)
+    return most
+
+
+@inner
+def point_lanes(s, reach):  # type: ignore[no-untyped-def]
+    """Point the lanes' rays, cosine-weighted. What points below the facet is closed by the facet itself."""
+    for lane in range(LANES):
+        a, b, c = cosine_direction(s[U_WAY * _L + lane] - _ONE, s[W_WAY * _L + lane] - _ONE)
+        dx = a * s[TANGENT * _L + lane] + b * s[BITANGENT * _L + lane] + c * s[SHADED * _L + lane]
+        dy = (
+            a * s[(TANGENT + 1) * _L + lane]
+            + b * s[(BITANGENT + 1) * _L + lane]
+            + c * s[(SHADED + 1) * _L + lane]
+        )
+        dz = (
+            a * s[(TANGENT + 2) * _L + lane]
+            + b * s[(BITANGENT + 2) * _L + lane]
+            + c * s[(SHADED + 2) * _L + lane]
+        )
+        above = (
+            dx * s[NORMAL * _L + lane] + dy * s[(NORMAL + 1) * _L + lane] + dz * s[(NORMAL + 2) * _L + lane]
+        )
+        s[DIR_X * _L + lane], s[DIR_Y * _L + lane], s[DIR_Z * _L + lane] = dx, dy, dz
+        s[TFAR * _L + lane] = reach
+        s[ALIVE * _L + lane] = _ONE if above > _ZERO else _ZERO
+
+
+@inner
+def count_lanes(s):  # type: ignore[no-untyped-def]
+    """Count the lanes' rays that have met nothing in `VALUE`."""
+    for lane in range(LANES):
+        s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
+
+
+@kernel
+def open_rays(  # type: ignore[no-untyped-def]
+    position, normal, face_normal, name, memory, arguments, net, shared, reach, alike, sizes, how, out
+):
+    """Count the rays of points that meet nothing within reach.
+
+    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k;
+        rays are fastest if neighbours follow each other
+    name : (m,) int64, what random numbers a point has; memory : `PathMemory`
+    arguments : (2, 5) int64, `arguments_of` of packets whose rays do not go alike, and do
+    net : (n, 2) uint32; shared : uint32, bits that all points share
+    reach, alike : float32, metres, see `alike_within`; sizes : (2,) float32, `Surfaces.least` and `.most`
+    how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
+    """
+    scene, occluded = memory.scene, memory.occluded
+    on, s, words = memory.on, memory.s, memory.words
+    samples, places = len(net), position.shape[1]
+    for group in range(0, len(position), LANES):
+        lanes = min(LANES, len(position) - group)
+        seed_lanes(words, name, group, how[0], how[1])
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+            s[VALUE * LANES + lane] = _ZERO
+        for sample in range(samples):
+            k = (how[0] * samples + sample) % places
+            if sample == 0 or places > 1:
+                place_lanes(s, position, normal, face_normal, group, k)
+                stand_lanes(s, 0, sizes[0], sizes[1])
+            if sample == 0:
+                asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
+            number_lanes(words, net[sample, 0], net[sample, 1], shared)
+            point_lanes(s, reach)
+            call_embree_with(occluded, on, scene, s, asked)
+            count_lanes(s)
+        for lane in range(lanes):
+            out[group + lane, 0] += s[VALUE * LANES + lane]

@@ -1,0 +1,170 @@
+"""Eight paths side by side, and the blocks in which the paths of a tile wait between two rays.
+
+A block is a ray packet, with further rows of eight numbers behind the packet's own. It is traced where it
+lies and shaded where it lies. All of a block's rows stand at constant distances in one array: only so does
+the compiler know that rows do not overlap, and loops over lanes become vector code (loops as short as these
+only if all they touch is in one array). Paths that end leave gaps, which paths from the last blocks fill:
+packets stay full.
+
+Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van
+Antwerpen, Improving SIMD efficiency for parallel Monte Carlo light transport on the GPU, 2011 (compaction).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.transmittance import follow_packet, light_kept
+from baker.trace.embree import RayScene
+from baker.trace.jit import inner
+from baker.trace.packets import (
+    DIR_X,
+    GEOM_ID,
+    MASK,
+    NO_HIT,
+    ORG_X,
+    PRIM_ID,
+    ROWS,
+    TFAR,
+    Tint,
+    aligned_floats,
+    call_embree,
+    new_tint,
+)
+from baker.trace.pointers import prefetch
+
+# Paths in a block, blocks of a tile.
+LANES, BLOCKS = 8, 32
+# Rows behind the packet's. What lasts from ray to ray: throughput, density of the direction (0: emission
+# counts in full), its cosine to the normal it left, bounces (-1 before a camera ray's hit), point in the
+# tile, 1 for a path; as uint32: point, sample, twice the vertices so far.
+BETA, DENSITY, COSINE, BOUNCES, POINT, ALIVE = (ROWS + i for i in (0, 3, 4, 5, 6, 7))
+KEY, SAMPLE, COUNT = ROWS + 8, ROWS + 9, ROWS + 10
+# At a vertex: albedo, geometric normal on the side that was hit, shading normal, tangent, bitangent.
+ALBEDO, NORMAL, SHADED, TANGENT, BITANGENT = (ROWS + i for i in (11, 14, 17, 20, 23))
+# Uniform numbers, in [1, 2): two pairs (lamp, direction), one that decides whether the path goes on. As
+# uint32: what chooses a lamp, and a lobe.
+U_LAMP, W_LAMP, U_WAY, W_WAY, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
+CHOICE, LOBE = ROWS + 31, ROWS + 32
+# Ray to a lamp: direction, reach, light it brings, barycentrics of its end.
+TO_LAMP, REACH, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
+# Copies of the hit triangle's first columns and of the chosen lamp's row.
+TRIANGLE, LAMP = ROWS + 42, ROWS + 65
+N_ROWS = ROWS + 85
+BLOCK = N_ROWS * LANES
+# Shadow rays wait in as many packets, by lamp; behind the rows of their rays: light, point.
+BINS = 8
+BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
+
+_f = np.float32
+
+
+class PathMemory(NamedTuple):
+    """An Embree scene with a thread's memory for paths.
+
+    scene, intersect, occluded : RTCScene, rtcIntersect8 and rtcOccluded8
+    on (8,) int32 : lanes to trace
+    s (BLOCKS * BLOCK,) float32, words (the same as uint32) : blocks
+    bins (BINS * BIN_ROWS * 8,) float32 : packets of shadow rays
+    tint : see `Caster.tint`
+    """
+
+    scene: int
+    intersect: int
+    occluded: int
+    on: NDArray[np.int32]
+    s: NDArray[np.float32]
+    words: NDArray[np.uint32]
+    bins: NDArray[np.float32]
+    tint: Tint | None
+
+
+def new_path_memory(rays: RayScene) -> PathMemory:
+    """Return memory as Embree wants it; what no kernel changes is set here: time, tnear 0, the mask."""
+    on, s = aligned_floats(LANES).view(np.int32), aligned_floats(BLOCKS * BLOCK)
+    bins = aligned_floats(BINS * BIN_ROWS * LANES)
+    s.view(np.uint32).reshape(BLOCKS, N_ROWS, LANES)[:, MASK] = NO_HIT
+    bins.view(np.uint32).reshape(BINS, BIN_ROWS, LANES)[:, MASK] = NO_HIT
+    intersect, occluded = rays.functions(LANES)
+    tinted, coloured = rays.tracer.tint, rays.tracer.coloured
+    tint = None if tinted is None else new_tint(tinted, coloured)
+    return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins, tint)
+
+
+@inner
+def unsigned(place):  # type: ignore[no-untyped-def]
+    """Return a place in an array, said to be below 2^32: negative ones would count from the end."""
+    return np.int64(np.uint32(place))
+
+
+@inner
+def place_of(lane):  # type: ignore[no-untyped-def]
+    """Return where the first row of a lane is; lanes are numbered through all blocks."""
+    return unsigned(lane // LANES * BLOCK + lane % LANES)
+
+
+@inner
+def colour_lanes(tint, occluded, s, base, on):  # type: ignore[no-untyped-def]
+    """Multiply the lanes' throughput by the colours of what their rays passed."""
+    if tint is None:
+        return
+    follow_packet(tint, occluded, LANES, on, s[base : base + BLOCK], True)
+    for c in range(3):
+        for lane in range(LANES):
+            s[base + (BETA + c) * LANES + lane] *= light_kept(tint, c, lane)
+
+
+@inner
+def trace_blocks(s, words, blocks, on, intersect, occluded, scene, tint, surface):  # type: ignore[no-untyped-def]
+    """Trace the rays of the first blocks and ask for the rows (two cache lines each) of what they hit.
+
+    Shading begins when all is traced: by then the rows have come from memory.
+
+    Returns
+    -------
+    int
+        Rays.
+    """
+    n = 0
+    for block in range(blocks):
+        base = unsigned(block * BLOCK)
+        for lane in range(LANES):
+            alive = s[base + ALIVE * LANES + lane] > _f(0.0)
+            on[lane] = np.int32(-1) if alive else np.int32(0)
+            n += 1 if alive else 0
+            s[base + TFAR * LANES + lane] = _f(1.0e30)
+            words[base + GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
+        call_embree(intersect, on, scene, s[base : base + BLOCK])
+        colour_lanes(tint, occluded, s, base, on)
+        for lane in range(LANES):
+            if on[lane] != 0 and words[base + GEOM_ID * LANES + lane] != NO_HIT:
+                row = surface.ctypes.data + 4 * surface.shape[1] * np.int64(
+                    words[base + PRIM_ID * LANES + lane]
+                )
+                prefetch(row)
+                prefetch(row + 64)
+    return n
+
+
+@inner
+def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
+    """Move paths from the last blocks into the gaps of the first; return how many blocks are left."""
+    low, high = 0, blocks * LANES - 1
+    while True:
+        while low <= high and s[place_of(low) + ALIVE * LANES] > _f(0.0):
+            low += 1
+        while low <= high and s[place_of(high) + ALIVE * LANES] == _f(0.0):
+            high -= 1
+        if low >= high:
+            return (low + LANES - 1) // LANES
+        to = place_of(low)
+        start = place_of(high)
+        for a in range(3):
+            s[to + (ORG_X + a) * LANES] = s[start + (ORG_X + a) * LANES]
+            s[to + (DIR_X + a) * LANES] = s[start + (DIR_X + a) * LANES]
+        for r in range(BETA, COUNT + 1):
+            s[to + r * LANES] = s[start + r * LANES]
+        s[start + ALIVE * LANES] = _f(0.0)

@@ -1,0 +1,76 @@
+"""Radiance along camera rays, pass by pass; see `irradiance` for what a pass is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baker.core.parallel import run_tiles
+from baker.core.progress import Progress, silent
+from baker.core.scene import Camera
+from baker.kernels.sampling import sobol_reversed
+from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.estimators import estimator_named
+from baker.pathtracer.irradiance import path_setting
+from baker.pathtracer.path_blocks import new_path_memory
+from baker.pathtracer.paths import trace_paths
+from baker.pathtracer.point_estimate import PointEstimate, add_pass
+from baker.pathtracer.scene import Reference
+
+_TILE = 512
+
+
+def radiance_pass(
+    reference: Reference,
+    estimate: PointEstimate,
+    camera: Camera,
+    width: int,
+    height: int,
+    *,
+    estimator: str = "mis",
+    max_bounces: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> None:
+    """Add one pass of path-traced radiance, cd/m2, through every pixel to an estimate.
+
+    Parameters
+    ----------
+    estimate : PointEstimate
+        Of (height * width, 3), row 0 on top; changed in place.
+    max_bounces : int, optional
+        Reflections between lamp and camera beyond the first; None is unlimited.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such estimator.
+    Cancelled
+        If `progress` asked to stop.
+    """
+    how = estimator_named(estimator)
+    samples, number = estimate.samples, estimate.rounds
+    net = sobol_reversed(samples, seed, 1 + number)
+    setting = path_setting(how, how.strata, max_bounces, seed, number)
+    if how.both:
+        from baker.pathtracer.bidirectional_pass import picture_pass
+
+        picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
+        return
+    counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
+    eye = reference.local(camera.position)[None, None]
+
+    def work(begin: int, end: int) -> None:
+        pixel = np.arange(begin, end)
+        way = camera_rays(camera, width, height, pixel, samples, seed, number)
+        out = np.zeros((end - begin, 3))
+        cast = trace_paths(
+            eye, way, way, begin, False, reference.surfaces, reference.lamps, reference.shading,
+            new_path_memory(reference.rays), net, setting, out,
+        )  # fmt: skip
+        counted[begin // _TILE] = cast
+        add_pass(estimate, slice(begin, end), out / samples)
+
+    run_tiles(width * height, _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
+    estimate.rounds += 1
+    estimate.rays += int(counted.sum())
+    estimate.segments += int(counted[:, 0].sum())

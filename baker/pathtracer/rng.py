@@ -1,0 +1,144 @@
+"""Random numbers of a path, which depend on (seed, pass, point, sample) and on the place in the path only.
+
+`draw`: SplitMix64 from a state that names the path. `random_lanes`: a hash of the name and the number of the
+vertex, for eight paths at once; it multiplies 32-bit numbers only, which processors do eight at a time.
+
+Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014; Jarzynski and Olano,
+Hash functions for GPU rendering, 2020 (pcg4d).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baker.kernels.sampling import hash_u32, reverse_bits, scramble_reversed, texel_scramble
+from baker.pathtracer.path_blocks import (
+    CHOICE,
+    COUNT,
+    KEY,
+    LANES,
+    LOBE,
+    ROULETTE,
+    SAMPLE,
+    U_LAMP,
+    U_WAY,
+    W_LAMP,
+    W_WAY,
+    unsigned,
+)
+from baker.trace.jit import inner
+
+_w = np.uint32
+_u = np.uint64
+_STEP = np.uint64(0x9E3779B97F4A7C15)
+_INV_2_53 = 1.0 / 9007199254740992.0
+
+
+@inner
+def mix64(x):  # type: ignore[no-untyped-def]
+    """Return a well-mixed uint64 of a uint64."""
+    x = _u(x ^ (x >> _u(30)))
+    x = _u(x * _u(0xBF58476D1CE4E5B9))
+    x = _u(x ^ (x >> _u(27)))
+    x = _u(x * _u(0x94D049BB133111EB))
+    return _u(x ^ (x >> _u(31)))
+
+
+@inner
+def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
+    """Return the state (uint64) of sample `sample` of point `point` in pass `number`."""
+    x = mix64(_u(_u(seed) + _STEP))
+    x = mix64(_u(x ^ _u(_u(number) + _u(1)) * _u(0xD1342543DE82EF95)))
+    x = mix64(_u(x ^ _u(_u(point) + _u(1)) * _u(0x2545F4914F6CDD1D)))
+    return mix64(_u(x ^ _u(_u(sample) + _u(1)) * _STEP))
+
+
+@inner
+def draw(state, lane):  # type: ignore[no-untyped-def]
+    """Advance `state` (16,) uint64 of a lane and return a float64 in [0, 1)."""
+    state[lane] = _u(state[lane] + _STEP)
+    return np.float64(mix64(state[lane]) >> _u(11)) * _INV_2_53
+
+
+@inner
+def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
+    """Return numbers of a scrambled (0,2)-net, scrambled anew for each point, pass and pair."""
+    bits = path_state(seed, number_of_pass, point, _u(1) << _u(40 + pair))
+    first = np.uint32(bits & _u(0xFFFFFFFF))
+    second = np.uint32(bits >> _u(32))
+    none = np.uint32(0)
+    return (
+        np.float64(texel_scramble(net[sample, 0], first, none)),
+        np.float64(texel_scramble(net[sample, 1], second, none)),
+    )
+
+
+@inner
+def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
+    """Return four well-mixed uint32 of four (pcg4d)."""
+    x, y = _w(x * _w(1664525) + _w(1013904223)), _w(y * _w(1664525) + _w(1013904223))
+    z, w = _w(z * _w(1664525) + _w(1013904223)), _w(w * _w(1664525) + _w(1013904223))
+    x = _w(x + _w(y * w))
+    y = _w(y + _w(z * x))
+    z = _w(z + _w(x * y))
+    w = _w(w + _w(y * z))
+    x, y = _w(x ^ (x >> _w(16))), _w(y ^ (y >> _w(16)))
+    z, w = _w(z ^ (z >> _w(16))), _w(w ^ (w >> _w(16)))
+    x = _w(x + _w(y * w))
+    y = _w(y + _w(z * x))
+    z = _w(z + _w(x * y))
+    w = _w(w + _w(y * z))
+    return x, y, z, w
+
+
+def seed_salt(seed: int) -> int:
+    """Return what makes all numbers of a seed differ from those of others."""
+    # An array: arithmetic on single numbers warns of overflow.
+    return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
+
+
+@inner
+def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
+    """Write the lanes' random numbers for their vertices; `COUNT` counts up.
+
+    number : the pass; salt : `seed_salt`
+    """
+    base = unsigned(base)
+    number, salt, one, bits = _w(number), _w(salt), _w(0x3F800000), _w(9)
+    for lane in range(LANES):
+        point, sample = words[base + KEY * LANES + lane], words[base + SAMPLE * LANES + lane]
+        count = words[base + COUNT * LANES + lane]
+        words[base + COUNT * LANES + lane] = _w(count + _w(2))
+        x, y, z, w = mix4(point, sample, number, _w(salt + count))
+        words[base + CHOICE * LANES + lane] = x
+        words[base + U_LAMP * LANES + lane] = _w((y >> bits) | one)
+        words[base + W_LAMP * LANES + lane] = _w((z >> bits) | one)
+        words[base + ROULETTE * LANES + lane] = _w((w >> bits) | one)
+        x, y, z, w = mix4(point, sample, number, _w(_w(salt + count) + _w(1)))
+        words[base + LOBE * LANES + lane] = x
+        words[base + U_WAY * LANES + lane] = _w((y >> bits) | one)
+        words[base + W_WAY * LANES + lane] = _w((z >> bits) | one)
+
+
+@inner
+def spread_lanes(words, base, net, number, salt):  # type: ignore[no-untyped-def]
+    """Replace the pairs of lanes at their path's first vertex by numbers of scrambled (0,2)-nets.
+
+    net : (n, 2) uint32; the nets are scrambled anew for each point, pass and pair
+    """
+    base = unsigned(base)
+    for lane in range(LANES):
+        if words[base + COUNT * LANES + lane] == _w(2):
+            sample = unsigned(words[base + SAMPLE * LANES + lane])
+            key = words[base + KEY * LANES + lane]
+            x, y, z, w = mix4(key, _w(0xFFFFFFFF), _w(number), _w(salt))
+            words[base + U_LAMP * LANES + lane] = scrambled(net[sample, 0], x)
+            words[base + W_LAMP * LANES + lane] = scrambled(net[sample, 1], y)
+            words[base + U_WAY * LANES + lane] = scrambled(net[sample, 0], z)
+            words[base + W_WAY * LANES + lane] = scrambled(net[sample, 1], w)
+
+
+@inner
+def scrambled(number, seed):  # type: ignore[no-untyped-def]
+    """Return a scrambled number of a net as the bits of a float32 in [1, 2)."""
+    return _w((reverse_bits(scramble_reversed(number, seed)) >> _w(9)) | _w(0x3F800000))

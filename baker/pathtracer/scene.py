@@ -1,0 +1,209 @@
+"""A scene as the reference sees it: triangles, materials, lamps, a ray tree; no atlas, no map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.parallel import thread_count
+from baker.core.scene import Scene
+from baker.kernels.shading import Shading
+from baker.pathtracer.light_table import LampTable, build_lamps
+from baker.shading.materials import resolve_materials
+from baker.shading.ray_tree import build_ray_tree
+from baker.shading.scene_solids import hide_backs
+from baker.trace.embree import RayScene
+from baker.trace.packets import aligned_floats
+
+# Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
+# what it is as a lamp (`LampTable.emitter`), 1 if a texture or a vertex colour changes what the material
+# says, radiance without texture, and whether it emits: 0 no, 1 yes, 2 with a texture.
+CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES = (
+    0,
+    9,
+    18,
+    21,
+    22,
+    23,
+    24,
+    25,
+    28,
+)
+# Two cache lines.
+ROW_LENGTH = 32
+# Share of triangles that are smaller than half of what starts of paths are offset for.
+_SMALL = 0.1
+
+
+class Surfaces(NamedTuple):
+    """What a path needs at a hit.
+
+    row (T, 32) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
+    a texture scales the last two; least, most float, metres: offsets are never computed from smaller
+    coordinates, and from no larger ones where the triangle is not known;
+    lambertian int: 1 if everything reflects as Lambert; painted int: 1 if any triangle is textured.
+    """
+
+    row: NDArray[np.float32]
+    material: NDArray[np.float32]
+    least: float
+    most: float
+    lambertian: int
+    painted: int
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A scene ready to be path-traced. Close it, or use it as a context manager.
+
+    Attributes
+    ----------
+    geometry : Geometry
+        All that is traced is relative to its `origin`.
+    shading : Shading
+    surfaces : Surfaces
+    lamps : LampTable
+    rays : RayScene
+    sphere : (4,) float64
+        Centre and radius, metres, of a sphere around everything.
+    threads : int
+    tells : (T,) uint8
+        What each triangle says about who sees it first, see `kernels.probe`; nothing if not asked for.
+    """
+
+    geometry: Geometry
+    shading: Shading
+    surfaces: Surfaces
+    lamps: LampTable
+    rays: RayScene
+    sphere: NDArray[np.float64]
+    threads: int
+    tells: NDArray[np.uint8]
+
+    def __enter__(self) -> Reference:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Release the ray tree."""
+        self.close()
+
+    def local(self, position: Sequence[float]) -> NDArray[np.float64]:
+        """Return a world position (3,) relative to the geometry's origin."""
+        return np.asarray(position, np.float64) - self.geometry.origin
+
+    def close(self) -> None:
+        """Release the ray tree; nothing can be traced any more."""
+        self.rays.close()
+
+
+def build_reference(
+    scene: Scene,
+    *,
+    sky: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    lambertian: bool = False,
+    threads: int | None = None,
+    buried: bool = False,
+) -> Reference:
+    """Prepare a scene for path tracing.
+
+    Parameters
+    ----------
+    scene : Scene
+    sky : (3,) tuple
+        Radiance of the constant sky, cd/m2, linear Rec.709.
+    lambertian : bool
+        Every surface reflects as Lambert with its base colour, as bakes see it.
+    threads : int, optional
+    buried : bool
+        Work out what is solid, so that `pathtracer.inside_geometry` can be asked.
+
+    Raises
+    ------
+    ResourceError
+        If Embree cannot be used or memory runs out.
+    """
+    count = thread_count(threads)
+    geometry = world_geometry(scene, _no_atlas(scene))
+    shading = resolve_materials(scene, geometry, reflections=not lambertian)
+    rays = build_ray_tree(geometry, shading, threads=count)
+    lamps = build_lamps(scene, geometry, shading, sky)
+    surfaces = _surfaces(geometry, shading, lamps, lambertian)
+    tells = np.zeros(len(geometry.triangle), np.uint8)
+    if buried:
+        # Only for the question what is buried: paths see backs as materials have them.
+        tells = hide_backs(scene, geometry, shading)[1]
+    return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count, tells)
+
+
+def _no_atlas(scene: Scene) -> Atlas:
+    """Return an atlas in which nothing lies anywhere, so that meshes keep their own vertices."""
+    layouts = []
+    for index, instance in enumerate(scene.instances):
+        mesh = scene.meshes[instance.mesh]
+        n = len(mesh.position)
+        layouts.append(
+            InstanceLayout(
+                instance=index,
+                page=0,
+                vertex=np.arange(n, dtype=np.int32),
+                uv=np.zeros((n, 2), np.float32),
+                triangle=mesh.triangle,
+                chart=np.zeros(len(mesh.triangle), np.int32),
+                kept=False,
+                texels_per_metre=0.0,
+            )
+        )
+    return Atlas(1, 1, tuple(layouts), 0, 0)
+
+
+def _sphere(geometry: Geometry) -> NDArray[np.float64]:
+    if not len(geometry.position):
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
+    # A little more than half the diagonal: nothing that parallel light starts at touches the scene.
+    radius = max(0.501 * float(np.linalg.norm(high - low)), 1e-9)
+    return np.array([*(0.5 * (low + high)), radius])
+
+
+def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian: bool) -> Surfaces:
+    n, material = len(geometry.triangle), geometry.material
+    row = aligned_floats(n * ROW_LENGTH).reshape(n, ROW_LENGTH)
+    row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
+    row[:, SHADING : SHADING + 9] = geometry.normal[geometry.triangle].reshape(n, 9)
+    row[:, FACE : FACE + 3] = geometry.face_normal
+    row[:, MATERIAL] = material
+    row[:, TWO_SIDED] = geometry.double_sided
+    row[:, EMITTER] = lamps.emitter
+    row[:, EMISSION : EMISSION + 3] = shading.emission[material]
+    # Not asked of the lamps: light that aiming forgets is found by rays that hit it.
+    emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
+    row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
+    painted = shading.base_texture >= 0
+    if not lambertian:
+        painted = painted | (shading.reflection_texture >= 0)
+    row[:, TEXTURED] = painted[material] | (len(shading.colour) > 1)
+    kinds = np.zeros((len(shading.base), 8), np.float32)
+    kinds[:, :3] = shading.base
+    kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
+    kinds[:, 5] = shading.reflection_texture >= 0
+    least, most = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
+    return Surfaces(row, kinds, least, most, int(lambertian), int(row[:, TEXTURED].any()))
+
+
+def _small_size(geometry: Geometry) -> float:
+    """Return twice the size, metres, of small triangles: a sky around a room does not count."""
+    if not len(geometry.triangle):
+        return 1.0
+    corner = geometry.position[geometry.triangle]
+    size = np.abs(corner[:, 1:] - corner[:, :1]).max(axis=(1, 2))
+    return max(2.0 * float(np.quantile(size, _SMALL)), 1e-12)

@@ -1,0 +1,314 @@
+"""One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
+
+A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
+(`bsdf`). Directions in `path` are world space; only `TO`, the way back, is in the frame of the normal.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baker.kernels.alpha import presence_at
+from baker.kernels.sampling import tangent_frame
+from baker.kernels.texel_info import uv_at
+from baker.kernels.textures import sample_texture
+from baker.pathtracer.bsdf import (
+    METALLIC,
+    SMOOTH,
+    WIDTH,
+    bsdf_eval,
+    bsdf_sample,
+    cosine_sample,
+    specular_chance,
+)
+from baker.pathtracer.light_table import (
+    FAR,
+    INTENSITY,
+    POINT_CHANCE,
+    RADIANCE,
+    SHORT,
+    aim_at_point_light,
+    aim_at_triangle,
+    pick_lamp,
+)
+from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
+from baker.trace.jit import inner
+
+# Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
+# emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces, the
+# interpolated normal on the geometric one's side.
+PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = 0, 3, 6, 9, 12, 13, 16, 25, 28, 29
+N_ROWS = 32
+# A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
+GRAZE = 1.0e-3
+# Origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever is
+# less; but at least by sixteen float32 steps of either (as `kernels.surface` has it).
+OFFSET, ROUNDING = 1.0e-5, 1.9e-6
+# Roulette begins after this many bounces and lets at most this share live on.
+SURE, MOST = 3, 0.98
+
+
+@inner
+def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Write the frame around a unit shading normal."""
+    tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
+    path[FRAME, lane], path[FRAME + 1, lane], path[FRAME + 2, lane] = tx, ty, tz
+    path[FRAME + 3, lane], path[FRAME + 4, lane], path[FRAME + 5, lane] = bx, by, bz
+    path[FRAME + 6, lane], path[FRAME + 7, lane], path[FRAME + 8, lane] = nx, ny, nz
+
+
+@inner
+def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Return a world direction in the frame of the vertex."""
+    return (
+        dx * path[FRAME, lane] + dy * path[FRAME + 1, lane] + dz * path[FRAME + 2, lane],
+        dx * path[FRAME + 3, lane] + dy * path[FRAME + 4, lane] + dz * path[FRAME + 5, lane],
+        dx * path[FRAME + 6, lane] + dy * path[FRAME + 7, lane] + dz * path[FRAME + 8, lane],
+    )
+
+
+@inner
+def place_off(path, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
+    """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
+
+    least : see `Surfaces`; size : of the triangle, metres, or `Surfaces.most` where it is not known
+    """
+    far = max(abs(x), abs(y), abs(z))
+    off = max(ROUNDING * max(far, size), OFFSET * min(max(far, least), size))
+    path[PLACE, lane] = x + off * path[NORMAL, lane]
+    path[PLACE + 1, lane] = y + off * path[NORMAL + 1, lane]
+    path[PLACE + 2, lane] = z + off * path[NORMAL + 2, lane]
+
+
+@inner
+def size_of(corner, t):  # type: ignore[no-untyped-def]
+    """Return the largest component of the edges from corner 0 of row t, whose first columns are corners."""
+    size = 0.0
+    for a in range(3):
+        size = max(size, max(abs(corner[t, 3 + a] - corner[t, a]), abs(corner[t, 6 + a] - corner[t, a])))
+    return size
+
+
+@inner
+def start_path(path, row, lane, where, toward, normal, at_surface, sizes):  # type: ignore[no-untyped-def]
+    """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
+
+    where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
+    sizes : `Surfaces.least` and `.most`
+    """
+    for c in range(3):
+        path[BETA + c, lane] = 1.0
+        path[LIGHT + c, lane] = 0.0
+    path[DENSITY, lane] = 0.0
+    path[BOUNCES, lane] = 0.0
+    if not at_surface:
+        for a in range(3):
+            path[PLACE + a, lane] = where[a]
+            path[GO + a, lane] = toward[a]
+        path[BOUNCES, lane] = -1.0
+        return
+    for a in range(3):
+        path[NORMAL + a, lane] = normal[a]
+        row[a, lane] = 1.0
+    row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
+    place_off(path, lane, where[0], where[1], where[2], sizes[0], sizes[1])
+    set_frame(path, lane, toward[0], toward[1], toward[2])
+    path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
+
+
+@inner
+def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
+    """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
+    b0 = 1.0 - u - v
+    dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
+    fx, fy, fz = surface[prim, FACE], surface[prim, FACE + 1], surface[prim, FACE + 2]
+    sign = 1.0
+    if dx * fx + dy * fy + dz * fz >= 0.0:
+        if surface[prim, TWO_SIDED] == 0.0:
+            return False
+        sign = -1.0
+    path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane] = sign * fx, sign * fy, sign * fz
+    x = b0 * surface[prim, CORNER] + u * surface[prim, CORNER + 3] + v * surface[prim, CORNER + 6]
+    y = b0 * surface[prim, CORNER + 1] + u * surface[prim, CORNER + 4] + v * surface[prim, CORNER + 7]
+    z = b0 * surface[prim, CORNER + 2] + u * surface[prim, CORNER + 5] + v * surface[prim, CORNER + 8]
+    place_off(path, lane, x, y, z, least, size_of(surface, prim))
+    nx = b0 * surface[prim, SHADING] + u * surface[prim, SHADING + 3] + v * surface[prim, SHADING + 6]
+    ny = b0 * surface[prim, SHADING + 1] + u * surface[prim, SHADING + 4] + v * surface[prim, SHADING + 7]
+    nz = b0 * surface[prim, SHADING + 2] + u * surface[prim, SHADING + 5] + v * surface[prim, SHADING + 8]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length < 1.0e-6 or nx * fx + ny * fy + nz * fz <= 0.0:
+        nx, ny, nz, length = fx, fy, fz, 1.0
+    nx, ny, nz = sign * nx / length, sign * ny / length, sign * nz / length
+    path[SHADED, lane], path[SHADED + 1, lane], path[SHADED + 2, lane] = nx, ny, nz
+    glossy = lambertian == 0
+    if glossy and nx * dx + ny * dy + nz * dz >= -GRAZE:
+        # The interpolated normal looks away: a glossy lobe would have no side to reflect from.
+        nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
+    set_frame(path, lane, nx, ny, nz)
+    tx, ty, tz = local(path, lane, -dx, -dy, -dz)
+    # Lambert reflects alike in all directions: what the interpolated normal hides still shines.
+    path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
+    m = np.int64(surface[prim, MATERIAL])
+    row[0, lane], row[1, lane], row[2, lane] = material[m, 0], material[m, 1], material[m, 2]
+    row[METALLIC, lane] = material[m, 3] if glossy else 0.0
+    row[WIDTH, lane] = material[m, 4] * material[m, 4] if glossy else -1.0
+    return True
+
+
+@inner
+def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-untyped-def]
+    """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory."""
+    m = shading.material[prim]
+    base_colour(shading, prim, m, u, v, rgba)
+    for c in range(3):
+        row[c, lane] *= rgba[c]
+    if row[WIDTH, lane] >= 0.0 and material[m, 5] > 0.0:
+        s, t = uv_at(shading.reflection_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.reflection_texture[m], s, t, 0.0, rgba)
+        row[METALLIC, lane] *= rgba[2]
+        row[WIDTH, lane] *= rgba[1] * rgba[1]
+
+
+@inner
+def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
+    """Write what texture and vertex colours multiply a base colour by to `out` (4,)."""
+    out[0] = out[1] = out[2] = 1.0
+    if shading.base_texture[m] >= 0:
+        s, t = uv_at(shading.base_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.base_texture[m], s, t, 0.0, out)
+    if len(shading.colour) > 1:
+        i, j, k = shading.triangle[prim, 0], shading.triangle[prim, 1], shading.triangle[prim, 2]
+        for c in range(3):
+            out[c] *= (
+                (1.0 - u - v) * shading.colour[i, c] + u * shading.colour[j, c] + v * shading.colour[k, c]
+            )
+
+
+@inner
+def heuristic(own, other, power):  # type: ignore[no-untyped-def]
+    """Return the MIS weight of a technique of density `own` against one of density `other`."""
+    if power:
+        own, other = own * own, other * other
+    return own / (own + other) if own > 0.0 else 0.0
+
+
+@inner
+def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):  # type: ignore[no-untyped-def]
+    """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
+
+    mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
+    value : (3,) output, what the path collects if nothing is in the way; way : (6,) output, the ray, its
+    reach and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
+    """
+    n, p = len(triangle), len(point)
+    x, y, z = path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane]
+    lamp = pick_lamp(cumulative, choice)
+    reach = FAR
+    density = 0.0
+    b1 = b2 = 0.0
+    if lamp < n:
+        if mode == 0:
+            return -1
+        dx, dy, dz, density, b1, b2 = aim_at_triangle(triangle, lamp, u, w, x, y, z)
+        if density <= 0.0:
+            return -1
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = dx / length, dy / length, dz / length
+        reach = length * SHORT
+        scale = 1.0 / density
+        red, green, blue = (
+            triangle[lamp, RADIANCE],
+            triangle[lamp, RADIANCE + 1],
+            triangle[lamp, RADIANCE + 2],
+        )
+    elif lamp < n + p:
+        e = lamp - n
+        dx, dy, dz, reach, share = aim_at_point_light(point, e, x, y, z)
+        scale = share / point[e, POINT_CHANCE]
+        red, green, blue = point[e, INTENSITY], point[e, INTENSITY + 1], point[e, INTENSITY + 2]
+    else:
+        if mode == 0:
+            return -1
+        a, b, c = cosine_sample(u, w)
+        dx = a * path[FRAME, lane] + b * path[FRAME + 3, lane] + c * path[FRAME + 6, lane]
+        dy = a * path[FRAME + 1, lane] + b * path[FRAME + 4, lane] + c * path[FRAME + 7, lane]
+        dz = a * path[FRAME + 2, lane] + b * path[FRAME + 5, lane] + c * path[FRAME + 8, lane]
+        density = sky[3] * c / math.pi
+        scale = 1.0 / density if density > 0.0 else 0.0
+        red, green, blue = sky[0], sky[1], sky[2]
+    above = dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane]
+    if scale <= 0.0 or above <= 0.0:
+        return -1
+    lx, ly, lz = local(path, lane, dx, dy, dz)
+    other = bsdf_eval(row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], lx, ly, lz, value)
+    if density > 0.0 and mode == 2:
+        scale *= heuristic(density, other, power)
+    value[0] *= path[BETA, lane] * red * scale
+    value[1] *= path[BETA + 1, lane] * green * scale
+    value[2] *= path[BETA + 2, lane] * blue * scale
+    way[0], way[1], way[2], way[3], way[4], way[5] = dx, dy, dz, reach, b1, b2
+    return lamp if value[0] + value[1] + value[2] > 0.0 else -1
+
+
+@inner
+def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-def]
+    """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
+
+    aimed : also by its alpha: rays that hit it know that already
+    """
+    m = shading.material[prim]
+    there = presence_at(shading, prim, u, v) if aimed else 1.0
+    for c in range(3):
+        value[c] *= there
+    if shading.emission_texture[m] >= 0:
+        s, t = uv_at(shading.emission_uv, shading.triangle, prim, u, v)
+        sample_texture(shading.pack, shading.emission_texture[m], s, t, 0.0, rgba)
+        for c in range(3):
+            value[c] *= rgba[c]
+
+
+@inner
+def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[no-untyped-def]
+    """Choose the direction in which the path goes on; return False where it ends.
+
+    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers; weight : (3,) working memory
+    """
+    vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
+    mirror = 0.0
+    if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
+        # A mirror's direction cannot be found by chance.
+        mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < SMOOTH else 0.0
+    if hemisphere == 0 or choice < mirror:
+        lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)
+        if smooth:
+            density = 0.0
+        elif density <= 0.0:
+            return False
+    else:
+        if hemisphere == 1:
+            lz = u
+            r = math.sqrt(max(1.0 - u * u, 0.0))
+            lx, ly = r * math.cos(2.0 * math.pi * w), r * math.sin(2.0 * math.pi * w)
+            density = 0.5 / math.pi
+        else:
+            lx, ly, lz = cosine_sample(u, w)
+            density = lz / math.pi
+        bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, weight)
+        if density <= 0.0:
+            return False
+        for c in range(3):
+            weight[c] /= density * (1.0 - mirror)
+    dx = lx * path[FRAME, lane] + ly * path[FRAME + 3, lane] + lz * path[FRAME + 6, lane]
+    dy = lx * path[FRAME + 1, lane] + ly * path[FRAME + 4, lane] + lz * path[FRAME + 7, lane]
+    dz = lx * path[FRAME + 2, lane] + ly * path[FRAME + 5, lane] + lz * path[FRAME + 8, lane]
+    if dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane] <= 0.0:
+        return False
+    path[GO, lane], path[GO + 1, lane], path[GO + 2, lane] = dx, dy, dz
+    path[DENSITY, lane] = density
+    most = 0.0
+    for c in range(3):
+        path[BETA + c, lane] *= weight[c]
+        most = max(most, path[BETA + c, lane])
+    return most > 0.0

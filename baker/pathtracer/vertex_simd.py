@@ -1,0 +1,301 @@
+"""One vertex of eight paths at once on Lambertian surfaces, in loops that become vector code.
+
+Says for eight lanes in float32 what `vertex` says for one in float64: how a hit becomes a vertex, the light
+aimed at from it, the direction that leaves it. Nothing branches; what is not there is selected away.
+
+    light aimed at: beta albedo / pi cos L w / density       w = density / (density + cos / pi)   (balance)
+    direction: density cos / pi, beta becomes beta albedo
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baker.kernels.sampling import cosine_direction, tangent_frame, triangle_barycentric
+from baker.pathtracer.light_table import (
+    FAR,
+    LANE_CORNER,
+    LANE_EDGE,
+    LANE_GAIN,
+    LANE_INVERSE_RANGE,
+    LANE_KIND,
+    LANE_NORMAL,
+    LANE_OUTER,
+    LANE_RADIANCE,
+    LANE_SCALE,
+    LANE_TWO_SIDED,
+    SHORT,
+)
+from baker.pathtracer.path_blocks import (
+    ALBEDO,
+    ALIVE,
+    B1,
+    B2,
+    BETA,
+    BITANGENT,
+    BOUNCES,
+    COSINE,
+    DENSITY,
+    LAMP,
+    LANES,
+    NORMAL,
+    REACH,
+    ROULETTE,
+    SHADED,
+    TANGENT,
+    TO_LAMP,
+    TRIANGLE,
+    U_LAMP,
+    U_WAY,
+    VALUE,
+    W_LAMP,
+    W_WAY,
+    unsigned,
+)
+from baker.pathtracer.scene import CORNER, FACE, SHADING, TWO_SIDED
+from baker.pathtracer.vertex import MOST, OFFSET, ROUNDING, SURE
+from baker.trace.jit import inner
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
+
+_f = np.float32
+# A float64 constant would widen the whole expression.
+_ZERO, _ONE = _f(0.0), _f(1.0)
+_PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
+_OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
+_SURE, _MOST = _f(SURE), _f(MOST)
+_T = TRIANGLE * LANES
+_M = LAMP * LANES
+_L = LANES
+
+
+@inner
+def stand(s, base, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
+    """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
+
+    least, size : float32, metres, see `vertex.place_off`
+    """
+    far = max(max(abs(x), abs(y)), abs(z))
+    off = max(_ROUNDING * max(far, size), _OFFSET * min(max(far, least), size))
+    s[base + ORG_X * _L + lane] = x + off * s[base + NORMAL * _L + lane]
+    s[base + ORG_Y * _L + lane] = y + off * s[base + (NORMAL + 1) * _L + lane]
+    s[base + ORG_Z * _L + lane] = z + off * s[base + (NORMAL + 2) * _L + lane]
+    tx, ty, tz, bx, by, bz = tangent_frame(
+        s[base + SHADED * _L + lane], s[base + (SHADED + 1) * _L + lane], s[base + (SHADED + 2) * _L + lane]
+    )
+    s[base + TANGENT * _L + lane] = tx
+    s[base + (TANGENT + 1) * _L + lane] = ty
+    s[base + (TANGENT + 2) * _L + lane] = tz
+    s[base + BITANGENT * _L + lane] = bx
+    s[base + (BITANGENT + 1) * _L + lane] = by
+    s[base + (BITANGENT + 2) * _L + lane] = bz
+
+
+@inner
+def stand_lanes(s, base, least, most):  # type: ignore[no-untyped-def]
+    """Make the lanes' places on surfaces vertices; least, most : float32, metres, see `Surfaces`."""
+    base = unsigned(base)
+    for lane in range(LANES):
+        x, y, z = s[base + ORG_X * _L + lane], s[base + ORG_Y * _L + lane], s[base + ORG_Z * _L + lane]
+        stand(s, base, lane, x, y, z, least, most)
+
+
+@inner
+def edge_lane(s, base, lane, a):  # type: ignore[no-untyped-def]
+    """Return the larger one along axis a of the two edges from corner 0 of a lane's triangle."""
+    at = base + _T + (CORNER + a) * _L + lane
+    return max(abs(s[at + 3 * _L] - s[at]), abs(s[at + 6 * _L] - s[at]))
+
+
+@inner
+def weighted(s, base, column, lane, b, u, v):  # type: ignore[no-untyped-def]
+    """Return what a lane's triangle has at barycentrics (b, u, v), by three corners from a column on."""
+    at = base + _T + column * _L + lane
+    return (
+        b * s[at] + u * s[at + 3 * _L] + v * s[at + 6 * _L],
+        b * s[at + _L] + u * s[at + 4 * _L] + v * s[at + 7 * _L],
+        b * s[at + 2 * _L] + u * s[at + 5 * _L] + v * s[at + 8 * _L],
+    )
+
+
+@inner
+def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
+    """Make the lanes' hits, whose triangles' rows have been copied, vertices; black backs end the path.
+
+    least : float32, metres, see `Surfaces`
+    """
+    base = unsigned(base)
+    for lane in range(LANES):
+        u, v = s[base + HIT_U * _L + lane], s[base + HIT_V * _L + lane]
+        b = _ONE - u - v
+        fx, fy, fz = (
+            s[base + _T + FACE * _L + lane],
+            s[base + _T + (FACE + 1) * _L + lane],
+            s[base + _T + (FACE + 2) * _L + lane],
+        )
+        facing = (
+            s[base + DIR_X * _L + lane] * fx
+            + s[base + DIR_Y * _L + lane] * fy
+            + s[base + DIR_Z * _L + lane] * fz
+        )
+        sign = _ONE if facing < _ZERO else -_ONE
+        two_sided = s[base + _T + TWO_SIDED * _L + lane] > _ZERO
+        s[base + ALIVE * _L + lane] *= _ONE if facing < _ZERO or two_sided else _ZERO
+        s[base + NORMAL * _L + lane] = sign * fx
+        s[base + (NORMAL + 1) * _L + lane] = sign * fy
+        s[base + (NORMAL + 2) * _L + lane] = sign * fz
+        x, y, z = weighted(s, base, CORNER, lane, b, u, v)
+        nx, ny, nz = weighted(s, base, SHADING, lane, b, u, v)
+        square = nx * nx + ny * ny + nz * nz
+        bent = square > _f(1.0e-12) and nx * fx + ny * fy + nz * fz > _ZERO
+        scale = sign / math.sqrt(square if bent else _ONE)
+        s[base + SHADED * _L + lane] = scale * (nx if bent else fx)
+        s[base + (SHADED + 1) * _L + lane] = scale * (ny if bent else fy)
+        s[base + (SHADED + 2) * _L + lane] = scale * (nz if bent else fz)
+        size = max(max(edge_lane(s, base, lane, 0), edge_lane(s, base, lane, 1)), edge_lane(s, base, lane, 2))
+        stand(s, base, lane, x, y, z, least, size)
+
+
+@inner
+def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
+    """Aim at the lanes' lamps, whose rows have been copied: write direction, reach and the light they bring.
+
+    mode, power : `Estimator.aim` and `.power`. What cannot light a vertex brings 0.
+    """
+    base = unsigned(base)
+    for lane in range(LANES):
+        u, w = s[base + U_LAMP * _L + lane] - _ONE, s[base + W_LAMP * _L + lane] - _ONE
+        kind = s[base + _M + LANE_KIND * _L + lane]
+        sky = kind == _f(4.0)
+        b1, b2 = triangle_barycentric(u, w)
+        # Lights without area have no edges; what is infinitely far does not depend on the place.
+        near = _ONE if kind < _f(3.0) else _ZERO
+        dx = (
+            s[base + _M + LANE_CORNER * _L + lane]
+            + b1 * s[base + _M + LANE_EDGE * _L + lane]
+            + b2 * s[base + _M + (LANE_EDGE + 3) * _L + lane]
+            - near * s[base + ORG_X * _L + lane]
+        )
+        dy = (
+            s[base + _M + (LANE_CORNER + 1) * _L + lane]
+            + b1 * s[base + _M + (LANE_EDGE + 1) * _L + lane]
+            + b2 * s[base + _M + (LANE_EDGE + 4) * _L + lane]
+            - near * s[base + ORG_Y * _L + lane]
+        )
+        dz = (
+            s[base + _M + (LANE_CORNER + 2) * _L + lane]
+            + b1 * s[base + _M + (LANE_EDGE + 2) * _L + lane]
+            + b2 * s[base + _M + (LANE_EDGE + 5) * _L + lane]
+            - near * s[base + ORG_Z * _L + lane]
+        )
+        a, b, c = cosine_direction(u, w)
+        tx, ty, tz = (
+            s[base + TANGENT * _L + lane],
+            s[base + (TANGENT + 1) * _L + lane],
+            s[base + (TANGENT + 2) * _L + lane],
+        )
+        bx, by, bz = (
+            s[base + BITANGENT * _L + lane],
+            s[base + (BITANGENT + 1) * _L + lane],
+            s[base + (BITANGENT + 2) * _L + lane],
+        )
+        nx, ny, nz = (
+            s[base + SHADED * _L + lane],
+            s[base + (SHADED + 1) * _L + lane],
+            s[base + (SHADED + 2) * _L + lane],
+        )
+        dx = a * tx + b * bx + c * nx if sky else dx
+        dy = a * ty + b * by + c * ny if sky else dy
+        dz = a * tz + b * bz + c * nz if sky else dz
+        square = max(dx * dx + dy * dy + dz * dz, _f(1.0e-20))
+        length = math.sqrt(square)
+        shrink = _ONE / length
+        dx, dy, dz = dx * shrink, dy * shrink, dz * shrink
+        at_lamp = -(
+            dx * s[base + _M + LANE_NORMAL * _L + lane]
+            + dy * s[base + _M + (LANE_NORMAL + 1) * _L + lane]
+            + dz * s[base + _M + (LANE_NORMAL + 2) * _L + lane]
+        )
+        cosine = abs(at_lamp) if s[base + _M + LANE_TWO_SIDED * _L + lane] > _ZERO else at_lamp
+        inside = (at_lamp - s[base + _M + LANE_OUTER * _L + lane]) * s[base + _M + LANE_SCALE * _L + lane]
+        inside = min(max(inside, _ZERO), _ONE)
+        # One over the density per steradian; irradiance per intensity and chance of lights without area.
+        here = dx * nx + dy * ny + dz * nz
+        gain = s[base + _M + LANE_GAIN * _L + lane]
+        area = kind == _ZERO
+        gain *= (cosine if cosine > _f(1.0e-9) else _ZERO) if area else _ONE
+        gain *= inside * inside if kind == _f(2.0) else _ONE
+        faded = square * s[base + _M + LANE_INVERSE_RANGE * _L + lane]
+        gain *= _ONE if area else max(_ONE - faded * faded, _ZERO)
+        gain *= _PI / max(c, _f(1.0e-9)) if sky else near / square + (_ONE - near)
+        above = (
+            dx * s[base + NORMAL * _L + lane]
+            + dy * s[base + (NORMAL + 1) * _L + lane]
+            + dz * s[base + (NORMAL + 2) * _L + lane]
+        )
+        ratio = here * _INV_PI * gain
+        ratio = ratio * ratio if power != 0 else ratio
+        spread = area or sky
+        weight = _ONE / (_ONE + ratio) if spread and mode == 2 else _ONE
+        usable = above > _ZERO and here > _ZERO and s[base + ALIVE * _L + lane] > _ZERO
+        scale = gain * weight * here * _INV_PI if usable and (mode > 0 or not spread) else _ZERO
+        for k in range(3):
+            s[base + (VALUE + k) * _L + lane] = (
+                scale
+                * s[base + (BETA + k) * _L + lane]
+                * s[base + (ALBEDO + k) * _L + lane]
+                * s[base + _M + (LANE_RADIANCE + k) * _L + lane]
+            )
+        (
+            s[base + TO_LAMP * _L + lane],
+            s[base + (TO_LAMP + 1) * _L + lane],
+            s[base + (TO_LAMP + 2) * _L + lane],
+        ) = dx, dy, dz
+        s[base + REACH * _L + lane] = length * _SHORT if near > _ZERO else _FAR
+        s[base + B1 * _L + lane], s[base + B2 * _L + lane] = b1, b2
+
+
+@inner
+def scatter_lanes(s, base):  # type: ignore[no-untyped-def]
+    """Choose the directions in which the lanes' paths go on; others end."""
+    base = unsigned(base)
+    for lane in range(LANES):
+        u, w = s[base + U_WAY * _L + lane] - _ONE, s[base + W_WAY * _L + lane] - _ONE
+        a, b, c = cosine_direction(u, w)
+        dx = (
+            a * s[base + TANGENT * _L + lane]
+            + b * s[base + BITANGENT * _L + lane]
+            + c * s[base + SHADED * _L + lane]
+        )
+        dy = (
+            a * s[base + (TANGENT + 1) * _L + lane]
+            + b * s[base + (BITANGENT + 1) * _L + lane]
+            + c * s[base + (SHADED + 1) * _L + lane]
+        )
+        dz = (
+            a * s[base + (TANGENT + 2) * _L + lane]
+            + b * s[base + (BITANGENT + 2) * _L + lane]
+            + c * s[base + (SHADED + 2) * _L + lane]
+        )
+        above = (
+            dx * s[base + NORMAL * _L + lane]
+            + dy * s[base + (NORMAL + 1) * _L + lane]
+            + dz * s[base + (NORMAL + 2) * _L + lane]
+        )
+        red = s[base + BETA * _L + lane] * s[base + ALBEDO * _L + lane]
+        green = s[base + (BETA + 1) * _L + lane] * s[base + (ALBEDO + 1) * _L + lane]
+        blue = s[base + (BETA + 2) * _L + lane] * s[base + (ALBEDO + 2) * _L + lane]
+        most = max(max(red, green), blue)
+        survive = min(most, _MOST) if s[base + BOUNCES * _L + lane] >= _SURE else _ONE
+        goes_on = (
+            c > _ZERO and above > _ZERO and s[base + ROULETTE * _L + lane] - _ONE < survive and most > _ZERO
+        )
+        scale = _ONE / (survive if survive > _ZERO else _ONE)
+        s[base + ALIVE * _L + lane] *= _ONE if goes_on else _ZERO
+        s[base + DIR_X * _L + lane], s[base + DIR_Y * _L + lane], s[base + DIR_Z * _L + lane] = dx, dy, dz
+        s[base + BETA * _L + lane] = red * scale
+        s[base + (BETA + 1) * _L + lane] = green * scale
+        s[base + (BETA + 2) * _L + lane] = blue * scale
+        s[base + DENSITY * _L + lane] = c * _INV_PI
+        s[base + COSINE * _L + lane] = c

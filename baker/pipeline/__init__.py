@@ -1,0 +1,1 @@
+"""Wires the stages of a bake in order: world, transport, finished pages."""

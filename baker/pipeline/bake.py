@@ -1,0 +1,112 @@
+"""The stages of a bake, in order; the only place that wires them together.
+
+scene -> atlas -> texels -> buried points -> direct light -> patches -> form factors -> solve
+-> final gather -> finished pages -> output folder
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from baker.channels.channel import CHANNELS, Channel
+from baker.checks.in_bake import bake_warnings
+from baker.core.errors import ResourceError, SettingsError
+from baker.core.executor import Farm, LocalFarm
+from baker.core.export import check_exports
+from baker.core.lightmap import BakeResult
+from baker.core.precision import coarse_warnings
+from baker.core.progress import Progress, silent
+from baker.core.scene import Scene, check_brightness
+from baker.core.settings import BakeSettings
+from baker.io.load import load_for_bake
+from baker.pipeline import precompile as warm
+from baker.pipeline.pages import finish_pages
+from baker.pipeline.record import Record
+from baker.pipeline.transport import trace_transport
+from baker.pipeline.world import prepare
+from baker.uv.unwrap import unwrap_scene
+
+
+def bake(
+    scene: Scene | str | Path,
+    *,
+    settings: BakeSettings,
+    out: Path | str | None = None,
+    progress: Progress = silent,
+    force: bool = False,
+    farm: Farm | None = None,
+) -> BakeResult:
+    """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
+
+    Parameters
+    ----------
+    scene : Scene or path
+    settings : BakeSettings
+    out : path, optional
+        Folder to write; None keeps everything in memory.
+    progress : Progress
+    force : bool
+        Replace an `out` that baker did not write.
+    farm : Farm, optional
+        Works on the tiles of the ray stages; None is this process.
+
+    Raises
+    ------
+    InputError, SettingsError, ResourceError, Cancelled
+    """
+    channels = _channels(settings)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        from baker.io.bake.write_bake import check_encodings, check_out
+
+        check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
+        check_exports(settings.export, settings.channels)
+        check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
+    record, farm = Record(progress), farm or LocalFarm()
+    compiling = warm.start()
+    try:
+        with record.stage("load"):
+            if isinstance(scene, Scene):
+                check_brightness(scene)
+            else:
+                scene = load_for_bake(scene, settings)
+        compiling = warm.suit(compiling, scene)
+        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
+        with record.stage("unwrap"):
+            atlas = unwrap_scene(scene, settings, progress)
+        record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
+        farm.open(scene, atlas, settings)
+        world = prepare(scene, atlas, settings, record)
+        if any(channel.needs_light for channel in channels.values()):
+            warm.wait_for_rays(compiling, progress)
+        transport = trace_transport(scene, world, channels, settings, record, farm)
+        world.rays.close()
+        farm.close()
+        # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
+        texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
+        del world
+        warm.finish(compiling, progress)
+        result = finish_pages(scene, atlas, texels, good, transport, channels, settings, record)
+        if folder is not None:
+            from baker.io.bake.write_bake import write_bake
+
+            with record.stage("write"):
+                manifest = write_bake(result, folder, force=force, progress=progress)
+            result = replace(result, out=folder, manifest=manifest)
+    except MemoryError:
+        raise ResourceError(
+            "memory ran out; lower --resolution or --samples, or bake fewer objects"
+        ) from None
+    return result
+
+
+def _channels(settings: BakeSettings) -> dict[str, Channel]:
+    """Look up the channels asked for, in the order asked."""
+    found: dict[str, Channel] = {}
+    for name in settings.channels:
+        channel = CHANNELS.get(name)
+        if channel is None:
+            raise SettingsError(f"there is no channel '{name}'; known are {', '.join(CHANNELS.names())}")
+        found[name] = channel
+    return found

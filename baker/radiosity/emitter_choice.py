@@ -1,0 +1,250 @@
+"""Which emitters the texels of a tile sample, and how often.
+
+How bright an emitter would be if nothing stood in between (`emitters.cluster_chances`) says nothing of walls:
+one in another room, ten thousand times as bright, would take all samples. So a few shadow rays find the
+clusters that the tile can see. Those alone are sampled as if there were no others; what no ray reached has a
+few samples of its own, and rays of the gather that find it count, so that nothing is lost where it is seen
+through a keyhole. Where a bright emitter is seen from some texels of a tile only, every sixteen neighbours
+choose for themselves.
+
+Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
+illumination, 2012.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.kernels.emitters import (
+    AREA,
+    CLUSTER,
+    NO_CLOSED_FORM,
+    TEXTURED,
+    Emitters,
+    Lamps,
+    lamps_for,
+    widest_view,
+)
+from baker.radiosity.kernels.emitter_probe import probe_clusters
+from baker.trace.packets import LANES, Caster
+
+# Rays to each cluster from a tile, and what all of them may cost, as a share of a tile's shadow rays.
+_MOST_RAYS, _FEWEST_RAYS = 32, 4
+_COST = 0.06
+# Up to so many clusters all hidden ones are set apart; of more only the brightest, until the others come to
+# this share of what is seen.
+_FEW = 32
+_HARMLESS = 0.25
+# A cluster that only some texels see is a reason to choose by blocks of neighbours if it is so many times as
+# bright as another one that is seen. Blocks end where a chart ends or the surface turns so much (cosine).
+_OUTSHINES = 4.0
+_TURN = 0.5
+# Emitters that touch and differ by less than this are one lamp: nothing is to be chosen.
+_ALIKE = 4.0
+# Samples of what no ray reached, as a share of the others.
+_HIDDEN_SHARE = 1.0 / 8.0
+
+
+class Choice(NamedTuple):
+    """What neighbouring texels sample.
+
+    part : slice of the tile's texels
+    seen : clusters that get the samples; others are missing
+    hidden : clusters that no ray of the tile reached, None if there are none
+    found : all clusters with the density at which both sample them, for rays that find them
+    view : largest radius / distance of a cluster of `seen`, see `emitters.widest_view`
+    """
+
+    part: slice
+    seen: Lamps
+    hidden: Lamps | None
+    found: Lamps
+    view: float
+
+
+@dataclass(frozen=True)
+class LampChooser:
+    """Chooses emitters for tiles; the same for all stages that know the same points.
+
+    Attributes
+    ----------
+    emitters : Emitters
+    n_light, n_hidden : int, samples of a texel, and those of what its tile does not see
+    single : bool, whether all emitters are one lamp
+    chart : (n,) int32 or None, of each texel entry
+    """
+
+    emitters: Emitters
+    n_light: int
+    n_hidden: int
+    single: bool
+    chart: NDArray[np.int32] | None
+
+    @classmethod
+    def build(cls, emitters: Emitters, n_light: int, chart: NDArray[np.int32] | None = None) -> LampChooser:
+        """Return the chooser for `n_light` samples a texel; `chart` (n,) int32 of each texel entry."""
+        n_hidden = max(int(n_light * _HIDDEN_SHARE), 1)
+        return cls(emitters, n_light, n_hidden, _one_lamp(emitters), chart)
+
+    def choose(
+        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], caster: Caster
+    ) -> list[Choice]:
+        """Return the choices of a tile's parts, which cover it in order.
+
+        Parameters
+        ----------
+        begin : int, number of the tile's first texel entry
+        origin, normal : (m, 16, 3) float32, points of the tile's texels, world
+        """
+        whole = slice(0, len(origin))
+        lamps = lamps_for(self.emitters, origin)
+        if self.single or np.count_nonzero(lamps.chance) < 2:
+            return [Choice(whole, lamps, None, lamps, widest_view(self.emitters, origin))]
+        bounds, hidden = self._find_hidden(lamps, begin, origin, normal, caster)
+        parts = [slice(*span) for span in pairwise(bounds.tolist())]
+        if len(parts) == 1:
+            return [self._choice(whole, origin, lamps, hidden[0])]
+        return [
+            self._choice(part, origin[part], lamps_for(self.emitters, origin[part]), own)
+            for part, own in zip(parts, hidden, strict=True)
+        ]
+
+    def _find_hidden(
+        self,
+        lamps: Lamps,
+        begin: int,
+        origin: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        caster: Caster,
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return where parts of a tile begin, (P + 1,), and the clusters (P, C) hidden from each."""
+        weight = self._weights(lamps, origin)
+        blocks, broken = self._blocks(begin, origin, normal)
+        bounds = np.array([0, len(origin)])
+        chosen = weight > 0
+        unlike = weight.max() > _OUTSHINES * weight[chosen].min()
+        seen = np.zeros((1, len(weight)), np.int32)
+        if not (unlike and broken):
+            asked, seen = self._probe(origin, normal, caster, bounds, chosen)
+            partly = (seen[0] > 0) & (seen[0] < asked[0])
+            dimmest = weight[seen[0] > 0].min(initial=np.inf)
+            if not (partly & (weight > _OUTSHINES * dimmest)).any():
+                return bounds, self._hidden(weight, seen[0])[None]
+            chosen = partly
+        by_block = self._probe(origin, normal, caster, blocks, chosen)[1]
+        hidden = np.stack([self._hidden(weight, np.where(chosen, own, seen[0])) for own in by_block])
+        new = np.flatnonzero(np.append(True, (hidden[1:] != hidden[:-1]).any(axis=1)))
+        return np.append(blocks[new], len(origin)), hidden[new]
+
+    def _blocks(
+        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int64], bool]:
+        """Return where blocks of up to sixteen neighbours of one surface begin, (B + 1,).
+
+        Also whether the texels belong to several surfaces.
+        """
+        facing = normal[:, 0]
+        apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
+        if self.chart is not None:
+            own = self.chart[begin : begin + len(origin)]
+            apart |= own[1:] != own[:-1]
+        breaks = np.flatnonzero(apart) + 1
+        bounds = np.unique(np.concatenate([np.arange(0, len(origin), LANES), breaks, [len(origin)]]))
+        return bounds, bool(apart.any())
+
+    def _probe(
+        self,
+        origin: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        caster: Caster,
+        bounds: NDArray[np.int64],
+        chosen: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the counts of `probe_clusters` (B, C) for some clusters (C,) bool."""
+        shape = (len(bounds) - 1, len(chosen))
+        share = _COST * self.n_light * len(origin) / (shape[0] * np.count_nonzero(chosen))
+        n_rays = int(np.clip(share, _FEWEST_RAYS, _MOST_RAYS if shape[0] == 1 else LANES))
+        asked, seen = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+        row, first = self.emitters.row, self.emitters.first
+        probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, asked, seen)
+        return asked, seen
+
+    def _weights(self, lamps: Lamps, origin: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return (C,) roughly how bright clusters are at points (m, w, 3); 0 if they are turned away."""
+        points = origin.reshape(-1, 3)
+        low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
+        square = ((self.emitters.centre - 0.5 * (low + high)) ** 2).sum(axis=1)
+        reach = self.emitters.radius + 0.5 * np.linalg.norm(high - low)
+        weight: NDArray[np.float64] = self.emitters.power / np.maximum(square, reach**2 + 1e-12)
+        return np.where(lamps.chance > 0, weight, 0.0)
+
+    def _hidden(self, weight: NDArray[np.float64], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Return which clusters (C,) are set apart: none if no cluster is seen."""
+        hidden: NDArray[np.bool_] = (seen == 0) & (weight > 0)
+        if not (seen > 0).any():
+            return np.zeros_like(hidden)
+        if len(weight) > _FEW:
+            order = np.argsort(np.where(hidden, weight, 0.0), kind="stable")
+            harmless = np.cumsum(np.where(hidden, weight, 0.0)[order]) <= _HARMLESS * weight[seen > 0].sum()
+            hidden[order[harmless]] = False
+        return hidden
+
+    def _choice(
+        self, part: slice, origin: NDArray[np.float32], lamps: Lamps, hidden: NDArray[np.bool_]
+    ) -> Choice:
+        """Return the choice for points (m, w, 3) that do not see the clusters `hidden` (C,)."""
+        hidden = hidden & (lamps.chance > 0)
+        if not hidden.any() or not (lamps.chance[~hidden] > 0).any():
+            return Choice(part, lamps, None, lamps, widest_view(self.emitters, origin))
+        visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
+        # No closed form for these: a ray that gets there after all is never taken for many.
+        others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
+        seen, apart = lamps_for(visible, origin), lamps_for(others, origin)
+        chance = np.zeros_like(lamps.chance)
+        chance[~hidden] = seen.chance / seen.cumulative[-1]
+        chance[hidden] = apart.chance / apart.cumulative[-1] * (self.n_hidden / self.n_light)
+        found = lamps._replace(chance=chance, cumulative=np.ones_like(chance), apart=hidden.astype(np.uint8))
+        return Choice(part, seen, apart, found, widest_view(visible, origin))
+
+
+def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
+    """Return the emitters of some clusters (C,) alone."""
+    length = np.diff(emitters.first)
+    own = np.repeat(which, length)
+    row = np.ascontiguousarray(emitters.row[own])
+    first = np.concatenate([[0], np.cumsum(length[which])]).astype(np.int32)
+    row[:, CLUSTER] = np.repeat(np.arange(len(first) - 1), length[which])
+    return emitters._replace(
+        row=row,
+        triangle=emitters.triangle[own],
+        first=first,
+        centre=emitters.centre[which],
+        radius=emitters.radius[which],
+        power=emitters.power[which],
+        axis=emitters.axis[which],
+        spread=emitters.spread[which],
+    )
+
+
+def _one_lamp(emitters: Emitters) -> bool:
+    """Tell whether all clusters hang together and shine alike, so that walls can hardly come in between."""
+    n = len(emitters.power)
+    if n < 2:
+        return True
+    brightness = emitters.power / np.bincount(emitters.row[:, CLUSTER].astype(int), emitters.row[:, AREA], n)
+    if brightness.max() > _ALIKE * brightness.min():
+        return False
+    between = np.linalg.norm(emitters.centre[:, None] - emitters.centre[None], axis=2)
+    touching = between <= emitters.radius[:, None] + emitters.radius[None]
+    reached = np.zeros(n, bool)
+    reached[0] = True
+    while True:
+        more = touching[reached].any(axis=0)
+        if (more == reached).all():
+            return bool(reached.all())
+        reached = more

@@ -1,0 +1,299 @@
+"""Irradiance of texels from emissive triangles: shadow rays to sampled points, weighted for MIS.
+
+    E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
+
+The balance heuristic leaves the rest to hemisphere rays that hit the same emitters. Where nothing is found
+to stand in between, the closed form takes the place of both (`polygon_light`).
+Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from baker.kernels.alpha import presence_at
+from baker.kernels.emitters import (
+    NORMAL,
+    RADIANCE,
+    TEXTURED,
+    TWO_SIDED,
+    choose_emitter,
+    emitted_radiance,
+    emitter_density,
+    on_triangle,
+)  # fmt: skip
+from baker.kernels.rays import lane_seeds, new_seeds
+from baker.kernels.sampling import texel_scramble, triangle_barycentric
+from baker.kernels.surface import N_POINTS
+from baker.kernels.transmittance import count_coloured, light_kept, trace_shadow_lanes
+from baker.kernels.triangle_lookup import front_facing
+from baker.radiosity.kernels.polygon_light import clear_light
+from baker.trace.jit import inner, kernel, larger, scratch, smaller
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR
+
+_f = np.float32
+_INV_PI = np.float32(1.0 / math.pi)
+# Shadow rays end this share of their length before the light.
+_SHORT = np.float32(0.9999)
+# The closed form is used for up to one emitter for so many samples.
+_SAMPLES_AN_EMITTER = 8
+# Memory of `light_samples`.
+_rgba, _numbers, _lamps = scratch((4,), np.float64), scratch((LANES,), np.int64), scratch((17 * LANES,), _f)
+_pairs, _vectors = scratch((2 * LANES,), _f), scratch((3 * LANES,), _f)
+_parts = scratch((N_POINTS, 6 * LANES), _f)
+
+
+@inner
+def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+    """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
+    return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
+
+
+@inner
+def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
+    """Write origins of point k of texels group to group + lanes to `rays`, normals to `facing` (3 * 16,)."""
+    for lane in range(lanes):
+        for a in range(3):
+            rays[(ORG_X + a) * LANES + lane] = origin[group + lane, k, a]
+            facing[a * LANES + lane] = normal[group + lane, k, a]
+
+
+@inner
+def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):  # type: ignore[no-untyped-def]
+    """Choose an emitter for every lane and copy what is needed of it.
+
+    row, starts, chance, cumulative : see `emitters.Lamps`
+    first, second : uint32, the sample's bit-reversed Sobol numbers
+    uv : (2 * 16,) float32, place on the emitter; chosen : (16,) int64
+    lamp : (17 * 16,) float32: corner 0, edges, normal, density per m2, 1 if two-sided, radiance
+    """
+    for lane in range(LANES):
+        uv[lane] = texel_scramble(first, seeds[lane], shared)
+        uv[LANES + lane] = texel_scramble(second, seeds[LANES + lane], shared)
+    same = True
+    for lane in range(LANES):
+        m, density, u = choose_emitter(row, starts, chance, cumulative, uv[lane])
+        uv[lane] = u
+        chosen[lane] = m
+        lamp[12 * LANES + lane] = density
+        same = same and m == chosen[0]
+    if same:
+        # The rule: neighbouring texels share the first bits of their numbers.
+        m = chosen[0]
+        for a in range(3):
+            for lane in range(LANES):
+                lamp[a * LANES + lane] = row[m, a]
+                lamp[(3 + a) * LANES + lane] = row[m, 3 + a] - row[m, a]
+                lamp[(6 + a) * LANES + lane] = row[m, 6 + a] - row[m, a]
+                lamp[(9 + a) * LANES + lane] = row[m, NORMAL + a]
+                lamp[(14 + a) * LANES + lane] = row[m, RADIANCE + a]
+        for lane in range(LANES):
+            lamp[13 * LANES + lane] = row[m, TWO_SIDED]
+        return
+    for lane in range(LANES):
+        m = chosen[lane]
+        for a in range(3):
+            lamp[a * LANES + lane] = row[m, a]
+            lamp[(3 + a) * LANES + lane] = row[m, 3 + a] - row[m, a]
+            lamp[(6 + a) * LANES + lane] = row[m, 6 + a] - row[m, a]
+            lamp[(9 + a) * LANES + lane] = row[m, NORMAL + a]
+            lamp[(14 + a) * LANES + lane] = row[m, RADIANCE + a]
+        lamp[13 * LANES + lane] = row[m, TWO_SIDED]
+
+
+@inner
+def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  # type: ignore[no-untyped-def]
+    """Write the shadow ray of every lane and its two weights; lanes that see no light get weight 0.
+
+    uv : (2 * 16,) float32, becomes the barycentrics b1 and b2 on the emitter
+    n_light, first_n, second_n : float32, rays that share the work: shadow rays, hemisphere rays of both
+    estimates; weight : (2 * 16,) float32
+    """
+    for lane in range(LANES):
+        b1, b2 = triangle_barycentric(uv[lane], uv[LANES + lane])
+        dx = lamp[lane] + b1 * lamp[3 * LANES + lane] + b2 * lamp[6 * LANES + lane]
+        dy = lamp[LANES + lane] + b1 * lamp[4 * LANES + lane] + b2 * lamp[7 * LANES + lane]
+        dz = lamp[2 * LANES + lane] + b1 * lamp[5 * LANES + lane] + b2 * lamp[8 * LANES + lane]
+        dx -= rays[ORG_X * LANES + lane]
+        dy -= rays[ORG_Y * LANES + lane]
+        dz -= rays[ORG_Z * LANES + lane]
+        square = larger(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
+        length = math.sqrt(square)
+        cosine = (dx * facing[lane] + dy * facing[LANES + lane] + dz * facing[2 * LANES + lane]) / length
+        light = dx * lamp[9 * LANES + lane] + dy * lamp[10 * LANES + lane] + dz * lamp[11 * LANES + lane]
+        light = -light / length
+        light = abs(light) if lamp[13 * LANES + lane] > _f(0.0) else light
+        seen = cosine > _f(0.0) and light > _f(1.0e-6)
+        steradian = lamp[12 * LANES + lane] * square / larger(light, _f(1.0e-6))
+        cosine = cosine if seen else _f(0.0)
+        share = n_light * steradian
+        weight[lane] = cosine / (share + first_n * cosine * _INV_PI)
+        weight[LANES + lane] = cosine / (share + second_n * cosine * _INV_PI)
+        uv[lane] = b1
+        uv[LANES + lane] = b2
+        rays[DIR_X * LANES + lane] = dx
+        rays[DIR_Y * LANES + lane] = dy
+        rays[DIR_Z * LANES + lane] = dz
+        rays[TFAR * LANES + lane] = _SHORT
+
+
+@kernel
+def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, exact, out, second):  # type: ignore[no-untyped-def]
+    """Add the light-sampled share of irradiance of texels, and return the number of shadow rays cast.
+
+    Sixteen neighbouring texels first look: one ray from each of their points. If none of these up to 256
+    rays is blocked, no further one of theirs is cast: where a share p of the light is hidden, the error that
+    this can bring is p (1 - p)^256 of it on average, at most 0.15 %. A few even emitters then are not
+    sampled either: they shine by their closed form, and hemisphere rays have nothing to add.
+
+    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
+    shading : from `emitters.needed_shading`
+    net : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
+    hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
+    exact : (m,) uint8, set to 1 for texels whose light is complete in both estimates
+    out : (m, 6) float32, lx: two differently weighted estimates of RGB
+    second : (m,) float32, sum over 16 batches of the square of the first estimate's share
+    """
+    n_samples = len(net)
+    scene, occluded, width = caster.scene, caster.occluded, caster.width
+    query = caster.query
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    row, triangle, starts = lamps.row, lamps.triangle, lamps.first
+    chance, cumulative = lamps.chance, lamps.cumulative
+    any_alpha = False
+    if shading is not None:
+        any_alpha = len(shading.alpha.slot) > 0
+    # One emitter in closed form at all points costs as much as some samples.
+    plain = len(row) * _SAMPLES_AN_EMITTER <= n_samples
+    for m in range(len(row) if plain else 0):
+        plain = plain and row[m, TEXTURED] == _f(0.0)
+        if shading is not None:
+            # Alpha of anything but the emitter is in the way, and found by the looks.
+            plain = plain and (not any_alpha or shading.alpha.slot[triangle[m]] < 0)
+    found = _vectors()
+    radiance = _rgba()
+    # Sums of one point's samples are short: float32; those of all points are not.
+    part = _parts()
+    uv, weight = _pairs(), _pairs()
+    chosen, lamp = _numbers(), _lamps()
+    facing = _vectors()
+    seeds = new_seeds()
+    n_light, first_n, second_n = _f(n_samples), _f(hemisphere[0]), _f(hemisphere[1])
+    cast = 0
+    rounds = 2 if n_samples >= 2 * N_POINTS else 1
+    for group in range(0, len(origin), LANES):
+        lanes = smaller(LANES, len(origin) - group)
+        lane_seeds(begin + group, lanes, 15, seeds)
+        for k in range(N_POINTS):
+            for j in range(6 * LANES):
+                part[k, j] = _f(0.0)
+        looked = blocked = 0
+        if plain:
+            clear_light(origin, normal, group, lanes, row, found)
+            lit = False
+            for j in range(3 * LANES):
+                lit = lit or found[j] != _f(0.0)
+            if not lit:
+                for lane in range(lanes):
+                    exact[group + lane] = 1
+                continue
+        for turn in range(rounds):
+            clear = turn == 1 and blocked == 0 and looked >= 8 * lanes
+            if clear and plain:
+                break
+            for k in range(N_POINTS):
+                start, end = -(-k * n_samples // N_POINTS), -(-(k + 1) * n_samples // N_POINTS)
+                if start == end:
+                    continue
+                # Which of a point's samples looks first goes round, so that the looks are spread, too.
+                look = start + k % (end - start)
+                load_points(rays, facing, origin, normal, group, lanes, k)
+                for s in range(start, end):
+                    if rounds == 2 and (s == look) != (turn == 0):
+                        continue
+                    choose_lanes(
+                        row, starts, chance, cumulative, net[s, 0], net[s, 1], seeds, shared, uv, chosen, lamp
+                    )
+                    aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight)
+                    asked = 0
+                    for lane in range(LANES):
+                        on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
+                        asked -= on[lane]
+                    if shading is not None:
+                        # What is not there does not shine; rays that find an emitter know that already.
+                        for lane in range(lanes if any_alpha else 0):
+                            m = chosen[lane]
+                            b1, b2 = on_triangle(row, m, uv[lane], uv[LANES + lane])
+                            there = _f(presence_at(shading, triangle[m], b1, b2))
+                            weight[lane] *= there
+                            weight[LANES + lane] *= there
+                    if asked == 0:
+                        continue
+                    if not clear:
+                        trace_shadow_lanes(
+                            caster.tint, occluded, scene, width, query, on, rays, words, spare_on, spare
+                        )
+                        cast += asked
+                        looked += asked
+                        for lane in range(LANES):
+                            hidden = on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0)
+                            on[lane] = 0 if hidden else on[lane]
+                            blocked += 1 if hidden else 0
+                        # Where a pane is in the way, each ray has its own transmittance; where none is,
+                        # all are 1 and stay so for the rays that are not cast.
+                        blocked += count_coloured(caster.tint)
+                    if shading is not None:
+                        for lane in range(lanes):
+                            m = chosen[lane]
+                            if on[lane] and row[m, TEXTURED] > _f(0.0):
+                                b1, b2 = on_triangle(row, m, uv[lane], uv[LANES + lane])
+                                emitted_radiance(shading, triangle[m], b1, b2, radiance)
+                                for c in range(3):
+                                    lamp[(14 + c) * LANES + lane] = radiance[c]
+                    for c in range(3):
+                        for lane in range(LANES):
+                            light = lamp[(14 + c) * LANES + lane] if on[lane] else _f(0.0)
+                            light *= light_kept(caster.tint, c, lane)
+                            part[k, c * LANES + lane] += light * weight[lane]
+                            part[k, (3 + c) * LANES + lane] += light * weight[LANES + lane]
+        if plain and blocked == 0 and looked >= 8 * lanes and n_samples >= N_POINTS:
+            # No squares: there is no variance.
+            for lane in range(lanes):
+                exact[group + lane] = 1
+                for c in range(3):
+                    out[group + lane, c] += found[c * LANES + lane]
+                    out[group + lane, 3 + c] += found[c * LANES + lane]
+            continue
+        for lane in range(lanes):
+            squares = 0.0
+            for k in range(N_POINTS):
+                now = 0.0
+                for c in range(3):
+                    now += part[k, c * LANES + lane]
+                squares += now * now
+            second[group + lane] = squares
+            for c in range(6):
+                total = 0.0
+                for k in range(N_POINTS):
+                    total += part[k, c * LANES + lane]
+                out[group + lane, c] += total
+    return cast
+
+
+@inner
+def emitter_hit(  # type: ignore[no-untyped-def]
+    row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
+):
+    """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0: back)."""
+    front = front_facing(row, prim, dx, dy, dz)
+    if not front and lamp[m, TWO_SIDED] == _f(0.0):
+        return 0.0
+    cosine = dx * nx + dy * ny + dz * nz
+    light = abs(dx * lamp[m, NORMAL] + dy * lamp[m, NORMAL + 1] + dz * lamp[m, NORMAL + 2])
+    if cosine <= 0.0 or light <= 1.0e-6:
+        return 0.0
+    density = emitter_density(lamp, chance, cumulative, m) * distance * distance / light
+    return mis_weighted(cosine, density, n_light, n_hemisphere)

@@ -1,0 +1,266 @@
+"""Final gather: what a texel's hemisphere rays see, and how far they go.
+
+    E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit (emitters aside)
+    E_sky      = pi / n sum L_sky         over rays that leave the scene
+    E_emitted  = sum of MIS-weighted hits of emitters (the other half of `area_light`, where that left one)
+    AO         = share of rays that meet nothing within the distance
+
+Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
+Christensen, Faster photon map global illumination, 1999.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from baker.kernels.emitters import CLUSTER, RADIANCE, TEXTURED, emitted_radiance, emitter_at
+from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
+from baker.kernels.surface import N_POINTS
+from baker.kernels.transmittance import any_stopped, follow_gather, gather_turns, light_kept, trace_gather
+from baker.kernels.triangle_lookup import front_facing, hit_pixel
+from baker.radiosity.kernels.area_light import emitter_hit
+from baker.radiosity.kernels.side_table import find_side, new_hits, note_hit
+from baker.trace.jit import inner, kernel, scratch, smaller
+from baker.trace.packets import (
+    DIR_X,
+    DIR_Y,
+    DIR_Z,
+    GEOM_ID,
+    HIT_U,
+    HIT_V,
+    LANES,
+    NO_HIT,
+    PRIM_ID,
+    TFAR,
+    trace_lanes,
+)  # fmt: skip
+
+_f = np.float32
+# Columns of `out`: indirect RGB, sky and emitted RGB, AO, sum of squares over 16 batches.
+INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
+N_COLUMNS = 8
+# Memory of the kernels below.
+_parts, _floats = scratch((7 * LANES,), np.float32), scratch((LANES,), np.float32)
+_totals, _doubles = scratch((7 * LANES,), np.float64), scratch((LANES,), np.float64)
+_numbers, _counts, _rgba = scratch((LANES,), np.int64), scratch((LANES,), np.int32), scratch((4,), np.float64)
+
+
+@kernel
+def gather(  # type: ignore[no-untyped-def]
+    origin, normal, table, seen, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
+):
+    """Write the gathered light of texels.
+
+    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
+    seen : `side_table.SeenLight`, light that texels reflect
+    shading : from `emitters.needed_shading`
+    net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
+    limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
+    exact : (m,) uint8, 1 for texels that have all light of emitters already
+    begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
+    """
+    n_samples = len(net)
+    scene, intersect, width = caster.scene, caster.intersect, caster.width
+    query = caster.query
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    row, size, n_pixels = table.row, table.size, table.n_pixels
+    lamp, chance, cumulative, node = lamps.row, lamps.chance, lamps.cumulative, lamps.node
+    apart = lamps.apart
+    some_apart = False
+    for c in range(len(apart)):
+        some_apart = some_apart or apart[c] != 0
+    radiance = _rgba()
+    # Sums of one point's samples are short: float32; those of all points are not.
+    part, missed = _parts(), _floats()
+    total, squares = _totals(), _doubles()
+    pixel = _numbers()
+    exitance, of_side = seen.image, seen.value
+    side_point, side_normal, side_height = seen.sides.point, seen.sides.normal, seen.sides.height
+    side_member, side_length = seen.sides.member, seen.sides.side
+    hits, split = new_hits(), _counts()
+    seeds, frame = new_seeds(), new_frame()
+    distance = _f(limits[0])
+    # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
+    inverse_pi = _f(1.0 / np.pi)
+    lit = len(exitance) > 0
+    whole = n_samples / np.pi
+    turns, opened = gather_turns(caster.tint), _f(1.0)
+    for group in range(0, len(origin), LANES):
+        lanes = smaller(LANES, len(origin) - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+            squares[lane] = 0.0
+        for j in range(7 * LANES):
+            total[j] = 0.0
+        stopped = True
+        for step in range(n_samples * turns):
+            s, turn = step // turns, step % turns
+            k = s * N_POINTS // n_samples
+            if turn == 0 and (s == 0 or k != (s - 1) * N_POINTS // n_samples):
+                load_frames(rays, frame, origin, normal, group, lanes, k)
+                for j in range(7 * LANES):
+                    part[j] = _f(0.0)
+                for lane in range(LANES):
+                    missed[lane] = _f(0.0)
+            if turn == 0 or stopped:
+                aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
+                trace_gather(
+                    caster.tint, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
+                )
+            if turn == 0:
+                # AO goes by where rays stop by chance.
+                opened = _f(1.0)
+                stopped = any_stopped(caster.tint, words)
+                if not stopped:
+                    continue
+            follow_gather(caster.tint, turn, caster.occluded, width, on, rays, words, spare_on, spare)
+            for lane in range(LANES):
+                none = words[GEOM_ID * LANES + lane] == NO_HIT
+                missed[lane] += _f(1.0) if none else _f(0.0)
+                free = none or rays[TFAR * LANES + lane] > distance
+                part[OPEN * LANES + lane] += opened if free else _f(0.0)
+            opened = _f(0.0)
+            _add_coloured_sky(caster.tint, words, sky, missed, part)
+            # First only find the pixels, then fetch them: the fetches do not wait for each other.
+            for lane in range(lanes):
+                pixel[lane] = -1
+                if words[GEOM_ID * LANES + lane] == NO_HIT:
+                    continue
+                prim = np.int64(words[PRIM_ID * LANES + lane])
+                dx, dy, dz = (
+                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
+                )  # fmt: skip
+                hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
+                i = group + lane
+                m = np.int64(row[prim, 12])
+                if m < -1 and (exact[i] == 0 or some_apart):
+                    m = emitter_at(node, m, hit_u, hit_v)
+                if m >= 0 and (exact[i] == 0 or apart[np.int64(lamp[m, CLUSTER])] != 0):
+                    weight = whole * emitter_hit(
+                        row, lamp, chance, cumulative, prim, m, dx, dy, dz,
+                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],
+                        limits[1], n_samples,
+                    )  # fmt: skip
+                    if weight > 0.0:
+                        for c in range(3):
+                            radiance[c] = lamp[m, RADIANCE + c]
+                        if shading is not None and lamp[m, TEXTURED] > _f(0.0):
+                            emitted_radiance(shading, prim, hit_u, hit_v, radiance)
+                        for c in range(3):
+                            kept = light_kept(caster.tint, c, lane)
+                            part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight) * kept
+                front = front_facing(row, prim, dx, dy, dz)
+                pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
+            if lit:
+                n_split = 0
+                for lane in range(lanes):
+                    p = pixel[lane]
+                    if p >= 0:
+                        if exitance[p, 3] > _f(0.0):
+                            prim = np.int64(words[PRIM_ID * LANES + lane])
+                            dx, dy, dz = (
+                                rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane],
+                                rays[DIR_Z * LANES + lane],
+                            )  # fmt: skip
+                            note_hit(hits, lane, rays, row, prim, front_facing(row, prim, dx, dy, dz))
+                            split[n_split] = lane
+                            n_split += 1
+                            continue
+                        tint = caster.tint
+                        part[lane] += exitance[p, 0] * inverse_pi * light_kept(tint, 0, lane)
+                        part[LANES + lane] += exitance[p, 1] * inverse_pi * light_kept(tint, 1, lane)
+                        part[2 * LANES + lane] += exitance[p, 2] * inverse_pi * light_kept(tint, 2, lane)
+                for j in range(n_split):
+                    lane = int(split[j])
+                    at = np.int64(exitance[pixel[lane], 3]) - 1
+                    found = find_side(
+                        side_point, side_normal, side_height, side_member, side_length, at, hits, lane, caster
+                    )
+                    if found >= 0:
+                        for c in range(3):
+                            kept = light_kept(caster.tint, c, lane)
+                            part[c * LANES + lane] += of_side[found, c] * inverse_pi * kept
+                if n_split > 0:
+                    for lane in range(LANES):
+                        on[lane] = -1 if lane < lanes else 0
+            if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
+                for lane in range(LANES):
+                    for c in range(3):
+                        part[(DIRECT + c) * LANES + lane] += missed[lane] * sky[c]
+                    now = 0.0
+                    for c in range(6):
+                        now += part[c * LANES + lane]
+                    squares[lane] += now * now
+                    for c in range(7):
+                        total[c * LANES + lane] += part[c * LANES + lane]
+        scale = np.pi / n_samples
+        for lane in range(lanes):
+            i = group + lane
+            for c in range(6):
+                out[i, c] = total[c * LANES + lane] * scale
+            out[i, OPEN] = total[OPEN * LANES + lane] / n_samples
+            out[i, SQUARE] = squares[lane] * scale * scale
+
+
+@inner
+def _add_coloured_sky(tint, words, sky, missed, part):  # type: ignore[no-untyped-def]
+    """Add the sky's light where it passed coloured surfaces; those rays do not count as `missed`."""
+    if tint is None:
+        return
+    for lane in range(LANES):
+        if words[GEOM_ID * LANES + lane] != NO_HIT:
+            continue
+        red, green, blue = (
+            light_kept(tint, 0, lane), light_kept(tint, 1, lane), light_kept(tint, 2, lane)
+        )  # fmt: skip
+        if red != _f(1.0) or green != _f(1.0) or blue != _f(1.0):
+            missed[lane] -= _f(1.0)
+            part[DIRECT * LANES + lane] += red * sky[0]
+            part[(DIRECT + 1) * LANES + lane] += green * sky[1]
+            part[(DIRECT + 2) * LANES + lane] += blue * sky[2]
+
+
+@kernel
+def open_share(origin, normal, caster, begin, net, shared, distance, look, out):  # type: ignore[no-untyped-def]
+    """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
+
+    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32
+    look : after so many rays sixteen texels are done if at most one of each one's rays was blocked; 0: never
+    Returns the number of rays cast.
+    """
+    n_samples = len(net)
+    scene, occluded, width = caster.scene, caster.occluded, caster.width
+    query = caster.query
+    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    spare_on, spare = caster.valid, caster.floats
+    count = _counts()
+    seeds, frame = new_seeds(), new_frame()
+    cast = 0
+    for group in range(0, len(origin), LANES):
+        lanes = smaller(LANES, len(origin) - group)
+        lane_seeds(begin + group, lanes, 25, seeds)
+        for lane in range(LANES):
+            on[lane] = -1 if lane < lanes else 0
+            count[lane] = 0
+        done = 0
+        for s in range(n_samples):
+            k = s * N_POINTS // n_samples
+            if s == 0 or k != (s - 1) * N_POINTS // n_samples:
+                load_frames(rays, frame, origin, normal, group, lanes, k)
+            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, distance)
+            trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
+            for lane in range(LANES):
+                count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
+            done += 1
+            if done == look:
+                clear = 0
+                for lane in range(lanes):
+                    clear += 1 if count[lane] >= look - 1 else 0
+                if clear == lanes:
+                    break
+        cast += done * lanes
+        for lane in range(lanes):
+            out[begin + group + lane] = count[lane] / done
+    return cast

@@ -1,0 +1,1 @@
+"""`baker check --fix` and `--repair`: meshes rewritten where that keeps their look."""

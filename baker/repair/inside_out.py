@@ -1,0 +1,33 @@
+"""Finds the closed parts that look inwards although nothing is in them, as `baker check` does."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.checks.context import Subject
+from baker.checks.rules.inside_out import inside_out_parts
+from baker.core.scene import Scene
+from baker.core.settings import make_settings
+
+
+def faces_to_turn(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
+    """Return the faces of parts that are inside out: by mesh, for each primitive a (T,) bool.
+
+    Parameters
+    ----------
+    scene : Scene
+        Read leniently. Meshes without such faces are not in the answer.
+    """
+    subject = Subject(scene, make_settings({}))
+    found: dict[int, list[NDArray[np.bool_]]] = {}
+    for number, facts in enumerate(subject.meshes):
+        parts = inside_out_parts(subject, number)
+        if not parts:
+            continue
+        face = facts.good[np.concatenate(parts)]
+        masks = [np.zeros(len(p.triangle), bool) for p in facts.raw.primitives]
+        for k, mask in enumerate(masks):
+            mask[facts.local[face[facts.primitive[face] == k]]] = True
+        found[number] = masks
+    return found

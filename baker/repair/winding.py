@@ -1,0 +1,157 @@
+"""Turns the faces of closed pieces so that all of them look the same way.
+
+A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
+Which side its faces should look to is read from what the file says of it: from the vertex normals if they
+take sides, else from the larger part of the faces as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.topology.weld import connected, number_by_first
+
+# Share of a piece's area by which normals have to lean to one side to be believed.
+_CLEAR = 0.5
+
+
+@dataclass(frozen=True)
+class Winding:
+    """What is wrong with the winding of a mesh's faces.
+
+    Attributes
+    ----------
+    flip : (T,) bool
+        Faces to be turned.
+    n_pieces : int
+        Closed pieces with faces to be turned.
+    n_one_sided : int
+        Closed pieces that cannot be wound consistently (like a Klein bottle).
+    """
+
+    flip: NDArray[np.bool_]
+    n_pieces: int
+    n_one_sided: int
+
+
+def judge_winding(
+    position: NDArray[np.float32],
+    corner: NDArray[np.int64],
+    normal: NDArray[np.float32] | None,
+    *,
+    open_too: bool = False,
+) -> Winding:
+    """Find the faces of closed pieces that look the wrong way.
+
+    Parameters
+    ----------
+    position : (P, 3) float32
+        One row for each place: corners in the same place have the same number.
+    corner : (T, 3) int64
+        Places of each face's corners, all different.
+    normal : (T, 3) float32 or None
+        Mean of the vertex normals of each face, zero where the file has none.
+    open_too : bool
+        Judge open pieces as well, of which no edge belongs to more than two faces.
+
+    Returns
+    -------
+    Winding
+    """
+    n = len(corner)
+    edge = _Edges(corner)
+    piece, closed = edge.pieces(n, open_too=open_too)
+    closed_face = closed[piece]
+    if not closed_face.any():
+        return Winding(np.zeros(n, bool), 0, 0)
+    first_side, one_sided = _orient(edge, n, closed_face)
+    n_pieces_all = int(piece.max()) + 1
+    faulty = np.bincount(piece, one_sided, n_pieces_all) > 0
+    judged = closed_face & ~faulty[piece]
+
+    a, b, c = (position[corner[:, k]].astype(np.float64) for k in range(3))
+    double_area = np.cross(b - a, c - a)
+    # All faces as their piece's first face has it.
+    sign = np.where(first_side, 1.0, -1.0)
+    area = np.linalg.norm(double_area, axis=1)
+    # Volume under each face as seen from a corner of its own piece, where little is lost to rounding.
+    anchor = np.zeros((n_pieces_all, 3))
+    anchor[piece[::-1]] = a[::-1]
+    a, b, c = (p - anchor[piece] for p in (a, b, c))
+    volume = np.bincount(piece, sign * np.einsum("ij,ij->i", a, np.cross(b, c)), n_pieces_all)
+    total = np.maximum(np.bincount(piece, area, n_pieces_all), 1e-300)
+    as_wound = np.bincount(piece, sign * area, n_pieces_all) / total
+    by_normal = np.zeros(n_pieces_all)
+    if normal is not None:
+        agree = np.sign(np.einsum("ij,ij->i", double_area, normal.astype(np.float64)))
+        by_normal = np.bincount(piece, sign * area * agree, n_pieces_all) / total
+    # +1: the first face's side is the right one; a tie goes to the outside.
+    outside = np.where(volume >= 0, 1.0, -1.0)
+    leaning = np.where(np.abs(as_wound) > 1e-9, np.sign(as_wound), outside)
+    right = np.where(np.abs(by_normal) > _CLEAR, np.sign(by_normal), leaning)
+    flip = judged & (sign != right[piece])
+    turned = np.bincount(piece, flip, n_pieces_all) > 0
+    return Winding(flip, int(turned.sum()), int((closed & faulty).sum()))
+
+
+def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many of the faces (T, 3) each of their edges belongs to, (E,) int64."""
+    return _Edges(corner).count
+
+
+class _Edges:
+    """The edges of triangles, sorted so that equal ones are neighbours."""
+
+    def __init__(self, corner: NDArray[np.int64]) -> None:
+        start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+        n_places = int(corner.max(initial=0)) + 1
+        key = np.minimum(start, end) * n_places + np.maximum(start, end)
+        order = np.argsort(key, kind="stable")
+        ordered = key[order]
+        self.face = order // 3
+        self.rising = (start < end)[order]
+        new = np.ones(len(order), bool)
+        new[1:] = ordered[1:] != ordered[:-1]
+        self.number = np.cumsum(new) - 1
+        self.count = np.bincount(self.number)
+        # Rows where an edge is the same as in the row before.
+        self.second = np.flatnonzero(~new)
+
+    def pieces(self, n_faces: int, *, open_too: bool) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the piece of each face, and which pieces are closed (or at least have no crowded edge)."""
+        a, b = self.face[self.second - 1], self.face[self.second]
+        piece = _components(a, b, n_faces)
+        good = self.count <= 2 if open_too else self.count == 2
+        open_face = self.face[~good[self.number]]
+        closed = np.ones(int(piece.max(initial=-1)) + 1, bool)
+        closed[piece[open_face]] = False
+        return piece, closed
+
+
+def _orient(
+    edge: _Edges, n: int, closed_face: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which faces are wound like the first of their piece, and which belong to one-sided pieces.
+
+    Each face stands in a graph twice, once for each way round. Neighbours that run along their edge in
+    opposite directions agree, so that equal ways hang together; else opposite ways do. A piece that can be
+    oriented falls into two halves, one for each side.
+    """
+    second = edge.second[closed_face[edge.face[edge.second]]]
+    a, b = edge.face[second - 1], edge.face[second]
+    crossed = edge.rising[second - 1] == edge.rising[second]
+    label = _components(
+        np.concatenate([a, a + n]),
+        np.concatenate([np.where(crossed, b + n, b), np.where(crossed, b, b + n)]),
+        2 * n,
+    )
+    one_sided = label[:n] == label[n:]
+    # Labels are numbered by first occurrence, and faces as they are come first.
+    return label[:n] < label[n:], one_sided
+
+
+def _components(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    return number_by_first(connected(a, b, n)).astype(np.int64)

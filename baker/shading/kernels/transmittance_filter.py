@@ -1,0 +1,89 @@
+"""The function that Embree tells hits of BLEND surfaces: it multiplies colours, and lets no hit count.
+
+It finds the ray's number in the ray (`packets.PASSES`), and what to write behind the query's context
+(`packets.Tint`).
+
+Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import carray, cfunc, types  # type: ignore[attr-defined]
+
+from baker.kernels.alpha import SURFACE
+from baker.kernels.textures import MAX_LEVELS, TexturePack
+from baker.kernels.transmittance import ROW_LENGTH, TintTable, tint_at
+from baker.shading.kernels.edge_hits import crossed_before, on_edge
+from baker.trace.embree import SeeThrough
+from baker.trace.jit import scratch
+from baker.trace.packets import (
+    CONTEXT_WORDS,
+    HIT_U,
+    HIT_V,
+    ID,
+    LANES,
+    NG_X,
+    PASSES,
+    PRIM_ID,
+    TFAR,
+    TINT_COLOUR,
+    TINT_STOP,
+)  # fmt: skip
+from baker.trace.pointers import pointer
+
+_U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
+_rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
+
+
+def filter_of(tint: TintTable, pack: TexturePack) -> SeeThrough:
+    """Return what the ray tree has to know of the triangles that let a share of light through."""
+    arrays = (tint.slot, tint.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
+    data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
+    address = _multiply_colour.address or 0
+    return SeeThrough(tint.slot >= 0, address, data.ctypes.data, (arrays, data), tint.coloured)
+
+
+@cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
+def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
+    """Multiply the colour of each valid lane's ray, and clear `valid`."""
+    # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit, N (of four bytes).
+    given = carray(arguments, (6,), np.int64)
+    n = given[5] & 0xFFFFFFFF
+    valid = carray(pointer(given[0]), (n,), np.int32)
+    data = carray(pointer(given[1]), (12,), np.int64)
+    context = carray(pointer(given[2]), (CONTEXT_WORDS,), np.float32)
+    context_words = carray(pointer(given[2]), (CONTEXT_WORDS,), np.uint32)
+    ray = carray(pointer(given[3]), (12 * n,), np.float32)
+    ray_words = carray(pointer(given[3]), (12 * n,), np.uint32)
+    hit = carray(pointer(given[4]), (6 * n,), np.float32)
+    hit_words = carray(pointer(given[4]), (6 * n,), np.uint32)
+    slot = carray(pointer(data[0]), (data[1],), np.int32)
+    row = carray(pointer(data[2]), (data[3], ROW_LENGTH), np.float32)
+    pack = TexturePack(
+        carray(pointer(data[4]), (data[5], 4), np.float32),
+        carray(pointer(data[6]), (data[7], MAX_LEVELS, 3), np.int64),
+        carray(pointer(data[8]), (data[9],), np.int64),
+        carray(pointer(data[10]), (data[11], 2), np.int64),
+    )
+    rgba, rgb = _rgba(), _rgb()
+    for lane in range(n):
+        if valid[lane] != -1:
+            continue
+        valid[lane] = 0
+        prim = hit_words[_PRIM * n + lane]
+        number = np.int64(ray_words[ID * n + lane]) - 1
+        whole = number >= PASSES
+        number -= PASSES if whole else 0
+        if not whole and prim == context_words[TINT_STOP + number]:
+            continue
+        k = np.int64(slot[prim])
+        b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
+        if on_edge(b1, b2) and crossed_before(
+            context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
+        ):
+            continue
+        alpha = tint_at(row, k, pack, b1, b2, rgba, rgb)
+        share = 1.0 - alpha if whole else 1.0
+        for c in range(3):
+            context[TINT_COLOUR + c * LANES + number] *= np.float32(share * rgb[c])

@@ -1,0 +1,1 @@
+"""Triangle meshes as such: equal vertices, shared edges, closed parts, solids."""

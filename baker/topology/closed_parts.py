@@ -1,0 +1,350 @@
+"""Which triangles of the world form closed surfaces, and on which side of each the enclosed space lies.
+
+A part is a set of triangles of one object that hang together by edges. Open parts whose open edges coincide
+are taken together: a box of six objects is closed, too. Winding need not be consistent: for the test,
+triangles are turned until their edges match.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.topology.edges import Edges, find_edges
+from baker.topology.weld import connected, number_by_first, number_rows
+
+# A part is nearly closed if the area of its holes is at most this share of the area of its triangles.
+SMALL_HOLES = 0.005
+# ... and closed if it is at most this one: slits of no width where an edge meets two shorter ones.
+NO_HOLES = 1e-6
+# A part whose mean thickness is below this share of its diagonal encloses nothing: origins of rays leave
+# a surface by as much.
+THINNEST = 1e-5
+# The one open loop of a part without a lid is flat: it leaves its plane by at most this share of its width.
+_FLAT = 0.1
+# ... and its area is at most this share of the part's, or the part is but a sheet.
+_WIDEST_LID = 0.9
+# Vertices of different objects are one if they differ by at most this share of the largest coordinate.
+_TOGETHER = 4e-7
+
+
+class ClosedParts(NamedTuple):
+    """Parts of the world's surface.
+
+    Attributes
+    ----------
+    part : (T,) int32
+        Part of each triangle, -1 = left out, also a wall between two boxes of one object.
+    outward : (T,) int8
+        1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it;
+        0 if its part encloses none. The same for parts without a lid.
+    closed, exact : (P,) bool
+        The part encloses a space; it has no holes at all.
+    lidless : (P,) bool
+        The part is open, but a flat lid on its only hole would close it.
+    area : (P,) float64, m2
+    low, high : (P, 3) float64, bounds, metres
+    """
+
+    part: NDArray[np.int32]
+    outward: NDArray[np.int8]
+    closed: NDArray[np.bool_]
+    exact: NDArray[np.bool_]
+    lidless: NDArray[np.bool_]
+    area: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+class _Pieces(NamedTuple):
+    """Pieces that F faces form.
+
+    piece (F,), of each face; turn (F,), 1 or -1, see `_turns`; bad (B,), edges that do not cancel;
+    holes, area (P,) float64, m2; flat (P,) bool, there is one hole, and it is flat.
+    """
+
+    piece: NDArray[np.int32]
+    turn: NDArray[np.int8]
+    bad: NDArray[np.int64]
+    edges: Edges
+    holes: NDArray[np.float64]
+    area: NDArray[np.float64]
+    flat: NDArray[np.bool_]
+
+
+def find_closed_parts(
+    position: NDArray[np.float32],
+    triangle: NDArray[np.integer],
+    instance: NDArray[np.integer],
+    used: NDArray[np.bool_],
+) -> ClosedParts:
+    """Find the parts of a world and which of them are closed.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, metres, world
+    triangle : (T, 3) int
+    instance : (T,) int, object of each triangle
+    used : (T,) bool
+        Which triangles count; the others are left out.
+    """
+    n = len(triangle)
+    part, outward = np.full(n, -1, np.int32), np.zeros(n, np.int8)
+    rows = np.flatnonzero(used)
+    vertex = _weld(position, triangle[rows], instance[rows])
+    distinct = _distinct(vertex)
+    rows, vertex = rows[distinct], vertex[distinct]
+    if not len(rows):
+        none = np.zeros((0, 3))
+        nothing = np.zeros(0, bool)
+        return ClosedParts(part, outward, nothing, nothing, nothing, np.zeros(0), none, none)
+    first, same_way = _twins(vertex)
+    single = _single(vertex, first, same_way)
+    corner = position[triangle[rows[single]]].astype(np.float64)
+    vertex = vertex[single]
+    pieces = _pieces(vertex, corner)
+    pieces = _join_objects(pieces, vertex, corner)
+    whole = _enclosing(pieces, corner)
+    number = np.full(len(rows), -1)
+    number[single] = np.arange(len(single))
+    of = number[first]
+    part[rows] = np.where(of >= 0, pieces.piece[of], -1)
+    outward[rows] = np.where(of >= 0, whole[of] * same_way, 0)
+    n_parts = len(pieces.area)
+    closed = np.zeros(n_parts, bool)
+    closed[pieces.piece[whole != 0]] = True
+    lidless = closed & (pieces.holes > SMALL_HOLES * pieces.area)
+    closed &= ~lidless
+    order = np.argsort(pieces.piece, kind="stable")
+    start = np.searchsorted(pieces.piece[order], np.arange(n_parts))
+    a, b, c = (corner[order, k] for k in range(3))
+    low = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), start, axis=0)
+    high = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), start, axis=0)
+    exact = closed & (pieces.holes <= NO_HOLES * pieces.area)
+    return ClosedParts(part, outward, closed, exact, lidless, pieces.area, low, high)
+
+
+def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the areas (F,) of triangles, corners (F, 3, 3)."""
+    (ux, uy, uz), (vx, vy, vz) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    area: NDArray[np.float64] = 0.5 * np.sqrt(x * x + y * y + z * z)
+    return area
+
+
+def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return (F,) bool: the three corners of a face (F, 3) differ."""
+    a, b, c = vertex.T
+    distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
+    return distinct
+
+
+def _weld(
+    position: NDArray[np.float32], triangle: NDArray[np.integer], instance: NDArray[np.integer]
+) -> NDArray[np.int64]:
+    """Return (F, 3) int64: number of each corner's position within its object."""
+    marked = np.zeros(len(position), bool)
+    marked[triangle.reshape(-1)] = True
+    used = np.flatnonzero(marked)
+    owner = np.zeros(len(position), np.float32)
+    owner[triangle.reshape(-1)] = np.repeat(instance, 3)
+    number = np.zeros(len(position), np.int64)
+    number[used] = number_rows(np.concatenate([position[used], owner[used, None]], axis=1))
+    welded: NDArray[np.int64] = number[triangle]
+    return welded
+
+
+def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+    """Return (F,) the first face with the same three corners, and 1 if that is wound alike, else -1."""
+    a, b, c = vertex.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    ordered = np.stack([low, a + b + c - low - high, high], axis=1)
+    n = int(ordered.max(initial=0)) + 1
+    # One number for three would overflow: the hash of all is enough to find candidates.
+    key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
+    order = np.argsort(key, kind="stable")
+    of, way = np.arange(len(vertex)), np.ones(len(vertex), np.int8)
+    begin, end = order[:-1], order[1:]
+    for k in np.flatnonzero(key[begin] == key[end]):
+        if (ordered[begin[k]] == ordered[end[k]]).all():
+            twin, first = int(end[k]), int(of[begin[k]])
+            of[twin] = first
+            turned = [np.roll(vertex[twin], shift).tolist() for shift in range(3)]
+            way[twin] = 1 if vertex[first].tolist() in turned else -1
+    return of, way
+
+
+def _single(
+    vertex: NDArray[np.int64], first: NDArray[np.int64], same_way: NDArray[np.int8]
+) -> NDArray[np.int64]:
+    """Return the faces that make pieces: one of each set of twins.
+
+    Two boxes of one object that touch have a wall in common, once for each: it lies inside both together and
+    is left out. Where all faces of a piece are there for both sides, one of each stays.
+    """
+    single = np.flatnonzero(first == np.arange(len(first)))
+    paired = np.zeros(len(first), bool)
+    paired[first[same_way < 0]] = True
+    if not paired.any():
+        return single
+    piece = find_edges(vertex[single]).connected_faces(len(single))
+    some = np.zeros(int(piece.max()) + 1, bool)
+    some[piece[~paired[single]]] = True
+    return single[~(paired[single] & some[piece])]
+
+
+def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
+    """Find pieces, turn their faces to one winding, and measure their holes."""
+    n = len(vertex)
+    edges = find_edges(vertex)
+    piece = edges.connected_faces(n)
+    n_pieces = int(piece.max(initial=-1)) + 1
+    turn = _turns(edges, piece, n_pieces)
+    half = np.repeat(np.arange(len(edges.first)), edges.count)
+    begin = vertex[edges.face, edges.corner]
+    way = np.where(begin == edges.low[half], 1, -1) * turn[edges.face]
+    net = np.add.reduceat(way, edges.first)
+    total = np.bincount(piece, face_areas(corner), minlength=n_pieces).astype(np.float64)
+    bad = np.flatnonzero(net != 0)
+    holes, flat = np.zeros(n_pieces), np.zeros(n_pieces, bool)
+    if len(bad):
+        loop, size, even = _loops(vertex, corner, edges, bad, net[bad])
+        owner = np.zeros(len(size), np.int64)
+        owner[loop] = piece[edges.face[edges.first[bad]]]
+        holes = holes + np.bincount(owner, size, minlength=n_pieces)
+        count = np.bincount(owner, minlength=n_pieces)
+        flat[owner[even]] = True
+        flat &= count == 1
+    return _Pieces(piece, turn, bad, edges, holes, total, flat)
+
+
+def _loops(
+    vertex: NDArray[np.int64],
+    corner: NDArray[np.float64],
+    edges: Edges,
+    bad: NDArray[np.int64],
+    net: NDArray[np.int64],
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the loop of each bad edge (those that share vertices), loops' areas, m2, and which are flat."""
+    name, ends = np.unique(np.stack([edges.low[bad], edges.high[bad]]), return_inverse=True)
+    ends = ends.reshape(2, -1)
+    loop = number_by_first(connected(ends[0], ends[1], len(name))[ends[0]])
+    face, c = edges.face[edges.first[bad]], edges.corner[edges.first[bad]]
+    begin, end = corner[face, c], corner[face, (c + 1) % 3]
+    forward = (vertex[face, c] == edges.low[bad])[:, None]
+    begin, end = np.where(forward, begin, end), np.where(forward, end, begin)
+    count = np.bincount(loop)
+    middle = np.stack([np.bincount(loop, begin[:, k]) / count for k in range(3)], axis=1)[loop]
+    turned = 0.5 * net[:, None] * np.cross(begin - middle, end - middle)
+    vector = np.stack([np.bincount(loop, turned[:, k]) for k in range(3)], axis=1)
+    size = np.linalg.norm(vector, axis=1)
+    normal = vector / np.maximum(size, 1e-300)[:, None]
+    away = np.zeros(len(count))
+    np.maximum.at(away, loop, np.abs(np.einsum("bx,bx->b", begin - middle, normal[loop])))
+    return loop, size, away <= _FLAT * np.sqrt(size)
+
+
+def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
+    """Return (F,) int8: 1 or -1, so that faces times that are wound alike across edges of two faces.
+
+    Each face stands twice in a graph, as it is and turned over; edges join the copies that match. A surface
+    with one side only (a Moebius strip) cannot be turned and is left as it is.
+    """
+    n = len(piece)
+    turn = np.ones(n, np.int8)
+    pair = edges.count == 2
+    first = edges.first
+    mixed = np.zeros(n_pieces, bool)
+    mixed[piece[edges.face[first[pair & (edges.balance != 0)]]]] = True
+    if not mixed.any():
+        return turn
+    chosen = np.flatnonzero(pair & mixed[piece[edges.face[first]]])
+    a, b = edges.face[first[chosen]], edges.face[first[chosen] + 1]
+    other = np.where(edges.balance[chosen] == 0, 0, n)
+    label = connected(np.concatenate([a, a + n]), np.concatenate([b + other, b + n - other]), 2 * n)
+    turn[label[:n] > label[n:]] = -1
+    return turn
+
+
+def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
+    """Take pieces together whose open edges coincide, if that closes them."""
+    edges, bad = pieces.edges, pieces.bad
+    is_open = pieces.holes > SMALL_HOLES * pieces.area
+    bad = bad[is_open[pieces.piece[edges.face[edges.first[bad]]]]]
+    if len(bad) < 2:
+        return pieces
+    at = edges.first[bad]
+    face, c = edges.face[at], edges.corner[at]
+    ends = np.stack([corner[face, c], corner[face, (c + 1) % 3]]).reshape(-1, 3)
+    place = _near_alike(ends, _TOGETHER * float(np.abs(corner).max(initial=0.0)))
+    here = np.sort(place.reshape(2, -1), axis=0)
+    _, key = np.unique(here[0] * (int(place.max()) + 1) + here[1], return_inverse=True)
+    key = key.reshape(-1)
+    order = np.argsort(key, kind="stable")
+    same = key[order][1:] == key[order][:-1]
+    owner = pieces.piece[face].astype(np.int64)
+    a, b = owner[order[:-1][same]], owner[order[1:][same]]
+    if not len(a):
+        return pieces
+    group = connected(a, b, len(pieces.area))
+    joined = np.zeros(len(pieces.area), bool)
+    joined[np.unique(np.concatenate([group[a], group[b]]))] = True
+    chosen = np.flatnonzero(joined[group[pieces.piece]])
+    # Open corners get the number of their place; the others keep their own.
+    shared = vertex.copy()
+    base = int(vertex.max()) + 1
+    renamed = np.arange(base)
+    renamed[np.concatenate([vertex[face, c], vertex[face, (c + 1) % 3]])] = base + place
+    shared = renamed[vertex[chosen]]
+    distinct = _distinct(shared)
+    chosen, shared = chosen[distinct], shared[distinct]
+    again = _pieces(shared, corner[chosen])
+    good = again.holes <= SMALL_HOLES * again.area
+    use = good[again.piece]
+    if not use.any():
+        return pieces
+    piece, turn = pieces.piece.astype(np.int64), pieces.turn.copy()
+    piece[chosen[use]] = len(pieces.area) + again.piece[use]
+    turn[chosen[use]] = again.turn[use]
+    name, number = np.unique(piece, return_inverse=True)
+    holes = np.concatenate([pieces.holes, again.holes])[name]
+    # What is left of a piece that lost faces to a closed one keeps its holes, and more.
+    area = np.concatenate([pieces.area, again.area])[name]
+    flat = np.concatenate([pieces.flat, again.flat])[name]
+    return pieces._replace(
+        piece=number.reshape(-1).astype(np.int32), turn=turn, holes=holes, area=area, flat=flat
+    )
+
+
+def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
+    """Number (N, 3) points alike if no coordinate has a gap wider than `step` between them."""
+    label = np.zeros(point.shape, np.int64)
+    for axis in range(3):
+        order = np.argsort(point[:, axis], kind="stable")
+        label[order[1:], axis] = np.cumsum(np.diff(point[order, axis]) > step)
+    xy = label[:, 0] * (int(label[:, 1].max()) + 1) + label[:, 1]
+    _, xy = np.unique(xy, return_inverse=True)
+    _, number = np.unique(xy.reshape(-1) * (int(label[:, 2].max()) + 1) + label[:, 2], return_inverse=True)
+    return number.reshape(-1).astype(np.int64)
+
+
+def _enclosing(pieces: _Pieces, corner: NDArray[np.float64]) -> NDArray[np.int8]:
+    """Return (F,) int8: 1 where a face's normal points out of its closed piece, -1 into it, else 0."""
+    n_pieces = len(pieces.area)
+    centre = (
+        np.stack([np.bincount(pieces.piece, corner[:, 0, k], minlength=n_pieces) for k in range(3)], axis=1)
+        / np.maximum(np.bincount(pieces.piece, minlength=n_pieces), 1)[:, None]
+    )
+    local = corner - centre[pieces.piece][:, None]
+    six = np.einsum("fx,fx->f", local[:, 0], np.cross(local[:, 1], local[:, 2])) * pieces.turn
+    volume = np.bincount(pieces.piece, six, minlength=n_pieces) / 6.0
+    far = np.zeros(n_pieces)
+    np.maximum.at(far, pieces.piece, np.einsum("fcx,fcx->fc", local, local).max(axis=1))
+    thick = np.abs(volume) > THINNEST * np.sqrt(far) * pieces.area
+    lidless = pieces.flat & (pieces.holes <= _WIDEST_LID * pieces.area)
+    closed = thick & (lidless | (pieces.holes <= SMALL_HOLES * pieces.area))
+    sign = np.where(volume < 0, -1, 1) * closed
+    return (sign[pieces.piece] * pieces.turn).astype(np.int8)

@@ -1,0 +1,139 @@
+"""Finds triangles that must not be baked: unusable vertices, no area, exact doubles of another face."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.topology.unique_rows import mix
+
+# Largest coordinate that is kept; Embree's own limit for single precision is 1.8e18.
+LARGEST_COORDINATE = 1e18
+# Height over longest edge. Below single precision's step the plane of the triangle is only rounding.
+_FLATTEST = 1e-7
+
+
+def in_range(
+    triangle: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell which (T, 3) triangles name only vertices from `low` to below `high` (T,), (T,) bool."""
+    within: NDArray[np.bool_] = np.asarray((triangle.min(axis=1) >= low) & (triangle.max(axis=1) < high))
+    return within
+
+
+def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell which (V, 3) positions are finite and within single precision's safe range, (V,) bool."""
+    # A comparison with NaN is false, so this one test covers NaN, inf and huge values.
+    usable: NDArray[np.bool_] = np.asarray((np.abs(position) <= LARGEST_COORDINATE).all(axis=1))
+    return usable
+
+
+def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell which triangles are points or lines, (T,) bool.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, finite where used
+    triangle : (T, 3) int64
+    """
+    a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
+    ab, ac, bc = b - a, c - a, c - b
+    # Scaled by the longest side first: squares of tiny or huge sides would leave the exponent's range.
+    longest = np.maximum(np.maximum(np.abs(ab).max(axis=1), np.abs(ac).max(axis=1)), np.abs(bc).max(axis=1))
+    scale = 1.0 / np.where(longest > 0, longest, 1.0)[:, None]
+    ab, ac, bc = ab * scale, ac * scale, bc * scale
+    squared = np.maximum(np.maximum((ab * ab).sum(axis=1), (ac * ac).sum(axis=1)), (bc * bc).sum(axis=1))
+    normal = _cross(ab, ac)
+    flat = np.sqrt((normal * normal).sum(axis=1)) <= _FLATTEST * squared
+    found: NDArray[np.bool_] = np.asarray(flat | (longest == 0))
+    return found
+
+
+def face_normal(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return (T, 3) normals as long as twice the area; the winding is counter-clockwise."""
+    a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
+    return _cross(b - a, c - a)
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    # np.cross takes three times as long on (n, 3) arrays.
+    out = np.zeros_like(a)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[:, k] = a[:, i] * b[:, j] - a[:, j] * b[:, i]
+    return out
+
+
+def duplicates(
+    position: NDArray[np.float32],
+    triangle: NDArray[np.int64],
+    material: NDArray[np.int32],
+    double_sided: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Tell which triangles repeat an earlier one, by position, (T,) bool.
+
+    A triangle with the same three corner positions and the same winding, from whichever corner it starts,
+    is a duplicate. One with the opposite winding is the back of the first and stays, unless both have the
+    same double-sided material, which shows both sides already.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, finite where used
+    triangle : (T, 3) int64
+    material : (T,) int32
+    double_sided : (M,) bool, for each material
+    """
+    repeated = np.zeros(len(triangle), bool)
+    candidate = _same_key(position, triangle)
+    if not len(candidate):
+        return repeated
+    corner = _position_number(position[triangle[candidate]].reshape(-1, 3)).reshape(-1, 3)
+    first = corner.argmin(axis=1)
+    row = np.arange(len(corner))
+    a, b, c = (corner[row, (first + k) % 3] for k in range(3))
+    winding = b > c
+    low, high = np.minimum(b, c), np.maximum(b, c)
+
+    # Sorted by face, winding, then file order: the first of each run is the one that stays.
+    order = np.lexsort((candidate, winding, high, low, a))
+    face = np.stack([a, low, high], axis=1)[order]
+    wound = winding[order]
+    same_face = np.zeros(len(order), bool)
+    same_face[1:] = (face[1:] == face[:-1]).all(axis=1)
+    same = same_face.copy()
+    same[1:] &= wound[1:] == wound[:-1]
+    repeated[candidate[order[same]]] = True
+
+    # What is left of a face is one triangle, or one of each winding: the later one may be a double.
+    left, left_face = order[~same], face[~same]
+    pair = np.flatnonzero((left_face[1:] == left_face[:-1]).all(axis=1))
+    one, two = candidate[left[pair]], candidate[left[pair + 1]]
+    double = (material[one] == material[two]) & double_sided[material[one]]
+    repeated[np.maximum(one, two)[double]] = True
+    return repeated
+
+
+def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return, sorted, the triangles whose corners hash like those of another: few in a clean mesh."""
+    with np.errstate(invalid="ignore"):
+        bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
+    key = np.zeros(len(bits), np.uint64)
+    for k in range(3):
+        key = mix(key ^ bits[:, k])
+    total = key[triangle[:, 0]] + key[triangle[:, 1]] + key[triangle[:, 2]]  # any order gives the same sum
+    ordered = np.sort(total)
+    twice = ordered[1:][ordered[1:] == ordered[:-1]]
+    if not len(twice):
+        return np.zeros(0, np.int64)
+    return np.flatnonzero(np.isin(total, twice))
+
+
+def _position_number(position: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Number equal positions alike, (N,) int64."""
+    order = np.lexsort((position[:, 2], position[:, 1], position[:, 0]))
+    ordered = position[order]
+    step = np.zeros(len(order), np.int64)
+    step[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    number = np.zeros(len(order), np.int64)
+    number[order] = np.cumsum(step)
+    return number

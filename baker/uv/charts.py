@@ -1,0 +1,174 @@
+"""Cuts meshes into charts that are true to size in metres, checked, every triangle included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.progress import Progress
+from baker.topology.weld import number_by_first, weld
+from baker.uv.check import CHART_TOLERANCE, chart_overlap, uv_area
+from baker.uv.parts import JOB_TRIANGLES, cut_parts
+from baker.uv.planar import planar_charts
+from baker.uv.pool import run_jobs
+from baker.uv.xatlas_charts import ChartJob, FlatCharts
+
+
+@dataclass(frozen=True)
+class MeshCharts:
+    """Charts of one mesh.
+
+    Attributes
+    ----------
+    vertex : (V',) int32
+        Mesh vertex of each lightmap vertex.
+    uv : (V', 2) float64, unit of the positions that were cut
+        Each chart has its lower corner at 0.
+    triangle : (T, 3) int32, into the lightmap vertices
+    chart : (T,) int32, from 0
+    vertex_chart : (V',) int32
+    n_repaired : int
+        Triangles that the unwrapper left out or laid over each other.
+    """
+
+    vertex: NDArray[np.int32]
+    uv: NDArray[np.float64]
+    triangle: NDArray[np.int32]
+    chart: NDArray[np.int32]
+    vertex_chart: NDArray[np.int32]
+    n_repaired: int
+
+    @property
+    def n_charts(self) -> int:
+        """Count the charts."""
+        return int(self.chart.max()) + 1 if len(self.chart) else 0
+
+
+@dataclass(frozen=True)
+class _Welded:
+    """A mesh with one vertex a place, and where its loose parts are."""
+
+    position: NDArray[np.float64]
+    triangle: NDArray[np.int32]
+    part: NDArray[np.int32]
+
+
+def chart_meshes(
+    meshes: Sequence[tuple[NDArray[np.float64], NDArray[np.int32]]],
+    threads: int,
+    progress: Progress,
+    until: float,
+) -> list[MeshCharts]:
+    """Cut meshes into charts.
+
+    Parameters
+    ----------
+    meshes : sequence of (position (V, 3) float64, triangle (T, 3) int32)
+    threads : int
+        Most worker processes at a time; the result does not depend on it.
+    progress : Progress
+        Told up to the fraction `until` of the stage.
+    """
+    welded = [_weld_mesh(position, triangle) for position, triangle in meshes]
+    jobs, origin = _make_jobs(welded)
+    answers = run_jobs(jobs, threads, progress, until)
+    uv = [np.zeros((len(w.triangle), 3, 2)) for w in welded]
+    chart = [np.full(len(w.triangle), -1, np.int64) for w in welded]
+    base = 0
+    for answer, pieces in zip(answers, origin, strict=True):
+        # A job's charts are numbered over all its pieces; a base keeps jobs apart.
+        number = np.where(answer.chart >= 0, answer.chart.astype(np.int64) + base, -1)
+        base = int(number.max(initial=base - 1)) + 1
+        row = 0
+        for mesh, face in pieces:
+            rows = slice(row, row + len(face))
+            row += len(face)
+            uv[mesh][face] = answer.uv[rows]
+            chart[mesh][face] = number[rows]
+    return [
+        _finish(triangle, w, FlatCharts(u, number_by_first(c)))
+        for (_, triangle), w, u, c in zip(meshes, welded, uv, chart, strict=True)
+    ]
+
+
+def _weld_mesh(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> _Welded:
+    """Weld vertices at one place, so that only sharp creases and not split normals cut charts."""
+    label = weld(position)
+    place = np.zeros((int(label.max(initial=-1)) + 1, 3))
+    place[label] = position
+    joined = label[triangle]
+    return _Welded(place, joined, cut_parts(place, joined))
+
+
+def _make_jobs(welded: Sequence[_Welded]) -> tuple[list[ChartJob], list[list[tuple[int, NDArray[np.int64]]]]]:
+    """Gather loose parts into jobs; the cut depends on the meshes alone."""
+    jobs: list[ChartJob] = []
+    origin: list[list[tuple[int, NDArray[np.int64]]]] = []
+    bundle: list[tuple[int, NDArray[np.int64]]] = []
+    size = 0
+
+    def close() -> None:
+        nonlocal bundle, size
+        if bundle:
+            jobs.append(_bundle_job(welded, bundle))
+            origin.append(bundle)
+        bundle, size = [], 0
+
+    for m, mesh in enumerate(welded):
+        order = np.argsort(mesh.part, kind="stable")
+        for face in np.split(order, np.flatnonzero(np.diff(mesh.part[order])) + 1):
+            if size and size + len(face) > JOB_TRIANGLES:
+                close()
+            bundle.append((m, face))
+            size += len(face)
+    close()
+    return jobs, origin
+
+
+def _bundle_job(welded: Sequence[_Welded], bundle: Sequence[tuple[int, NDArray[np.int64]]]) -> ChartJob:
+    position, triangle = [], []
+    first_vertex, first_triangle = [0], [0]
+    for mesh, face in bundle:
+        used, local = np.unique(welded[mesh].triangle[face], return_inverse=True)
+        position.append(welded[mesh].position[used])
+        triangle.append(local.reshape(-1, 3).astype(np.int32))
+        first_vertex.append(first_vertex[-1] + len(used))
+        first_triangle.append(first_triangle[-1] + len(face))
+    return ChartJob(
+        np.concatenate(position), np.concatenate(triangle), np.array(first_vertex), np.array(first_triangle)
+    )
+
+
+def _finish(triangle: NDArray[np.int32], welded: _Welded, flat: FlatCharts) -> MeshCharts:
+    """Repair what is missing or overlaps, and give each (vertex, place in the plane) one lightmap vertex."""
+    uv, chart = flat.uv.copy(), flat.chart.astype(np.int64)
+    good = np.flatnonzero(chart >= 0)
+    if len(good):
+        overlapping = chart_overlap(uv[good], flat.chart[good]).overlaps(CHART_TOLERANCE)
+        chart[good[overlapping[flat.chart[good]]]] = -1
+    missing = np.flatnonzero(chart < 0)
+    if len(missing):
+        uv[missing], own = planar_charts(welded.position, welded.triangle[missing])
+        chart[missing] = int(chart.max(initial=-1)) + 1 + own
+    chart32 = number_by_first(chart)
+    n_charts = int(chart32.max(initial=-1)) + 1
+    corner_chart = np.repeat(chart32, 3)
+    flat_uv = uv.reshape(-1, 2)
+    low = np.full((n_charts, 2), np.inf)
+    np.minimum.at(low, corner_chart, flat_uv)
+    flat_uv = flat_uv - low[corner_chart]
+    # Corners become one lightmap vertex where mesh vertex, chart and uv agree.
+    key = np.stack([triangle.reshape(-1).astype(np.float64), corner_chart.astype(np.float64)], axis=1)
+    label = weld(key, flat_uv)
+    _, first = np.unique(label, return_index=True)
+    return MeshCharts(
+        vertex=triangle.reshape(-1)[first].astype(np.int32),
+        uv=flat_uv[first],
+        triangle=label.reshape(-1, 3),
+        chart=chart32,
+        vertex_chart=corner_chart[first],
+        n_repaired=int(np.count_nonzero(uv_area(uv[missing]) > 0)) if len(missing) else 0,
+    )

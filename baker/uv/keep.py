@@ -1,0 +1,143 @@
+"""Judges and uses a lightmap uv that the scene brings along: TEXCOORD_1."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.core.scene import Mesh, Scene, SceneWarning
+from baker.topology.weld import connected_vertices, weld
+from baker.uv.check import PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
+
+
+@dataclass(frozen=True)
+class KeptUv:
+    """Which instances use TEXCOORD_1, and how.
+
+    Attributes
+    ----------
+    usable : (I,) bool
+        The instance's own TEXCOORD_1 is valid taken alone.
+    together : bool
+        All instances' uv lie in one page without overlap: they stay exactly as they are.
+    warnings : tuple of SceneWarning
+    """
+
+    usable: NDArray[np.bool_]
+    together: bool
+    warnings: tuple[SceneWarning, ...]
+
+
+def lightmap_uv(mesh: Mesh) -> NDArray[np.float32] | None:
+    """Return the mesh's TEXCOORD_1, (V, 2) float32, or None."""
+    return mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
+
+
+def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
+    """Return (warning code, what is wrong) of a mesh's TEXCOORD_1, or None if it can carry a lightmap."""
+    uv = lightmap_uv(mesh)
+    if uv is None:
+        return "uv.missing", "it has no TEXCOORD_1"
+    used = uv[mesh.triangle]
+    if not np.isfinite(used).all():
+        return "uv.not_finite", "its TEXCOORD_1 holds values that are not finite"
+    low, high = float(used.min(initial=0.0)), float(used.max(initial=0.0))
+    if low < -RANGE_SLACK or high > 1.0 + RANGE_SLACK:
+        return "uv.out_of_range", f"its TEXCOORD_1 reaches from {low:.4g} to {high:.4g}, outside 0 to 1"
+    area = uv_area(used)
+    if not float(area.sum()) * resolution * resolution > 1.0:
+        return "uv.degenerate", f"its TEXCOORD_1 covers less than one texel of a page of {resolution}"
+    corner = mesh.position[mesh.triangle].astype(np.float64)
+    real = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    lost = float(real[area == 0].sum()) / max(float(real.sum()), 1e-300)
+    if lost > 0.01:
+        return "uv.degenerate", f"{100 * lost:.3g}% of its surface has no area in TEXCOORD_1"
+    overlap = page_overlap(used, np.zeros(len(used), np.int64), resolution)
+    if overlap.overlaps(PAGE_TOLERANCE)[0]:
+        share = 100.0 * overlap.doubled[0] / overlap.covered[0]
+        return "uv.overlap", f"its TEXCOORD_1 overlaps itself by {share:.3g}%"
+    return None
+
+
+def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
+    """Find the instances whose TEXCOORD_1 is used.
+
+    Parameters
+    ----------
+    mode : str
+        "auto", "keep" or "unwrap".
+
+    Raises
+    ------
+    InputError
+        In mode "keep", for the first object whose TEXCOORD_1 cannot be used.
+    """
+    n = len(scene.instances)
+    usable = np.zeros(n, bool)
+    warnings: list[SceneWarning] = []
+    if mode == "unwrap":
+        return KeptUv(usable, False, ())
+    fault = {m: find_fault(scene.meshes[m], resolution) for m in sorted({i.mesh for i in scene.instances})}
+    told: set[int] = set()
+    for k, instance in enumerate(scene.instances):
+        found = fault[instance.mesh]
+        usable[k] = found is None
+        if found is None:
+            continue
+        code, why = found
+        name = instance.name or scene.meshes[instance.mesh].name
+        if mode == "keep":
+            raise InputError(
+                f"the lightmap uv cannot be kept, because {why}; repair it or use --uv auto or --uv unwrap",
+                file=str(scene.path) if scene.path else None,
+                object=name,
+            )
+        if code != "uv.missing" and instance.mesh not in told:
+            told.add(instance.mesh)
+            warnings.append(SceneWarning(code, f"'{name}' is unwrapped anew, because {why}", name))
+    together = bool(n) and bool(usable.all()) and _disjoint(scene, resolution)
+    return KeptUv(usable, together, tuple(warnings))
+
+
+def _disjoint(scene: Scene, resolution: int) -> bool:
+    """Tell whether all instances' uv share one page without overlap."""
+    if len({i.mesh for i in scene.instances}) < len(scene.instances):
+        return False
+    uv, group = [], []
+    for k, instance in enumerate(scene.instances):
+        own = lightmap_uv(scene.meshes[instance.mesh])
+        assert own is not None
+        uv.append(own[scene.meshes[instance.mesh].triangle])
+        group.append(np.full(len(uv[-1]), k, np.int64))
+    overlap = page_overlap(np.concatenate(uv), np.concatenate(group), resolution)
+    return not overlap.overlaps(PAGE_TOLERANCE).any()
+
+
+def kept_charts(mesh: Mesh) -> NDArray[np.int32]:
+    """Return the (T,) int32 chart of each triangle of a kept uv: pieces connected in space and in uv."""
+    uv = lightmap_uv(mesh)
+    assert uv is not None
+    label = weld(mesh.position, uv)
+    return connected_vertices(label[mesh.triangle], len(label))
+
+
+def close_charts(
+    uv: Sequence[NDArray[np.floating]], chart: Sequence[NDArray[np.int32]], resolution: int, gap: int
+) -> int:
+    """Count the texels that have another chart's texel within `gap` texels; charts in one page.
+
+    Parameters
+    ----------
+    uv : sequence of (T, 3, 2) float
+    chart : sequence of (T,) int32, numbered over all
+    """
+    from baker.uv.kernels.uv_overlap import count_close, mark_charts
+
+    owner = np.zeros((resolution, resolution), np.int32)
+    for corner, number in zip(uv, chart, strict=True):
+        mark_charts(np.asarray(corner, np.float64) * resolution, number.astype(np.int32), owner)
+    return int(count_close(owner, gap))

@@ -1,0 +1,207 @@
+"""Packs outlines into one square page, and finds the largest density that fits.
+
+Texel centres lie at whole numbers here; an outline's lower corner sits on one, so that straight
+borders are looked up exactly there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.progress import Progress, report
+
+STAGE = "unwrap"
+# Items times texels of the page to place between two looks at the cancel flag: well under a second.
+_CHUNK_WORK = 1 << 29
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Outlines to pack; several items may have the same one.
+
+    Attributes
+    ----------
+    corner : (T, 3, 2) float64, metres, each shape's lower corner at 0
+    first_triangle : (S + 1,) int64
+        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]`.
+    extent : (S, 2) float64, metres
+    area : (S,) float64, square metres
+    rigid : (S,) bool
+        True: scaled evenly. False: stretched so that both extents are whole texels.
+    """
+
+    corner: NDArray[np.float64]
+    first_triangle: NDArray[np.int64]
+    extent: NDArray[np.float64]
+    area: NDArray[np.float64]
+    rigid: NDArray[np.bool_]
+
+    def scale(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (S, 2) texels per metre along u and v for (S,) wanted densities."""
+        wanted = self.extent * density[:, None]
+        whole = np.maximum(np.round(wanted), 1.0)
+        snapped = np.divide(whole, self.extent, out=np.ones_like(whole), where=self.extent > 1e-12)
+        return np.where(self.rigid[:, None] | (self.extent <= 1e-12), density[:, None], snapped)
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Where items lie in a page.
+
+    Attributes
+    ----------
+    position : (I, 2) int32
+        Column and row of each item's lower corner.
+    scale : (S, 2) float64, texels per metre
+    height : int
+        Rows in use, with the border.
+    placed : int
+        Items that found a place; the packing is good if it is all of them.
+    placed_area : float
+        Their share of the area of all, 0 to 1.
+    """
+
+    position: NDArray[np.int32]
+    scale: NDArray[np.float64]
+    height: int
+    placed: int
+    placed_area: float
+
+
+def border(gap: int) -> int:
+    """Return the empty texels along the page border: wrapped around, they make one gap."""
+    return max(1, (gap + 1) // 2)
+
+
+def texel_gap(padding: int) -> int:
+    """Return the empty texels between outlines: a bilinear lookup reads one texel beyond each."""
+    return max(2, padding)
+
+
+def pack(
+    shapes: Shapes,
+    item_shape: NDArray[np.int64],
+    density: NDArray[np.float64],
+    page: tuple[int, int],
+    progress: Progress,
+    fraction: float,
+) -> Packing:
+    """Pack items at given densities.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    item_shape : (I,) int64
+    density : (S,) float64, texels per metre
+    page : (resolution, gap)
+        Width and height in texels; empty texels between items.
+    """
+    from baker.uv.kernels.uv_pack import outline_spans, place
+
+    resolution, gap = page
+    margin = border(gap)
+    scale = shapes.scale(density)
+    size = shapes.extent * scale
+    n_rows = np.floor(size[:, 1] + 0.5 + 1e-9).astype(np.int64) + 1
+    n_columns = np.floor(size[:, 0] + 0.5 + 1e-9).astype(np.int64) + 1
+    position = np.zeros((len(item_shape), 2), np.int32)
+    used = np.unique(item_shape)
+    if (np.maximum(n_rows, n_columns)[used] > resolution - 2 * margin).any():
+        return Packing(position, scale, resolution, 0, 0.0)
+    rows = np.zeros(len(n_rows), np.int64)
+    rows[used] = n_rows[used]
+    first_row = np.concatenate([[0], np.cumsum(rows)])
+    low = np.full(int(first_row[-1]), 1 << 28, np.int32)
+    high = np.full(int(first_row[-1]), -1, np.int32)
+    outline_spans(shapes.corner, shapes.first_triangle, used, scale, first_row, low, high)
+
+    free = np.arange(resolution + 1, dtype=np.int16)
+    next_free = np.tile(free, (resolution, 1))
+    next_used = np.full((resolution, resolution + 1), resolution, np.int16)
+    order = np.lexsort((np.arange(len(item_shape)), item_shape, -n_columns[item_shape], -n_rows[item_shape]))
+    lowest = np.full(len(n_rows), margin, np.int64)
+    placed = 0
+    step = max(16, _CHUNK_WORK // resolution**2)
+    for start in range(0, len(order), step):
+        report(progress, STAGE, fraction)
+        chunk = order[start : start + step]
+        count = place(
+            next_used, next_free, chunk, item_shape, first_row, low, high, gap, margin, lowest, position
+        )
+        placed += count
+        if count < len(chunk):
+            break
+    done = order[:placed]
+    top = position[done, 1] + n_rows[item_shape[done]]
+    weight = (n_rows + gap) * (n_columns + gap)
+    share = weight[item_shape[done]].sum() / max(1, weight[item_shape].sum())
+    return Packing(position, scale, int(top.max(initial=0)) + margin, placed, float(share))
+
+
+def fit_page(
+    shapes: Shapes,
+    item_shape: NDArray[np.int64],
+    page: tuple[int, int],
+    progress: Progress,
+    span: tuple[float, float],
+    most: float = np.inf,
+) -> tuple[float, Packing] | None:
+    """Find the largest density at which everything fits into one page.
+
+    Parameters
+    ----------
+    page : (resolution, gap)
+    span : (float, float)
+        Fractions of the stage to report between.
+    most : float
+        Density not to go beyond, texels per metre.
+
+    Returns
+    -------
+    (density, Packing) or None
+        None if the items do not fit even at one texel each.
+    """
+    resolution, gap = page
+    inner = resolution - 2 * border(gap)
+    n = len(shapes.extent)
+    widest = float(shapes.extent[item_shape].max())
+    ceiling = min(most, (inner - 1) / max(widest, 1e-12))
+    guess = min(ceiling, _estimate(shapes, item_shape, inner, gap))
+    tolerance, n_tries = (0.004, 12) if len(item_shape) < 3000 else (0.015, 7)
+    low, high = 0.0, ceiling * (1 + 1e-9)
+    best: Packing | None = None
+    for k in range(n_tries):
+        fraction = span[0] + (span[1] - span[0]) * k / n_tries
+        result = pack(shapes, item_shape, np.full(n, guess), page, progress, fraction)
+        if result.placed == len(item_shape):
+            low, best = guess, result
+            # What is left of the page in height says how much there is to gain.
+            step = guess * float(np.sqrt(resolution / max(1, result.height))) * 1.003
+        else:
+            high = guess
+            step = guess * float(np.sqrt(max(result.placed_area, 0.1))) * 0.997
+        if best is not None and (low >= ceiling or high <= low * (1 + tolerance)):
+            break
+        if best is None and k >= n_tries - 3:
+            # Outlines have a least size: go down in large steps.
+            step = guess / 30.0
+        margin = 0.25 * (high - low)
+        guess = min(max(step, low + margin), high - margin) if best is not None and high < ceiling else step
+        guess = min(guess, ceiling)
+    return None if best is None else (low, best)
+
+
+def _estimate(shapes: Shapes, item_shape: NDArray[np.int64], inner: int, gap: int) -> float:
+    """Guess the density at which outlines and gaps fill 85 % of the page: a quadratic equation."""
+    area = float(shapes.area[item_shape].sum())
+    half = float(shapes.extent[item_shape].sum()) * (1 + gap)
+    rest = len(item_shape) * (1 + gap) ** 2 - 0.85 * inner * inner
+    if rest >= 0:
+        return (
+            0.5 * inner / max(float(shapes.extent[item_shape].max()), 1e-12) / float(np.sqrt(len(item_shape)))
+        )
+    root = float(np.sqrt(half * half - 4 * area * rest))
+    return float(2 * -rest / max(half + root, 1e-12))

@@ -1,0 +1,100 @@
+"""Cuts a mesh into parts that xatlas does well with: connected, not too large, not curled up."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.topology.weld import connected_faces, connected_vertices
+
+# A part has at most about this many triangles if it had to be cut, and small parts are gathered into
+# worker's jobs of this many.
+JOB_TRIANGLES = 20_000
+# Connected parts above this are cut into blocks of space first: xatlas's time grows faster than
+# linearly with the part, and it crashed on one of 328 k triangles.
+SPLIT_TRIANGLES = 40_000
+# xatlas takes neighbours whose normals differ by less than some 2.5 degrees for one plane, from
+# neighbour to neighbour, so that a finely tessellated ball becomes one "planar" chart (stretch 0.37).
+SMOOTH_DOT = 0.9985
+SMOOTH_TRIANGLES = 500
+# Such a region is cut until its normals lie in a cone of about 40 degrees around their mean.
+MIN_FACING = 0.77
+
+
+def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the (T,) int32 part of each triangle; a part is connected.
+
+    Parameters
+    ----------
+    position : (V, 3) float64
+    triangle : (T, 3) int32
+        Vertices at one place should be one vertex.
+    """
+    part = connected_vertices(triangle, len(position))
+    if len(triangle) <= SMOOTH_TRIANGLES:
+        return part
+    corner = position[triangle]
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(cross, axis=1)
+    normal = _unit(cross)
+    region = connected_faces(triangle, part, normal, SMOOTH_DOT)
+    n_regions = int(region.max()) + 1
+    size = np.bincount(region, minlength=n_regions)
+    sums = [np.bincount(region, weights=cross[:, k], minlength=n_regions) for k in range(3)]
+    mean = np.stack(sums, axis=1).astype(np.float64)
+    facing = np.einsum("tx,tx->t", cross, _unit(mean)[region])
+    least = np.ones(n_regions)
+    np.minimum.at(least, region, np.where(length > 0, facing / np.where(length > 0, length, 1.0), 1.0))
+    curled = (least < MIN_FACING) & (size > SMOOTH_TRIANGLES)
+    large = np.bincount(part) > SPLIT_TRIANGLES
+
+    block = np.zeros(len(triangle), np.int64)
+    n = 1
+    centre = corner.mean(axis=1)
+    for r in np.flatnonzero(curled):
+        n = _cut_blocks(block, n, np.flatnonzero(region == r), centre, normal, cross)
+    for k in np.flatnonzero(large):
+        n = _cut_blocks(block, n, np.flatnonzero((part == k) & ~curled[region]), centre, None, None)
+    if n == 1:
+        return part
+    # Blocks hang together by edges: a fan around one vertex makes no good chart.
+    return connected_faces(triangle, part.astype(np.int64) * n + block)
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return vectors (..., 3) at unit length; zero ones stay zero."""
+    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    return np.asarray(vector / np.where(length > 0, length, 1.0))
+
+
+def _cut_blocks(
+    block: NDArray[np.int64],
+    n: int,
+    face: NDArray[np.int64],
+    centre: NDArray[np.float64],
+    normal: NDArray[np.float64] | None,
+    cross: NDArray[np.float64] | None,
+) -> int:
+    """Halve `face` until each block is small and, with normals given, uncurled; return the next number."""
+    todo = [face]
+    while todo:
+        rows = todo.pop()
+        if len(rows) == 0:
+            continue
+        if len(rows) > JOB_TRIANGLES:
+            axis = int(np.ptp(centre[rows], axis=0).argmax())
+            order = rows[np.argsort(centre[rows, axis], kind="stable")]
+            todo += [order[len(order) // 2 :], order[: len(order) // 2]]
+            continue
+        if normal is not None and cross is not None and len(rows) > 1:
+            facing = normal[rows] @ _unit(cross[rows].sum(axis=0))
+            if facing.min() < MIN_FACING:
+                axis = int(np.ptp(normal[rows], axis=0).argmax())
+                value = normal[rows, axis]
+                upper = value > 0.5 * (value.min() + value.max())
+                if upper.any() and not upper.all():
+                    todo += [rows[upper], rows[~upper]]
+                    continue
+        block[rows] = n
+        n += 1
+    return n

@@ -1,0 +1,148 @@
+"""Runs chart jobs here or in worker processes that are killed when the caller stops."""
+
+from __future__ import annotations
+
+import queue
+import subprocess
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+
+from baker.core.child_process import start_module
+from baker.core.progress import Progress, report
+from baker.uv.worker import receive_charts, send_job
+from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
+
+# Fewer triangles than this take less time here than a process takes to start (0.2 s).
+IN_PROCESS_TRIANGLES = 3000
+STAGE = "unwrap"
+
+
+def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: float) -> list[FlatCharts]:
+    """Cut all jobs into charts; the result does not depend on `threads`.
+
+    Parameters
+    ----------
+    jobs : sequence of ChartJob
+    threads : int
+        Most worker processes at a time.
+    progress : Progress
+        Told up to the fraction `until` of the stage.
+
+    Returns
+    -------
+    list of FlatCharts
+        In the order of `jobs`. A job at which a worker died has chart -1 everywhere.
+
+    Raises
+    ------
+    Cancelled
+        If `progress` says so; the workers are killed then, as for any exception.
+    """
+    total = sum(len(job.triangle) for job in jobs)
+    if total < IN_PROCESS_TRIANGLES:
+        report(progress, STAGE, 0.0)
+        return [cut_charts(job) for job in jobs]
+    return _Pool(jobs, min(threads, len(jobs)), total).run(progress, until)
+
+
+class _Pool:
+    """Worker processes, one feeding thread each, largest jobs first."""
+
+    def __init__(self, jobs: Sequence[ChartJob], n_workers: int, total: int) -> None:
+        self.jobs = jobs
+        self.total = total
+        self.results: list[FlatCharts | None] = [None] * len(jobs)
+        self.done = 0
+        self.stopped = False
+        self.lock = threading.Lock()
+        self.waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
+        for k in sorted(range(len(jobs)), key=lambda j: (-len(jobs[j].triangle), j)):
+            self.waiting.put(k)
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self.errors: list[BaseException] = []
+        self.threads = [threading.Thread(target=self._feed, daemon=True) for _ in range(n_workers)]
+
+    def run(self, progress: Progress, until: float) -> list[FlatCharts]:
+        try:
+            for thread in self.threads:
+                thread.start()
+            while any(thread.is_alive() for thread in self.threads):
+                report(
+                    progress, STAGE, until * self.done / self.total, f"{self.done} of {self.total} triangles"
+                )
+                for thread in self.threads:
+                    thread.join(0.1 / len(self.threads))
+        finally:
+            self._stop()
+        if self.errors:
+            raise self.errors[0]
+        return [result for result in self.results if result is not None]
+
+    def _stop(self) -> None:
+        with self.lock:
+            self.stopped = True
+            for process in self.processes:
+                process.kill()
+        for thread in self.threads:
+            if thread.ident is not None:
+                thread.join()
+
+    def _start(self) -> subprocess.Popen[bytes] | None:
+        with self.lock:
+            if self.stopped:
+                return None
+            process = start_module("baker.uv.worker")
+            self.processes.append(process)
+            return process
+
+    def _feed(self) -> None:
+        process: subprocess.Popen[bytes] | None = None
+        try:
+            while not self.stopped:
+                try:
+                    k = self.waiting.get_nowait()
+                except queue.Empty:
+                    break
+                process = process or self._start()
+                if process is None:
+                    break
+                charts = self._ask(process, self.jobs[k])
+                if charts is None:
+                    # The library crashed on this job: its triangles go the slow, safe way.
+                    self._end(process)
+                    process = None
+                    n = len(self.jobs[k].triangle)
+                    charts = FlatCharts(np.zeros((n, 3, 2)), np.full(n, -1, np.int32))
+                self.results[k] = charts
+                with self.lock:
+                    self.done += len(self.jobs[k].triangle)
+        except BaseException as error:
+            self.errors.append(error)
+        finally:
+            if process is not None:
+                self._end(process)
+
+    @staticmethod
+    def _ask(process: subprocess.Popen[bytes], job: ChartJob) -> FlatCharts | None:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            send_job(process.stdin, job)
+            return receive_charts(process.stdout)
+        except (BrokenPipeError, OSError):
+            return None
+
+    @staticmethod
+    def _end(process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        try:
+            process.stdin.close()
+        except OSError:
+            # What was still buffered for the dead process is of no use.
+            return

@@ -1,0 +1,252 @@
+"""Gives every instance its own texels: keeps, cuts and packs lightmap uv, and checks the result."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.errors import InputError
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import Instance, Mesh, Scene, SceneWarning
+from baker.core.settings import BakeSettings
+from baker.uv.charts import MeshCharts, chart_meshes
+from baker.uv.check import PAGE_TOLERANCE, page_overlap, uv_area
+from baker.uv.density_share import density_shares
+from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
+from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
+from baker.uv.pages import fill_pages
+from baker.uv.pool import STAGE
+
+# Relative difference of the axes' scales up to which an instance counts as evenly scaled.
+_EVEN_SCALE = 1e-4
+_CUT_UNTIL = 0.7
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A mesh in the size it has in the world, to be cut once for all instances alike."""
+
+    mesh: int
+    stretch: NDArray[np.float64]
+
+
+def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = silent) -> Atlas:
+    """Lay out all instances in lightmap pages of exactly `settings.resolution`.
+
+    Parameters
+    ----------
+    scene : Scene
+    settings : BakeSettings
+        `resolution`, `density`, `max_pages`, `padding`, `uv` and `threads` are read.
+    progress : Progress
+        Told the stage "unwrap"; a truthy answer stops the work, and kills what runs in processes.
+
+    Returns
+    -------
+    Atlas
+        The same for any number of threads.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to lay out, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept,
+        or if there are more charts than texels.
+    Cancelled
+        If `progress` asks for it.
+    """
+    if scene.n_triangles == 0:
+        raise InputError("the scene has no triangles to bake", file=str(scene.path) if scene.path else None)
+    report(progress, STAGE, 0.0)
+    kept = choose_kept(scene, settings.resolution, settings.uv)
+    if kept.together:
+        atlas = _keep_all(scene, settings, kept.warnings)
+    else:
+        try:
+            atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
+        except InputError as error:
+            # What packs charts does not know where they come from.
+            raise InputError(
+                error.message,
+                file=error.file or (str(scene.path) if scene.path else None),
+                object=error.object,
+            ) from None
+    report(progress, STAGE, 1.0, f"{atlas.n_charts} charts, {atlas.n_pages} pages")
+    return atlas
+
+
+def _keep_all(scene: Scene, settings: BakeSettings, warnings: tuple[SceneWarning, ...]) -> Atlas:
+    """Return the scene's own TEXCOORD_1 as the layout, to the byte."""
+    layouts: list[InstanceLayout] = []
+    n_charts = 0
+    for k, instance in enumerate(scene.instances):
+        mesh = scene.meshes[instance.mesh]
+        uv = lightmap_uv(mesh)
+        assert uv is not None
+        chart = kept_charts(mesh) + n_charts
+        n_charts = int(chart.max(initial=n_charts - 1)) + 1
+        density = settings.resolution * _per_metre(mesh, instance, uv)
+        vertex = np.arange(len(uv), dtype=np.int32)
+        layouts.append(InstanceLayout(k, 0, vertex, uv, mesh.triangle, chart.astype(np.int32), True, density))
+    found = list(warnings)
+    close = close_charts(
+        [layout.uv[layout.triangle] for layout in layouts],
+        [layout.chart for layout in layouts],
+        settings.resolution,
+        min(settings.padding, 8),
+    )
+    if close:
+        message = f"{close} texels of the kept uv have another chart within the padding of {settings.padding}"
+        found.append(SceneWarning("uv.close", message))
+    if settings.density is not None:
+        message = "the kept uv fills one page as it is; --density is not used"
+        found.append(SceneWarning("uv.density_unused", message))
+    return Atlas(settings.resolution, 1, tuple(layouts), n_charts, settings.padding, tuple(found))
+
+
+def _lay_out(
+    scene: Scene,
+    settings: BakeSettings,
+    progress: Progress,
+    usable: NDArray[np.bool_],
+    warnings: tuple[SceneWarning, ...],
+) -> Atlas:
+    """Cut what has no usable uv, and pack everything."""
+    # An instance without triangles has nothing to pack.
+    filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
+    # A density that was asked for is kept.
+    equal = settings.density is not None
+    shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
+    placements: list[CutInstance | RigidInstance] = []
+    cuts: list[_Cut] = []
+    index: dict[tuple[int, bytes], int] = {}
+    for k, share in zip(filled, shares.tolist(), strict=True):
+        instance = scene.instances[k]
+        if usable[k]:
+            placements.append(_rigid(scene.meshes[instance.mesh], instance, share))
+            continue
+        factor, stretch = _world_stretch(instance.world_from_object)
+        key = (instance.mesh, stretch.tobytes())
+        if key not in index:
+            index[key] = len(cuts)
+            cuts.append(_Cut(instance.mesh, stretch))
+        placements.append(CutInstance(index[key], factor * share))
+    inputs = [
+        (scene.meshes[c.mesh].position.astype(np.float64) @ c.stretch, scene.meshes[c.mesh].triangle)
+        for c in cuts
+    ]
+    charts = (
+        chart_meshes(inputs, settings.threads or os.cpu_count() or 1, progress, _CUT_UNTIL) if cuts else []
+    )
+    found = list(warnings)
+    for cut, one in zip(cuts, charts, strict=True):
+        if one.n_repaired:
+            name = scene.meshes[cut.mesh].name
+            message = f"{one.n_repaired} triangles of '{name}' were cut into flat charts of their own"
+            found.append(SceneWarning("uv.repaired", message, name))
+
+    outlines = make_outlines(placements, charts)
+    names = [scene.instances[k].name or scene.meshes[scene.instances[k].mesh].name for k in filled]
+    pages, told = fill_pages(outlines, names, settings, progress)
+    found += told
+    layout: dict[int, tuple[int, NDArray[np.float32], float]] = {}
+    for number, page in enumerate(pages):
+        for slot, position, density in zip(page.instance, page.position, page.density, strict=True):
+            uv = place_uv(
+                outlines, int(slot), placements[slot], charts, page.packing, position, settings.resolution
+            )
+            layout[filled[slot]] = (number, uv, float(density * shares[slot]))
+    slots = {k: slot for slot, k in enumerate(filled)}
+    layouts: list[InstanceLayout] = []
+    n_charts = 0
+    for k, instance in enumerate(scene.instances):
+        mesh = scene.meshes[instance.mesh]
+        if k not in slots:
+            none = np.zeros(0, np.int32)
+            layouts.append(
+                InstanceLayout(k, 0, none, np.zeros((0, 2), np.float32), mesh.triangle, none, False, 1.0)
+            )
+            continue
+        number, uv, density = layout[k]
+        vertex, triangle, chart = _structure(mesh, placements[slots[k]], charts)
+        layouts.append(InstanceLayout(k, number, vertex, uv, triangle, chart + n_charts, False, density))
+        n_charts = int(layouts[-1].chart.max()) + 1
+    found += _verify(layouts, len(pages), settings.resolution, scene, progress)
+    return Atlas(settings.resolution, len(pages), tuple(layouts), n_charts, settings.padding, tuple(found))
+
+
+def _structure(
+    mesh: Mesh, placement: CutInstance | RigidInstance, charts: list[MeshCharts]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Return mesh vertex, triangles and chart of an instance's lightmap vertices."""
+    if isinstance(placement, RigidInstance):
+        return np.arange(len(mesh.position), dtype=np.int32), mesh.triangle, kept_charts(mesh)
+    own = charts[placement.charts]
+    return own.vertex, own.triangle, own.chart
+
+
+def _verify(
+    layouts: list[InstanceLayout], n_pages: int, resolution: int, scene: Scene, progress: Progress
+) -> list[SceneWarning]:
+    """Check the finished pages for overlap and range, whatever made them."""
+    found: list[SceneWarning] = []
+    for page in range(n_pages):
+        report(progress, STAGE, 0.95 + 0.05 * page / n_pages)
+        here = [layout for layout in layouts if layout.page == page and len(layout.triangle)]
+        uv = np.concatenate([layout.uv[layout.triangle] for layout in here])
+        group = np.concatenate([np.full(len(layout.triangle), k) for k, layout in enumerate(here)])
+        overlap = page_overlap(uv, group, resolution)
+        bad = overlap.overlaps(PAGE_TOLERANCE)
+        for k, layout in enumerate(here):
+            name = scene.instances[layout.instance].name
+            if bad[k]:
+                share = 100.0 * overlap.doubled[k] / overlap.covered[k]
+                found.append(
+                    SceneWarning("uv.overlap", f"{share:.3g}% of '{name}' overlaps in the lightmap", name)
+                )
+            if not (layout.uv.min() >= 0.0 and layout.uv.max() <= 1.0):
+                found.append(
+                    SceneWarning("uv.out_of_range", f"the lightmap uv of '{name}' leaves its page", name)
+                )
+    return found
+
+
+def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Split a transform's effect on lengths into a factor and a symmetric (3, 3) stretch.
+
+    The stretch is the identity for even scales, so that all such instances share their charts; else
+    it is the root of M^T M: rotations and mirrors do not matter.
+    """
+    linear = world_from_object[:3, :3].astype(np.float64)
+    gram = linear.T @ linear
+    even = float(np.sqrt(np.trace(gram) / 3.0))
+    if np.abs(gram - even * even * np.eye(3)).max() <= 2.0 * _EVEN_SCALE * even * even:
+        return float(f"{even:.6g}"), np.eye(3)
+    value, vector = np.linalg.eigh(gram)
+    root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
+    # Rounded, so that instances that differ by rounding alone share their charts.
+    digits = 5 - int(np.floor(np.log10(np.abs(root).max())))
+    return 1.0, np.round(0.5 * (root + root.T), digits) + 0.0
+
+
+def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
+    """Return an instance that keeps the shape of its TEXCOORD_1, at a share of the density."""
+    uv = lightmap_uv(mesh)
+    assert uv is not None
+    wide = uv.astype(np.float64)
+    used = wide[mesh.triangle].reshape(-1, 2)
+    # Vertices no triangle uses may hold anything: they go to the corner.
+    wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
+    factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
+    return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)
+
+
+def _per_metre(mesh: Mesh, instance: Instance, uv: NDArray[np.float32]) -> float:
+    """Return units of uv per metre, by area; 1 if the surface has none."""
+    corner = (mesh.position.astype(np.float64) @ instance.world_from_object[:3, :3].T)[mesh.triangle]
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = 0.5 * float(np.linalg.norm(cross, axis=1).sum())
+    return float(np.sqrt(uv_area(uv[mesh.triangle]).sum() / area)) if area > 0 else 1.0

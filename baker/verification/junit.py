@@ -1,0 +1,30 @@
+"""A verification as JUnit cases: one for each limit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from baker.io.junit import Case, junit_text, write_text
+from baker.verification.verify import Verification
+
+
+def write_junit(path: Path, found: Verification) -> None:
+    """Write the JUnit file.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written.
+    """
+    scene = found.bake.folder.name
+    cases = []
+    for verdict in found.verdicts:
+        value = "missing" if verdict.value is None else f"{verdict.value:.6g}"
+        problem = ""
+        if verdict.failed:
+            remark = found.channels[verdict.limit.channel].remarks.get(verdict.limit.figure)
+            problem = f"{verdict.limit}: it is {value}" + (f"; {remark}" if remark else "")
+        cases.append(Case(f"not {verdict.limit}", scene, problem))
+    if cases:
+        cases[0] = Case(cases[0].name, cases[0].group, cases[0].problem, found.seconds)
+    write_text(path, junit_text("baker verify", cases))

@@ -1,0 +1,67 @@
+"""What the commands that judge a bake have in common: how they tell and end, lines on places and limits."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, TextIO
+
+import typer
+
+from baker.cli.failures import FAILED_CHECK
+
+if TYPE_CHECKING:
+    from baker.cli.session import Session
+    from baker.metrics.limits import Verdict
+
+
+def tell(
+    found: Any,
+    session: Session,
+    as_text: Callable[..., None],
+    as_data: Callable[[Any], dict[str, Any]],
+    *,
+    quiet: bool,
+    as_json: bool,
+    verbose: int,
+) -> None:
+    """Write what was found as text and, if wanted, as JSON; end the program as failed if it did not pass.
+
+    as_text : called with what was found, a stream and `verbose`; as_data : makes what `--json` writes
+    """
+    if not quiet:
+        as_text(found, session.text_stream(as_json=as_json), verbose=verbose)
+    if as_json:
+        session.write_json(as_data(found))
+    if not found.passed:
+        raise typer.Exit(FAILED_CHECK)
+
+
+def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
+    """Write one line for each of the worst places."""
+    for entry in worst:
+        place = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
+        stream.write(
+            f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
+        )
+
+
+def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
+    """Write the limits that were applied, and beside each the figure that was held against it."""
+    by_channel: dict[str, list[str]] = {}
+    for verdict in verdicts:
+        limit = verdict.limit
+        value = "none" if verdict.value is None else f"{verdict.value:.3g}"
+        entry = f"{limit.figure} {value} ({limit.sign} {limit.number:g})"
+        by_channel.setdefault(limit.channel, []).append(entry)
+    for channel, words in by_channel.items():
+        text = f"limits of {channel}, which fail beyond what is in brackets: {', '.join(words)}"
+        stream.write(textwrap.fill(text, 100, subsequent_indent="  ", break_on_hyphens=False) + "\n")
+
+
+def write_failed(verdicts: Iterable[Verdict], stream: TextIO) -> None:
+    """Write the limits that were passed."""
+    for verdict in verdicts:
+        if verdict.failed:
+            value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"
+            stream.write(f"failed: {verdict.limit} ({value})\n")

@@ -1,0 +1,69 @@
+"""What `check` knows of emissive textures: means over what triangles show, and where on them the light is."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
+from PIL import Image
+
+from baker.checks.context import Subject
+from baker.checks.direct_light import estimate_levels
+from baker.checks.rules.light_sources import emissive_black, no_light
+from baker.core.settings import BakeSettings
+from baker.io.load import load_scene
+
+UV = QUAD[:, :2].copy()
+
+
+def subject(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
+    """A lit texel of 64 x 64 on a unit square, and a floor one metre in front of it."""
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[texel] = 255
+    stream = io.BytesIO()
+    Image.fromarray(image).save(stream, "PNG")
+    builder = GltfBuilder()
+    texture = builder.image(stream.getvalue())
+    lamp = builder.add("materials", {"emissiveFactor": [1, 1, 0.5], "emissiveTexture": {"index": texture}})
+    grey = builder.add("materials", {})
+    for position, normal, triangle, material in (
+        (QUAD, QUAD_NORMAL, QUAD_TRIANGLE, lamp),
+        (QUAD + np.float32([0, 0, 1]), -QUAD_NORMAL, QUAD_TRIANGLE[:, ::-1], grey),
+    ):
+        made = builder.primitive(
+            position, triangle, NORMAL=np.float32(normal), TEXCOORD_0=np.float32(uv), material=material
+        )
+        builder.node(mesh=builder.mesh(made), scale=list(scale))
+    return Subject(load_scene(write(tmp_path / "a.glb", builder)), BakeSettings())
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("repeats", [1, 7])
+def test_the_mean_is_that_of_the_texture(tmp_path, repeats, scale):
+    found = subject(tmp_path, UV * repeats, scale=scale).emission
+    power = (found.area[:, None] * found.radiance).sum(axis=0)
+    np.testing.assert_allclose(power, np.array([1, 1, 0.5]) / 4096, rtol=1e-6)
+
+
+def test_light_levels_are_those_of_the_lit_texel(tmp_path):
+    one = subject(tmp_path, UV)
+    levels = estimate_levels(one)
+    low = QUAD.min(axis=0)
+    spot = low[:2] + np.array([40.5, 10.5]) / 64 * np.ptp(QUAD, axis=0)[:2]
+    facing = levels.position[:, 2] > 0.5
+    square = ((levels.position[facing, :2] - spot) ** 2).sum(axis=1) + 1
+    np.testing.assert_allclose(levels.irradiance[facing], 1 / 4096 / square**2, rtol=0.05)
+
+
+def test_surfaces_in_the_black_part_of_a_texture_emit_nothing(tmp_path):
+    dark = subject(tmp_path, UV * 0.1 + 0.8)
+    assert not dark.glows
+    assert len(list(no_light(dark))) == 1
+    (told,) = emissive_black(dark)
+    assert "where its emissive texture is black" in told.message
+    lit = subject(tmp_path, UV)
+    assert lit.glows
+    assert not list(no_light(lit))
+    assert not list(emissive_black(lit))

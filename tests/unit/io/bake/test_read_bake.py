@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from io_scenes import quad_result
+
+from baker.core.errors import InputError
+from baker.io.bake.read_bake import read_bake
+from baker.io.bake.write_bake import write_bake
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    write_bake(quad_result(tmp_path / "in"), tmp_path / "out")
+    return tmp_path / "out"
+
+
+def test_what_was_written_is_read_back(tmp_path: Path) -> None:
+    result = quad_result(tmp_path / "in")
+    manifest = write_bake(result, tmp_path / "out")
+    bake = read_bake(tmp_path / "out")
+    assert bake.manifest == json.loads(json.dumps(manifest))
+    assert bake.warnings == ()
+    assert set(bake.maps) == set(result.lightmaps)
+    for name, lightmap in result.lightmaps.items():
+        np.testing.assert_array_equal(bake.maps[name], lightmap.value.astype(np.float16))
+    np.testing.assert_array_equal(bake.status, result.status)
+    for stored, written in zip(bake.atlas.layouts, result.atlas.layouts, strict=True):
+        assert stored.page == written.page
+        np.testing.assert_array_equal(stored.uv[stored.triangle], written.uv[written.triangle])
+
+
+def test_a_manifest_names_the_folder_too(out: Path) -> None:
+    assert read_bake(out / "bake.json").folder == out
+
+
+def test_a_changed_file_is_read_and_named(out: Path) -> None:
+    manifest = json.loads((out / "bake.json").read_text())
+    manifest["files"][0]["sha256"] = "0" * 64
+    (out / "bake.json").write_text(json.dumps(manifest))
+    warnings = read_bake(out).warnings
+    assert [(w.code, w.object) for w in warnings] == [("changed-file", manifest["files"][0]["file"])]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("irradiance_0.exr", None, "missing"),
+        ("scene.glb", None, "missing"),
+        ("status_0.png", b"no picture", "not a readable PNG"),
+        ("bake.json", b"{", "holds no bake"),
+    ],
+)
+def test_a_broken_folder_is_refused_by_file(out: Path, name: str, content: bytes | None, said: str) -> None:
+    if content is None:
+        (out / name).unlink()
+    else:
+        (out / name).write_bytes(content)
+    with pytest.raises(InputError, match=said):
+        read_bake(out)
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such folder"):
+        read_bake(tmp_path / "nothing")

@@ -1,0 +1,154 @@
+"""Where light starts and how lamps are chosen: frequencies against densities, sums against powers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closed_forms import solid_angle
+from inner import compiled
+from numba import njit
+from scipy import stats
+from tiny_scenes import Quad, grey, quad_scene
+
+from baker.core.scene import PunctualLight
+from baker.pathtracer.bidirectional_lights import start_at_lamp
+from baker.pathtracer.bidirectional_weights import N_ROWS_BOTH
+from baker.pathtracer.light_table import aim_at_triangle, pick_lamp
+from baker.pathtracer.scene import build_reference
+from baker.pathtracer.vertex import BETA, GO, NORMAL, PLACE
+
+aim_at_triangle, pick_lamp, start_at_lamp = compiled(aim_at_triangle, pick_lamp, start_at_lamp)
+LEVEL = 1e-4
+N = 100_000
+SPOT = PunctualLight("spot", "s", 0, (2.0, 2.0, 2.0), (0.1, 0.2, 0.3), (0.6, 0.0, -0.8), 0.3, 0.7)
+POINT = PunctualLight("point", "p", 0, (3.0, 3.0, 3.0), (0.1, 0.2, 0.3))
+SUN = PunctualLight("directional", "d", 0, (5.0, 5.0, 5.0), direction=(0.6, 0.0, -0.8))
+
+
+@njit
+def start_many(triangle, point, cumulative, sky, sphere, random, n_rows):
+    path = np.zeros((n_rows, 16))
+    spot = np.zeros(2)
+    lamp = np.zeros(len(random), np.int64)
+    out = np.zeros((len(random), n_rows + 2))
+    for i in range(len(random)):
+        r = random[i]
+        lamp[i] = start_at_lamp(
+            path, 0, triangle, point, cumulative, sky, sphere, 1.0, r[0], r[1], r[2], r[3], r[4], spot
+        )
+        out[i, :n_rows] = path[:, 0]
+        out[i, n_rows:] = spot
+    return lamp, out
+
+
+def starts(scene, sky=(0.0, 0.0, 0.0), seed=1):
+    with build_reference(scene, sky=sky, threads=1) as reference:
+        lamps = reference.lamps
+        random = np.random.default_rng(seed).random((N, 5))
+        lamp, out = start_many(
+            lamps.triangle, lamps.point, lamps.cumulative, lamps.sky, reference.sphere, random, N_ROWS_BOTH
+        )
+        return lamps, reference.sphere, lamp, out
+
+
+def scene_with(*lights, lamp=None):
+    quads = [Quad((-1, -1, 0), (2, 0, 0), (0, 2, 0), grey(0.5))]
+    if lamp is not None:
+        quads.append(Quad((0, 0, 1), (0, 0.5, 0), (0.8, 0, 0.2), lamp))
+    return replace(quad_scene(quads), lights=lights)
+
+
+def uniform(value, cells=32):
+    """Check numbers that ought to be uniform in [0, 1]."""
+    count = np.bincount(np.minimum((value * cells).astype(int), cells - 1), minlength=cells)
+    assert value.min() >= -1e-9
+    assert value.max() <= 1 + 1e-6
+    assert stats.chisquare(count).pvalue > LEVEL
+
+
+def test_lamps_are_chosen_by_their_chance():
+    lamps, _, lamp, out = starts(scene_with(SPOT, POINT, SUN, lamp=grey(0.0, 4.0)), sky=(0.2, 0.2, 0.2))
+    chance = np.diff(lamps.cumulative, prepend=0.0)
+    assert chance.min() > 0
+    assert stats.chisquare(np.bincount(lamp, minlength=len(chance)), chance * N).pvalue > LEVEL
+    # What starts is, on average, all the power that there is.
+    area = 0.5 * math.hypot(0.8, 0.2)
+    flux = out[:, BETA]
+    error = flux.std() / math.sqrt(N)
+    with build_reference(scene_with(SPOT, lamp=grey(0.0, 4.0)), threads=1) as reference:
+        assert reference.lamps.triangle[:, 12].sum() == pytest.approx(area, rel=1e-6)
+    radius = starts(scene_with(SPOT, lamp=grey(0.0, 4.0)))[1][3]
+    cosine = np.linspace(math.cos(0.7), 1, 20001)
+    share = np.clip((cosine - math.cos(0.7)) / (math.cos(0.3) - math.cos(0.7)), 0, 1) ** 2
+    disc = math.pi * radius**2
+    power = (
+        4 * math.pi * area
+        + 2 * 2 * math.pi * np.trapezoid(share, cosine)
+        + 3 * 4 * math.pi
+        + 5 * disc
+        + 0.2 * 4 * math.pi * disc
+    )
+    assert abs(flux.mean() - power) < 4 * error
+    assert error < 0.01 * power
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+def test_light_leaves_triangles_evenly_and_by_the_cosine(two_sided):
+    lamps, _, lamp, out = starts(scene_with(lamp=grey(0.0, 1.0, double_sided=two_sided)))
+    normal = lamps.triangle[lamp][:, 9:12]
+    cosine = (out[:, GO : GO + 3] * normal).sum(axis=1)
+    sign = np.sign((out[:, NORMAL : NORMAL + 3] * normal).sum(axis=1))
+    assert ((cosine < 0) == (sign < 0)).all()
+    if two_sided:
+        assert stats.binomtest(int((sign > 0).sum()), N).pvalue > LEVEL
+    else:
+        assert (sign > 0).all()
+    uniform(cosine**2)
+    # Heights of uniform points over one edge of a triangle: (1 - b)^2 is uniform.
+    uniform((1 - out[:, -1]) ** 2)
+    uniform((1 - out[:, -2]) ** 2)
+    np.testing.assert_allclose(np.linalg.norm(out[:, GO : GO + 3], axis=1), 1, rtol=1e-6)
+
+
+def test_spots_fill_their_cone():
+    _, _, _, out = starts(scene_with(SPOT))
+    cosine = out[:, GO : GO + 3] @ np.array(SPOT.direction)
+    uniform((cosine - math.cos(0.7)) / (1 - math.cos(0.7)))
+
+
+def test_points_shine_everywhere():
+    _, _, _, out = starts(scene_with(POINT))
+    way = out[:, GO : GO + 3]
+    uniform(0.5 * (1 + way[:, 2]))
+    uniform(np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi) + 0.5)
+
+
+@pytest.mark.parametrize("sky", [False, True])
+def test_parallel_light_covers_the_scene(sky):
+    scene = scene_with() if sky else scene_with(SUN)
+    _, sphere, _, out = starts(scene, sky=(1.0, 1.0, 1.0) if sky else (0, 0, 0))
+    way, place = out[:, GO : GO + 3], out[:, PLACE : PLACE + 3] - sphere[:3]
+    along = (place * way).sum(axis=1)
+    np.testing.assert_allclose(along, -sphere[3], rtol=1e-5)
+    uniform(((place - along[:, None] * way) ** 2).sum(axis=1) / sphere[3] ** 2)
+    if sky:
+        uniform(0.5 * (1 + way[:, 2]))
+
+
+def test_aiming_at_a_triangle_has_the_density_it_tells():
+    # The mean of 1 / density is the solid angle.
+    with build_reference(scene_with(lamp=grey(0.0, 1.0)), threads=1) as reference:
+        lamps = reference.lamps
+    eye = np.array([0.3, 0.1, 0.2])
+    random = np.random.default_rng(2).random((20_000, 2))
+    for e in range(2):
+        found = np.array([aim_at_triangle(lamps.triangle, e, u, w, *eye) for u, w in random])
+        lit = found[:, 3] > 0
+        angle = np.where(lit, 1 / np.where(lit, found[:, 3], 1.0), 0.0) * lamps.triangle[e, 14]
+        truth = solid_angle(lamps.triangle[e, :9].reshape(1, 3, 3), eye)[0]
+        facing = lamps.triangle[e, 9:12] @ (lamps.triangle[e, :3] - eye) < 0
+        assert angle.mean() == pytest.approx(truth if facing else 0.0, abs=5 * angle.std() / 141 + 1e-9)
+    assert pick_lamp(lamps.cumulative, 0.0) == 0

@@ -1,0 +1,325 @@
+"""Gather, AO, light samples and shadow rays against loops in plain Python on a room of a few texels."""
+
+from __future__ import annotations
+
+import naive
+import numpy as np
+import pytest
+from inner import compiled
+from tiny_scenes import Quad, box_quads, grey, quad_world, seen_light
+
+from baker.core.progress import silent
+from baker.core.scene import PunctualLight
+from baker.kernels.emitters import emitter_density, lamps_for
+from baker.kernels.rays import lane_seeds
+from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble
+from baker.kernels.surface import N_POINTS
+from baker.radiosity.direct import direct_light
+from baker.radiosity.final_gather import ambient_occlusion, final_gather
+from baker.radiosity.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
+from baker.radiosity.kernels.shadow import add_visible
+from baker.radiosity.point_cache import points_of
+from baker.trace.packets import new_caster
+
+emitter_density, lane_seeds, texel_scramble = compiled(emitter_density, lane_seeds, texel_scramble)
+
+SKY = np.float32([0.5, 1.0, 2.0])
+REACH = 0.7
+
+
+@pytest.fixture(scope="module")
+def room():
+    """A room without a ceiling, a lamp that hangs in it, a two-sided board and a crate."""
+    quads = [q for k, q in enumerate(box_quads((0, 0, 0), (2, 1.5, 2), inward=True)) if k != 3]
+    quads += [
+        Quad((0.5, 1.2, 0.6), (0.6, 0, 0), (0, 0, 0.5), grey(0.1, 4.0)),
+        Quad((1.4, 0.1, 0.3), (0.3, 0, 0.5), (0, 0.8, 0), grey(0.7, 0.5, double_sided=True)),
+    ]
+    return quad_world(quads, 24, inset=0.2)
+
+
+@pytest.fixture(scope="module")
+def rays_of(room):
+    """Rays of some texels, made and traced one by one."""
+    n_samples, n_light = 64, 23
+    net, shared = sobol_reversed(n_samples, 0, 6), shared_bits_mask(n_samples)
+    # A tile that starts in the middle and fills no whole packet.
+    begin, end = 40, 63
+    origin, normal = points_of(room.surface, room.free, np.arange(begin, end))
+    exitance = np.random.default_rng(0).random((room.texels.n, 4), np.float32)
+    truth = np.zeros((end - begin, N_COLUMNS))
+    lamps = lamps_for(room.emitters, origin)
+    corner = room.geometry.uv[room.geometry.triangle]
+    entry_at = room.texels.hit_image(np.arange(room.texels.n), -1)
+    seeds = np.zeros(32, np.uint32)
+    emitter_of = {int(t): m for m, t in enumerate(room.emitters.triangle)}
+    for i in range(end - begin):
+        lane_seeds(begin + i, 1, 25, seeds)
+        batch = np.zeros(N_POINTS)
+        for s in range(n_samples):
+            k = s * N_POINTS // n_samples
+            u, v = (texel_scramble(net[s, a], seeds[16 * a], shared) for a in (0, 1))
+            direction = naive.frame(normal[i, k]) @ naive.cosine_direction(float(u), float(v))
+            t, prim = naive.intersect(room.geometry.position, room.geometry.triangle, origin[i, k], direction)
+            truth[i, OPEN] += (t > REACH) / n_samples
+            got, indirect = np.zeros(3), np.zeros(3)
+            if prim < 0:
+                got = SKY.astype(float)
+            else:
+                front = direction @ room.geometry.face_normal[prim] < 0
+                m = emitter_of.get(prim)
+                if m is not None and (front or room.geometry.double_sided[prim]):
+                    # Balance heuristic: the share of hemisphere rays among all rays that come this way.
+                    radiance = room.shading.emission[room.geometry.material[prim]]
+                    cosine, facing = (
+                        direction @ normal[i, k],
+                        abs(direction @ room.geometry.face_normal[prim]),
+                    )
+                    area = float(emitter_density(lamps.row, lamps.chance, lamps.cumulative, m))
+                    by_light, by_cosine = n_light * area * t * t / facing, n_samples * cosine / np.pi
+                    got = radiance * by_cosine / (by_light + by_cosine)
+                b1, b2 = naive.barycentric(
+                    room.geometry.position[room.geometry.triangle[prim]], origin[i, k] + t * direction
+                )
+                pixel = naive.hit_pixel(
+                    corner, room.geometry.page, room.geometry.double_sided, 24, 1, prim, b1, b2, front
+                )
+                entry = entry_at[pixel] if pixel >= 0 else -1
+                if entry >= 0:
+                    indirect = exitance[entry, :3].astype(float) / np.pi
+            truth[i, DIRECT : DIRECT + 3] += got * np.pi / n_samples
+            truth[i, INDIRECT : INDIRECT + 3] += indirect * np.pi / n_samples
+            batch[k] += (got + indirect).sum() * np.pi / n_samples
+        truth[i, SQUARE] = (batch**2).sum()
+    return net, shared, begin, origin, normal, seen_light(room.texels, exitance), lamps, n_light, truth
+
+
+def test_gather_is_the_sum_over_its_rays(room, rays_of):
+    net, shared, begin, origin, normal, exitance, lamps, n_light, truth = rays_of
+    ours = np.zeros((len(origin), N_COLUMNS), np.float32)
+    gather(
+        origin,
+        normal,
+        room.table,
+        exitance,
+        lamps,
+        room.shading,
+        new_caster(room.rays.tracer),
+        begin,
+        net,
+        shared,
+        SKY,
+        np.array([REACH, n_light], np.float64),
+        np.zeros(len(origin), np.uint8),
+        ours,
+    )
+    # A hit on the line between two texels may count for either.
+    differs = np.abs(ours - truth) > 2e-4 * (1 + np.abs(truth))
+    assert differs[:, INDIRECT : INDIRECT + 3].any(axis=1).sum() <= 2
+    for column in (DIRECT, DIRECT + 1, DIRECT + 2, OPEN):
+        np.testing.assert_allclose(ours[:, column], truth[:, column], rtol=3e-4, atol=1e-4)
+    assert differs[:, SQUARE].sum() <= 2
+    assert (truth[:, [DIRECT, INDIRECT, OPEN]].std(axis=0) > 0.01).all()
+    share = np.full(room.texels.n, -1, np.float32)
+    open_share(origin, normal, new_caster(room.rays.tracer), begin, net, shared, np.float32(REACH), 0, share)
+    np.testing.assert_allclose(share[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
+
+
+def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
+    net, _, begin, origin, _, exitance, _, n_light, truth = rays_of
+    options = {"n_samples": len(net), "seed": 0, "progress": silent}
+    runs = [
+        final_gather(
+            room.texels.n_front,
+            room.surface,
+            room.free,
+            room.table,
+            exitance,
+            np.zeros(room.texels.n, np.uint8),
+            room.emitters,
+            room.shading,
+            room.rays.tracer,
+            n_light=n_light,
+            sky=tuple(SKY.tolist()),
+            ao_distance=REACH,
+            threads=threads,
+            **options,
+        )
+        for threads in (1, 2)
+    ]
+    for name in ("indirect", "direct", "open", "variance"):
+        assert getattr(runs[0], name).tobytes() == getattr(runs[1], name).tobytes()
+        assert len(getattr(runs[0], name)) == room.texels.n_front
+    assert runs[0].rays == room.texels.n_front * len(net)
+    np.testing.assert_allclose(runs[0].open[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
+    alone = ambient_occlusion(
+        room.texels.n_front, room.surface, room.free, room.rays.tracer, distance=REACH, threads=1, **options
+    )
+    # The same rays, whichever stage casts them.
+    np.testing.assert_array_equal(alone, runs[0].open)
+    near = ambient_occlusion(
+        room.texels.n_front,
+        room.surface,
+        room.free,
+        room.rays.tracer,
+        distance=float("inf"),
+        threads=1,
+        **options,
+    )
+    assert (near <= alone).all()
+    assert near.mean() < 0.8 * alone.mean()
+
+
+def test_shadow_rays_add_what_they_reach(room):
+    rng = np.random.default_rng(4)
+    begin, n = 10, 37
+    origin, _ = points_of(room.surface, room.free, np.arange(begin, begin + n))
+    light = np.array([0.8, 1.35, 0.8])
+    ray = np.concatenate([light - origin, np.full((n, N_POINTS, 1), 0.999)], axis=2).astype(np.float32)
+    weight = rng.random((n, N_POINTS), np.float32) * (rng.random((n, N_POINTS)) < 0.7)
+    colour = np.float32([1, 2, 0.5])
+    out = rng.random((n, 6), np.float32)
+    before = out.copy()
+    add_visible(new_caster(room.rays.tracer), origin, ray, weight.astype(np.float32), colour, out)
+    mesh = room.geometry.position, room.geometry.triangle
+    hit = [
+        [naive.intersect(*mesh, o, d, 0, 0.999)[1] for o, d in zip(a, b, strict=True)]
+        for a, b in zip(origin, ray[..., :3], strict=True)
+    ]
+    seen = np.array(hit) < 0
+    truth = (weight * seen).mean(axis=1)[:, None] * np.tile(colour, 2)
+    np.testing.assert_allclose(out - before, truth, atol=2e-6)
+    assert 0.1 < seen.mean() < 0.95
+
+
+def rectangle_irradiance(point, normal, corners):
+    """Return E / L under a polygon that is above the horizon: Lambert's formula."""
+    v = np.asarray(corners, float) - point
+    v /= np.linalg.norm(v, axis=1, keepdims=True)
+    total = 0.0
+    for a, b in zip(v, np.roll(v, -1, axis=0), strict=True):
+        cross = np.cross(a, b)
+        total += np.arccos(np.clip(a @ b, -1, 1)) * (cross @ normal) / np.linalg.norm(cross)
+    return abs(total) / 2
+
+
+LAMP = (0.3, 0.4, 0.3), (0.5, 0, 0), (0, 0, 0.6)
+
+
+def lit_floor(pieces, n_light, seed=0, n_gather=64):
+    """A floor under a lamp made of `pieces` strips.
+
+    Returns the world, direct and gathered light, the floor's texels and their light in closed form.
+    """
+    (x, y, z), (width, *_), long = LAMP
+    strips = [
+        Quad((x + k * width / pieces, y, z), (width / pieces, 0, 0), long, grey(0.0, 5.0))
+        for k in range(pieces)
+    ]
+    world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0), grey(0.5)), *strips], 32, inset=0.3)
+    options = {"seed": seed, "threads": 1, "progress": silent}
+    direct = direct_light(
+        world.surface,
+        world.free,
+        world.table,
+        (),
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_light=n_light,
+        n_gather=n_gather,
+        **options,
+    )
+    gathered = final_gather(
+        world.texels.n_front,
+        world.surface,
+        world.free,
+        world.table,
+        seen_light(world.texels, np.zeros((world.texels.n, 4), np.float32)),
+        direct.exact,
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_samples=n_gather,
+        n_light=n_light,
+        sky=(0, 0, 0),
+        ao_distance=1.0,
+        **options,
+    )
+    own = np.flatnonzero(world.texels.instance == 0)
+    corners = [(0.3, 0.4, 0.3), (0.8, 0.4, 0.3), (0.8, 0.4, 0.9), (0.3, 0.4, 0.9)]
+    points, _ = points_of(world.surface, world.free, own)
+    truth = [
+        np.mean([rectangle_irradiance(point, [0, 1, 0], corners) for point in texel]) for texel in points
+    ]
+    return world, direct, gathered, own, 5.0 * np.array(truth)
+
+
+@pytest.mark.parametrize("n_light", [16, 64])
+def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
+    """Light samples and hemisphere rays together give L x projected solid angle, each alone less."""
+    # More triangles than the closed form takes on.
+    found = {"whole": [], "complete": [], "part": []}
+    for seed in range(6):
+        world, direct, gathered, own, truth = lit_floor(5, n_light, seed)
+        assert not direct.exact[own].any()
+        area = world.texels.area[own]
+        light = np.average(truth, weights=area)
+        whole = direct.weighted[own, 0] + gathered.direct[own, 0]
+        for name, estimate in (("whole", whole), ("complete", direct.complete[own, 0])):
+            found[name].append(np.average(estimate, weights=area) / light)
+            assert np.sqrt(np.average((estimate / truth - 1) ** 2, weights=area)) < 0.8 / np.sqrt(n_light)
+        found["part"].append(np.average(direct.weighted[own, 0], weights=area) / light)
+    for name in ("whole", "complete"):
+        assert np.mean(found[name]) == pytest.approx(1, rel=4e-3)
+    assert 0.05 < np.mean(found["part"]) < 0.95
+    np.testing.assert_array_equal(direct.weighted[own, 0], direct.weighted[own, 2])
+    # The lamp's back and the lamp itself see none of it.
+    other = world.texels.instance != 0
+    assert (direct.complete[other] == 0).all()
+    # The error that is told is that of the estimate, within a factor.
+    told = np.sqrt(direct.variance[own].mean())
+    assert told > 0
+    # Nothing is in the way: after one shadow ray from each point no other is cast, but for packets of which
+    # few are the floor's.
+    shadow = direct.rays - 4 * world.texels.n
+    assert 16 * len(own) <= shadow <= (16 if n_light == 16 else 30) * len(own)
+
+
+@pytest.mark.parametrize("n_light", [16, 64])
+def test_a_lamp_with_nothing_in_the_way_shines_by_lamberts_formula(n_light):
+    world, direct, gathered, own, truth = lit_floor(1, n_light)
+    # The last texel's fifteen neighbours in its packet are the lamp's: too few rays to tell.
+    sure = own[direct.exact[own] != 0]
+    assert len(own) - len(sure) <= 1
+    np.testing.assert_array_equal(direct.weighted[sure], direct.complete[sure])
+    assert (gathered.direct[sure] == 0).all()
+    assert (direct.variance[sure] == 0).all()
+    np.testing.assert_allclose(direct.complete[sure, 0], truth[: len(sure)], rtol=2e-5)
+    # Its own texels and its back are dark without a ray.
+    assert (direct.complete[world.texels.instance != 0] == 0).all()
+
+
+def test_dark_lights_cast_nothing(room):
+    lights = (
+        PunctualLight("point", "off", 0, (0, 0, 0)),
+        PunctualLight("unheard of", "odd", 1, (1, 1, 1)),
+    )
+    world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))])
+    direct = direct_light(
+        world.surface,
+        world.free,
+        world.table,
+        lights,
+        world.emitters,
+        world.shading,
+        world.rays.tracer,
+        n_light=4,
+        n_gather=4,
+        seed=0,
+        threads=2,
+        progress=silent,
+    )
+    assert not direct.complete.any()
+    assert not direct.weighted.any()
+    assert not direct.variance.any()

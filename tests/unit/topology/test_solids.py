@@ -1,0 +1,190 @@
+"""Closed parts are told from sheets by their edges, and crates from rooms by what is in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import icosphere
+
+from baker.topology.solids import BEFORE, BEHIND, NOWHERE, Surfaces, find_solids
+from baker.topology.winding_number import Enclosure, winding_number
+
+BOX = np.array(
+    [
+        [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5], [0, 1, 5], [0, 5, 4],
+        [2, 6, 7], [2, 7, 3], [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6],
+    ]
+)  # fmt: skip
+NOBODY = np.zeros((0, 3))
+
+
+def box(low, high, inward=False):
+    """Return the triangles (12, 3, 3) of a box."""
+    low, high = np.array(low, float), np.array(high, float)
+    corner = low + np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * (high - low)
+    return corner[BOX[:, ::-1] if inward else BOX]
+
+
+def shifted(corner, *by):
+    return corner + np.array(by)
+
+
+def ball(radius, inward=False, level=2):
+    return radius * icosphere(level, inward=inward)
+
+
+FLOOR = np.array([[[-9, 0, -9], [-9, 0, 9], [9, 0, 9]], [[-9, 0, -9], [9, 0, 9], [9, 0, -9]]], float)
+CRATE = box((0, 0, 0), (1, 1, 1))
+SMALL = box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))
+
+
+def covers(*objects, **more):
+    """Tell of each object whether it is a cover."""
+    return [bool(cover.all()) for _, _, _, cover in judge(*objects, **more)]
+
+
+def judge(*objects, places=NOBODY, double_sided=True, glows=(), see_through=()):
+    """Return (inside, room, sealed, cover) of each object's triangles."""
+    count = [len(one) for one in objects]
+    corner = np.concatenate(objects).reshape(-1, 3)
+    owner = np.repeat(np.arange(len(objects)), count)
+    surfaces = Surfaces(
+        position=corner.astype(np.float32),
+        triangle=np.arange(len(corner)).reshape(-1, 3),
+        instance=owner,
+        opaque=~np.isin(owner, see_through),
+        double_sided=np.full(len(owner), double_sided),
+        glows=np.isin(owner, glows),
+    )
+    solids = find_solids(surfaces, np.array(places, float).reshape(-1, 3))
+    columns = solids.inside, solids.room, solids.sealed, solids.cover
+    return [tuple(column[owner == k] for column in columns) for k in range(len(count))]
+
+
+def kinds(found):
+    """Return the distinct codes of each object."""
+    return [sorted(set(inside.tolist())) for inside, *_ in found]
+
+
+@pytest.mark.parametrize("double_sided", [False, True])
+def test_a_crate_on_a_floor_is_solid_and_the_floor_is_not(double_sided):
+    found = judge(FLOOR, CRATE, double_sided=double_sided)
+    assert kinds(found) == [[NOWHERE], [BEHIND]]
+    assert found[1][2].all()
+
+
+def test_crates_of_several_objects_and_several_crates_in_one_object():
+    sides = [CRATE[2 * k : 2 * k + 2] for k in range(6)]
+    # Their corners differ by a rounding error.
+    sides[3] = sides[3] + 2e-7
+    assert kinds(judge(FLOOR, *sides)) == [[NOWHERE]] + 6 * [[BEHIND]]
+    beside = np.concatenate([CRATE, shifted(CRATE, 1, 0, 0), shifted(CRATE, 0, 3, 0)])
+    inside = judge(FLOOR, beside)[1][0]
+    # The wall between the two that touch belongs to none.
+    assert (inside == NOWHERE).sum() == 4
+    assert (inside == BEHIND).sum() == 32
+
+
+def test_winding():
+    assert kinds(judge(FLOOR, CRATE[:, ::-1])) == [[NOWHERE], [BEFORE]]
+    mixed = CRATE.copy()
+    mixed[[1, 4, 5]] = mixed[[1, 4, 5], ::-1]
+    inside = judge(FLOOR, mixed)[1][0]
+    assert (inside[[1, 4, 5]] == BEFORE).all()
+    assert (np.delete(inside, [1, 4, 5]) == BEHIND).all()
+    both_ways = np.concatenate([CRATE, CRATE[:, ::-1]])
+    inside = judge(FLOOR, both_ways)[1][0]
+    assert (inside == np.repeat([BEHIND, BEFORE], 12)).all()
+
+
+def test_what_encloses_nothing():
+    sheets = np.concatenate([FLOOR, FLOOR[:, ::-1]])
+    assert kinds(judge(sheets, CRATE)) == [[NOWHERE], [BEHIND]]
+    no_lid = np.delete(CRATE, [6, 7], axis=0)
+    assert kinds(judge(FLOOR, no_lid)) == [[NOWHERE], [NOWHERE]]
+    assert kinds(judge(FLOOR, CRATE, see_through=[1])) == [[NOWHERE], [NOWHERE]]
+    thin = box((0, 0, 0), (1, 1, 1e-6))
+    assert kinds(judge(FLOOR, thin)) == [[NOWHERE], [NOWHERE]]
+    assert kinds(judge(FLOOR, box((0, 0, 0), (4, 3, 0.001)))) == [[NOWHERE], [BEHIND]]
+
+
+def test_a_crate_without_a_bottom_covers_what_it_stands_on():
+    bottomless = np.delete(CRATE, [4, 5], axis=0)
+    assert covers(FLOOR, bottomless) == [False, True]
+    assert covers(FLOOR, bottomless, double_sided=False) == [False, False]
+    assert covers(FLOOR, bottomless[:, ::-1]) == [False, False]
+    # A hut with a lamp, and one with furniture.
+    assert covers(FLOOR, bottomless, places=[(0.5, 0.5, 0.5)]) == [False, False]
+    assert covers(FLOOR, bottomless, shifted(SMALL, 0, -0.4, 0)) == [False, False, False]
+    two_holes = np.delete(CRATE, [4, 5, 6, 7], axis=0)
+    assert covers(FLOOR, two_holes) == [False, False]
+    # A door: half of a wall is absent.
+    assert covers(FLOOR, np.delete(CRATE, [4, 5, 11], axis=0)) == [False, False]
+
+
+def test_small_holes_do_no_harm():
+    holed = np.delete(ball(1.0, level=3), 7, axis=0)
+    (_, (inside, _, sealed, _)) = judge(FLOOR, holed)
+    assert (inside == BEHIND).all()
+    assert not sealed.any()
+    # Something stands in it: one looks in.
+    assert kinds(judge(FLOOR, holed, 0.2 * SMALL))[1] == [NOWHERE]
+    # An edge that meets two half as long: a slit without width.
+    split = np.concatenate([CRATE[:1], CRATE[2:]])
+    a, b, c = CRATE[1]
+    middle = 0.5 * (b + c)
+    split = np.concatenate([split, [[a, b, middle], [a, middle, c]]])
+    assert judge(FLOOR, split)[1][2].all()
+
+
+def test_rooms_are_told_from_crates_by_what_is_in_them():
+    lamp = (0.5, 0.9, 0.5)
+    out = (3.0, 0.9, 0.5)
+    assert kinds(judge(FLOOR, CRATE, SMALL, places=[out])) == [[NOWHERE], [BEHIND], [BEHIND]]
+    inside, room, *_ = judge(FLOOR, CRATE, SMALL, places=[out, lamp])[1]
+    assert (inside == NOWHERE).all()
+    assert room.all()
+    assert kinds(judge(FLOOR, CRATE, SMALL, glows=[2]))[1:] == [[NOWHERE], [BEHIND]]
+    # A lamp that sticks in the ceiling, and one that hangs on the wall outside.
+    assert kinds(judge(FLOOR, CRATE, shifted(SMALL, 0, 0.45, 0), glows=[2]))[1] == [NOWHERE]
+    assert kinds(judge(FLOOR, CRATE, shifted(SMALL, 0, 0, 0.55), glows=[2]))[1] == [BEHIND]
+
+
+def test_rooms_that_look_inwards():
+    room = box((-3, 0, -3), (3, 3, 3), inward=True)
+    assert kinds(judge(room)) == [[NOWHERE]]
+    assert kinds(judge(room, CRATE)) == [[NOWHERE], [BEHIND]]
+    # Furniture that stands a little in the floor.
+    assert kinds(judge(room, CRATE - [0, 0.1, 0], FLOOR - [0, 1, 0])) == [[NOWHERE], [BEHIND], [NOWHERE]]
+    # Thick walls: the solid is what lies between.
+    house = box((-3.3, -0.3, -3.3), (3.3, 3.3, 3.3))
+    for objects in ((house, room), (np.concatenate([house, room]),)):
+        found = judge(*objects, CRATE, places=[(0, 2, 0)])
+        assert kinds(found) == [[BEHIND]] * len(found)
+        assert all(sealed.all() for _, _, sealed, _ in found)
+
+
+@pytest.mark.parametrize("inward", [False, True])
+@pytest.mark.parametrize("glows", [(), (0,)])
+def test_a_sky_sphere_is_no_solid(inward, glows):
+    sky = ball(50.0, inward)
+    found = judge(sky, FLOOR, CRATE, shifted(CRATE, 2, 0.5, 0.5), glows=glows)
+    assert kinds(found) == [[NOWHERE], [NOWHERE], [BEHIND], [BEHIND]]
+    assert found[0][1].all()
+
+
+def test_nothing_comes_of_nothing():
+    assert kinds(judge(np.zeros((0, 3, 3)))) == [[]]
+
+
+def test_winding_numbers_along_a_line_are_those_of_solid_angles():
+    surface = np.concatenate(
+        [ball(1.0, level=4), ball(0.4, inward=True), shifted(ball(0.9, level=2), 1.3, 0.2, 0)]
+    )
+    many = Enclosure(surface)
+    assert many.many
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1.2, 2.3, (60, 3))
+    truth = [winding_number(surface, point) for point in points]
+    np.testing.assert_allclose([many.winding(point) for point in points], truth, atol=1e-6)
+    assert {round(value) for value in truth} == {0, 1, 2}
