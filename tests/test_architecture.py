@@ -115,8 +115,8 @@ def test_pillow_has_one_reader_and_one_writer():
 
 def test_numba_lives_low():
     homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
-    # The reference's paths are kernels of its own: it shares none with the bake that it judges.
-    assert homes <= {"kernels", "lights", "trace", "reference"}
+    # The path tracer's paths are kernels of its own: it shares none with the bake that it judges.
+    assert homes <= {"kernels", "lights", "trace", "pathtracer"}
 
 
 def test_printing_is_for_the_command_line():

@@ -20,7 +20,8 @@ from baker.core.progress import Progress, silent
 from baker.core.scene import Scene, check_brightness
 from baker.core.settings import BakeSettings
 from baker.io.load import load_for_bake
-from baker.pipeline import precompile as warm
+from baker.kernels.not_kept import cache_warnings
+from baker.pipeline import precompile
 from baker.pipeline.pages import finish_pages
 from baker.pipeline.record import Record
 from baker.pipeline.transport import trace_transport
@@ -64,29 +65,29 @@ def bake(
         check_exports(settings.export, settings.channels)
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record, farm = Record(progress), farm or LocalFarm()
-    compiling = warm.start()
+    compiling = precompile.start()
     try:
         with record.stage("load"):
             if isinstance(scene, Scene):
                 check_brightness(scene)
             else:
                 scene = load_for_bake(scene, settings)
-        compiling = warm.suit(compiling, scene)
-        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *warm.cache_warnings()])
+        compiling = precompile.suit(compiling, scene)
+        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
         farm.open(scene, atlas, settings)
         world = prepare(scene, atlas, settings, record)
         if any(channel.needs_light for channel in channels.values()):
-            warm.wait_for_rays(compiling, progress)
+            precompile.wait_for_rays(compiling, progress)
         transport = trace_transport(scene, world, channels, settings, record, farm)
         world.rays.close()
         farm.close()
         # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
         texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
         del world
-        warm.finish(compiling, progress)
+        precompile.finish(compiling, progress)
         result = finish_pages(scene, atlas, texels, good, transport, channels, settings, record)
         if folder is not None:
             from baker.io.bake.write_bake import write_bake

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from baker.core.progress import Progress, report, silent
-from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
+from baker.core.scene import Instance, Material, Mesh, Scene
 
 STAGE = "compile"
 _LOOK = 0.1
@@ -60,19 +60,6 @@ def _run(*kind: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "baker.pipeline.precompile", *kind]
     silence = subprocess.DEVNULL
     return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
-
-
-def cache_warnings() -> list[SceneWarning]:
-    """Return a warning if compiled kernels cannot be kept for the next run."""
-    from baker.finish.kernels.page_guard import hold_to_samples
-
-    if hold_to_samples._cache.cache_path is not None:
-        return []
-    message = (
-        "no folder can be written to keep compiled kernels in, so each run compiles them anew, for up to a"
-        " minute; make one writable: ~/.cache, or any, named by NUMBA_CACHE_DIR"
-    )
-    return [SceneWarning("kernels-not-kept", message)]
 
 
 def wait_for_rays(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:

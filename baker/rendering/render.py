@@ -15,9 +15,9 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera, Scene, SceneWarning
 from baker.core.settings import make_settings
 from baker.io.load import load_scene
+from baker.kernels.not_kept import cache_warnings
 from baker.pathtracer.camera import parse_camera
 from baker.pathtracer.scene import Reference, build_reference
-from baker.pipeline.precompile import cache_warnings
 from baker.rendering.baked import BakedLight, other_scene
 from baker.rendering.cameras import named_camera
 from baker.rendering.passes import Run, first_layers, lit_by, openness, traced

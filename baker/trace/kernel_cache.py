@@ -9,6 +9,7 @@ install without a cache folder. Ours are compiled in memory then, anew in every 
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import time
 from pathlib import Path
@@ -23,11 +24,19 @@ def keep_kernels(package_file: str, *made_of: str) -> None:
     package_file : str
         `__file__` of the package, or of the only file in it that has some.
     made_of : str
-        Names of the other packages that its kernels take functions from.
+        Dotted names of the other packages that its kernels take functions from.
     """
     folder = Path(package_file).parent
-    drop_stale(folder, [folder, *(folder.parent / name for name in made_of)])
+    drop_stale(folder, [folder, *map(_folder_of, made_of)])
     allow_no_cache(folder)
+
+
+def _folder_of(package: str) -> Path:
+    """Return the folder of a package without running its code."""
+    found = importlib.util.find_spec(package)
+    if found is None or not found.submodule_search_locations:
+        raise ImportError(f"{package} is no package")
+    return Path(next(iter(found.submodule_search_locations)))
 
 
 def drop_stale(folder: Path, made_of: list[Path]) -> None:

@@ -21,13 +21,13 @@ from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.io.bake.read_bake import StoredBake, read_bake
+from baker.kernels.not_kept import cache_warnings
 from baker.metrics.groups import Compared
 from baker.metrics.limits import Verdict, judge, parse_limits
 from baker.metrics.texel_area import look_up
 from baker.metrics.worst_texels import worst_texels
 from baker.pathtracer.point_estimate import PointEstimate
 from baker.pathtracer.scene import Reference, build_reference
-from baker.pipeline.precompile import cache_warnings
 from baker.verification.crops import Crop, trace_crops
 from baker.verification.judgements.judgement import Evidence, Judged
 from baker.verification.judgements.registry import FIGURE_NAMES, JUDGEMENTS, default_limits

@@ -1,4 +1,7 @@
-"""The path tracer's estimators against each other, and its bytes; `test_truth_metrics` has its closed forms."""
+"""The path tracer's estimators against each other, and its bytes.
+
+Its closed forms are in `test_truth_metrics`.
+"""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baker.core.scene import Material, Scene, Texture
-from baker.pipeline import precompile as warm
+from baker.pipeline import precompile
 
 SOLID, HOLED = np.full((2, 2, 4), 255, np.uint8), np.full((2, 2, 4), 255, np.uint8)
 HOLED[0, 0, 3] = 254
@@ -31,11 +31,11 @@ def material(mode, colour=(1.0, 1.0, 1.0), alpha=1.0, image=None):
 )
 def test_the_scene_tells_what_is_compiled(monkeypatch, materials, kind):
     started, stopped = [], []
-    monkeypatch.setattr(warm, "_run", lambda *kind: started.extend(kind) or "new")
-    monkeypatch.setattr(warm, "stop", stopped.append)
+    monkeypatch.setattr(precompile, "_run", lambda *kind: started.extend(kind) or "new")
+    monkeypatch.setattr(precompile, "stop", stopped.append)
     scene = Scene("", None, (), tuple(materials), ())
-    assert warm.suit("old", scene) == ("new" if kind else "old")
+    assert precompile.suit("old", scene) == ("new" if kind else "old")
     assert started == ([kind] if kind else [])
     assert stopped == (["old"] if kind else [])
     # Where kernels are on disk nothing is started.
-    assert warm.suit(None, scene) is None
+    assert precompile.suit(None, scene) is None
