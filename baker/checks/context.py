@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.checks.bake_rates import Rates
+from baker.checks.direct_light import Levels, estimate_levels
+from baker.checks.emission import Emission, find_emission
 from baker.checks.finding import Place
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.scene_rays import World
@@ -17,11 +19,6 @@ from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
-
-if TYPE_CHECKING:
-    from baker.checks.bake_rates import Rates
-    from baker.checks.direct_light import Levels
-    from baker.checks.emission import Emission
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
 DEFAULT_MIP = 2
@@ -96,7 +93,10 @@ class Subject:
     @cached_property
     def world(self) -> World:
         """Return all good triangles in the world."""
-        return World(self, thread_count(self.settings.threads))
+        threads = thread_count(self.settings.threads)
+        return World(
+            self.raw.instances, self.meshes, self.scene.materials, self.scene.origin, threads=threads
+        )
 
     @cached_property
     def used_materials(self) -> list[int]:
@@ -112,9 +112,7 @@ class Subject:
     @cached_property
     def emission(self) -> Emission:
         """Return the triangles that emit."""
-        from baker.checks.emission import find_emission
-
-        return find_emission(self)
+        return find_emission(self.world)
 
     @property
     def glows(self) -> bool:
@@ -125,13 +123,11 @@ class Subject:
     @cached_property
     def levels(self) -> Levels | None:
         """Return direct light at sample points; None without light, surface, or wish for either."""
-        from baker.checks.direct_light import estimate_levels
-
         bright = [max(light.intensity) for light in self.scene.lights]
         lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
         if not self.wants_light or not (lit or self.glows) or not self.world.area.sum() > 0:
             return None
-        return estimate_levels(self)
+        return estimate_levels(self.scene, self.world, self.emission, self.settings)
 
     def uv(self, mesh: int) -> UvFacts:
         """Return the lightmap uv of a mesh, worked out once."""

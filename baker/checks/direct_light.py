@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.core.scene import PunctualLight
+from baker.checks.emission import Emission
+from baker.checks.scene_rays import World
+from baker.core.scene import PunctualLight, Scene
+from baker.core.settings import BakeSettings
 
 # Receivers, a multiple of 16; rays from each to emissive surfaces, and into the sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
@@ -34,18 +36,27 @@ class Levels:
     triangle: NDArray[np.int64]
 
 
-def estimate_levels(subject: Subject) -> Levels:
-    """Estimate direct light at points spread over all front sides by area."""
-    world = subject.world
-    random = np.random.default_rng(subject.settings.seed)
-    position, normal, triangle = spread_points(subject, POINTS, random)
+def estimate_levels(scene: Scene, world: World, emission: Emission, settings: BakeSettings) -> Levels:
+    """Estimate direct light at points spread over all front sides by area.
+
+    Parameters
+    ----------
+    scene : Scene
+    world : World
+        Its triangles.
+    emission : Emission
+        Those of them that emit.
+    settings : BakeSettings
+    """
+    random = np.random.default_rng(settings.seed)
+    position, normal, triangle = spread_points(world, POINTS, random)
     total = np.zeros((len(position), 3))
     origin = world.lifted(position, triangle, normal)
-    for light in subject.scene.local_lights:
+    for light in scene.local_lights:
         if max(light.intensity) > 0:
-            total += _punctual(subject, light, origin, normal)
-    total += _emissive(subject, origin, normal, random)
-    sky = np.array(subject.settings.sky_radiance)
+            total += _punctual(world, light, origin, normal)
+    total += _emissive(world, emission, origin, normal, random)
+    sky = np.array(settings.sky_radiance)
     if sky.any():
         way = cosine_ways(normal, SKY_RAYS, random)
         far = np.full(len(way), 1e30)
@@ -55,24 +66,22 @@ def estimate_levels(subject: Subject) -> Levels:
 
 
 def spread_points(
-    subject: Subject, n: int, random: np.random.Generator
+    world: World, n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return n points, stratified by area, with the normal of their face and its number."""
-    world = subject.world
     share = np.cumsum(world.area)
     pick = (np.arange(n) + random.random(n)) / n * share[-1]
     triangle = np.minimum(np.searchsorted(share, pick), len(share) - 1)
-    return points_inside(subject, triangle, random), world.normal[triangle], triangle
+    return points_inside(world, triangle, random), world.normal[triangle], triangle
 
 
 def points_inside(
-    subject: Subject,
+    world: World,
     triangle: NDArray[np.int64],
     random: np.random.Generator,
     part: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Return a random point of each triangle, or of a part of it (n, 3), see `Emission.inside`."""
-    world = subject.world
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
@@ -86,7 +95,7 @@ def points_inside(
 
 
 def _punctual(
-    subject: Subject, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
+    world: World, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     from baker.lights.family import LIGHT_FAMILIES
 
@@ -99,16 +108,19 @@ def _punctual(
     at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
     family(light, at, up, ray, weight)
     rows = ray.reshape(-1, 4)
-    hit, _ = subject.world.first_hits(origin, rows[:, :3], np.zeros(len(rows)), rows[:, 3])
+    hit, _ = world.first_hits(origin, rows[:, :3], np.zeros(len(rows)), rows[:, 3])
     seen = np.where(hit < 0, weight.reshape(-1), 0.0)
     return np.asarray(seen[:, None] * np.array(light.intensity), np.float64)
 
 
 def _emissive(
-    subject: Subject, origin: NDArray[np.float64], normal: NDArray[np.float64], random: np.random.Generator
+    world: World,
+    found: Emission,
+    origin: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    random: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Light from emissive triangles, by points chosen by power, (n, 3) float64."""
-    world, found = subject.world, subject.emission
     power = found.area * (found.radiance @ _LUMINANCE)
     total = np.zeros((len(origin), 3))
     if not power.sum() > 0:
@@ -117,7 +129,7 @@ def _emissive(
     for _ in range(EMITTER_RAYS):
         part = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
         chosen = found.triangle[part]
-        way = points_inside(subject, chosen, random, found.inside[part]) - origin
+        way = points_inside(world, chosen, random, found.inside[part]) - origin
         square = np.maximum(np.einsum("nx,nx->n", way, way), 1e-20)
         here = np.einsum("nx,nx->n", way, normal)
         there = -np.einsum("nx,nx->n", way, world.normal[chosen])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
+from baker.checks.scene_rays import World
 from baker.core.scene import Texture
 
 # Parts that textured triangles are cut into, beside what they were.
@@ -35,9 +35,9 @@ class Emission:
     area: NDArray[np.float64]
 
 
-def find_emission(subject: Subject) -> Emission:
+def find_emission(world: World) -> Emission:
     """Find what emits; triangles whose part of the texture is black do not."""
-    world, materials = subject.world, subject.scene.materials
+    materials = world.materials
     factor = np.array([m.emission for m in materials], np.float64).reshape(-1, 3)
     emits = np.flatnonzero((factor.max(axis=1, initial=0.0) > 0)[world.material] & (world.area > 0))
     textured = np.array([m.emission_texture is not None for m in materials], bool)[world.material[emits]]
@@ -55,7 +55,7 @@ def find_emission(subject: Subject) -> Emission:
         pack = pack_textures([(t.image, t.wrap) for t in textures], [t.nearest for t in textures])
         uv = np.zeros((len(image), 3, 2))
         for k, texture in enumerate(textures):
-            uv[number == k] = _image_uv(subject, image[number == k], texture)
+            uv[number == k] = _image_uv(world, image[number == k], texture)
         shone = EmissiveTextures(pack, number, factor[world.material[image]], uv)
         parts = cut(shone, world.area[image], np.zeros(len(image)), _MOST_PARTS)
         triangle = np.concatenate([triangle, image[parts.owner]])
@@ -63,14 +63,13 @@ def find_emission(subject: Subject) -> Emission:
     return Emission(triangle, inside, radiance, world.area[triangle] * inside[:, 2] ** 2)
 
 
-def _image_uv(subject: Subject, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
+def _image_uv(world: World, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
     """Return where the corners of triangles lie in a texture, (n, 3, 2); (0, 0) without such a set."""
-    world = subject.world
     out = np.zeros((len(triangle), 3, 2))
     for k in np.unique(world.instance[triangle]):
         own = np.flatnonzero(world.instance[triangle] == k)
-        place = subject.raw.instances[k]
-        facts = subject.meshes[place.mesh]
+        place = world.instances[k]
+        facts = world.meshes[place.mesh]
         sets = [p.texcoord.get(texture.texcoord) for p in facts.raw.primitives]
         known = [
             np.zeros((len(p.position), 2)) if uv is None or len(uv) != len(p.position) else uv

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.checks.mesh_facts import MeshFacts
+from baker.core.scene import Material
+from baker.core.source_mesh import RawInstance
+
 if TYPE_CHECKING:
-    from baker.checks.context import Subject
     from baker.trace.embree import RayScene, Tracer
 
 # Rays that one call of the kernel takes; also what a thread works on at a time.
@@ -19,10 +23,19 @@ _TILE = 1 << 16
 class World:
     """Every instance's good faces, in the order of instances.
 
+    Parameters
+    ----------
+    instances : sequence of RawInstance
+    meshes : sequence of MeshFacts
+        What `RawInstance.mesh` counts.
+    materials : sequence of Material
+    origin : (3,) float64, metres, world
+        What positions are relative to: `Scene.origin`.
+    threads : int
+
     Attributes
     ----------
     position : (V, 3) float32, metres, world, relative to `origin`
-    origin : (3,) float64, metres: `Scene.origin`
     triangle : (T, 3) int64
         Wound as the front is seen: nodes that mirror turn the winding over.
     instance : (T,) int64, index into the raw scene's instances
@@ -31,16 +44,25 @@ class World:
     material : (T,) int32; double_sided : (T,) bool
     """
 
-    def __init__(self, subject: Subject, threads: int) -> None:
+    def __init__(
+        self,
+        instances: Sequence[RawInstance],
+        meshes: Sequence[MeshFacts],
+        materials: Sequence[Material],
+        origin: NDArray[np.float64],
+        *,
+        threads: int,
+    ) -> None:
+        self.instances, self.meshes, self.materials = instances, meshes, materials
+        self.origin = origin
         self.threads = threads
-        self.origin = subject.scene.origin
         position, triangle, instance, face, material = [], [], [], [], []
         start = 0
-        for k, place in enumerate(subject.raw.instances):
-            facts = subject.meshes[place.mesh]
+        for k, place in enumerate(instances):
+            facts = meshes[place.mesh]
             matrix = place.world_from_object
             with np.errstate(over="ignore", invalid="ignore"):
-                world = facts.position.astype(np.float64) @ matrix[:3, :3].T + (matrix[:3, 3] - self.origin)
+                world = facts.position.astype(np.float64) @ matrix[:3, :3].T + (matrix[:3, 3] - origin)
             corner = facts.triangle[facts.good]
             if np.linalg.det(matrix[:3, :3]) < 0:
                 corner = corner[:, ::-1]
@@ -56,7 +78,7 @@ class World:
         self.instance: NDArray[np.int64] = np.concatenate(instance or [none])
         self.face: NDArray[np.int64] = np.concatenate(face or [none])
         self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
-        sided = np.array([m.double_sided for m in subject.scene.materials], bool)
+        sided = np.array([m.double_sided for m in materials], bool)
         self.double_sided: NDArray[np.bool_] = sided[self.material]
         # Instances squashed flat have faces without area.
         a, b, c = (self.position[self.triangle[:, k]].astype(np.float64) for k in range(3))

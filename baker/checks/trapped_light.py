@@ -31,7 +31,7 @@ def trapped_gain(subject: Subject, albedo: NDArray[np.float64]) -> float:
     if not world.area.sum() > 0:
         return 1.0
     random = np.random.default_rng(subject.settings.seed)
-    position, normal, triangle = spread_points(subject, POINTS, random)
+    position, normal, triangle = spread_points(world, POINTS, random)
     position, normal = np.repeat(position, PATHS, axis=0), np.repeat(normal, PATHS, axis=0)
     triangle = np.repeat(triangle, PATHS)
     left = np.ones(len(position))

@@ -12,13 +12,9 @@ and a stray object far away cannot outweigh the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from baker.core.scene import Instance, Mesh
 
 # Bits lost that do not count; bits of the mean object that moving the origin away from 0 must win.
 _FREE, _WORTH = 3.0, 2.0
@@ -26,22 +22,30 @@ _FREE, _WORTH = 3.0, 2.0
 _PLACES, _VERTICES = 64, 1 << 15
 
 
-def scene_origin(meshes: Sequence[Mesh], instances: Sequence[Instance]) -> NDArray[np.float64]:
+def scene_origin(
+    position: Sequence[NDArray[np.float32]],
+    triangles: Sequence[int],
+    placed: Sequence[tuple[int, NDArray[np.float64]]],
+) -> NDArray[np.float64]:
     """Return (3,) float64, metres, world: what world positions of a bake are relative to.
 
     Parameters
     ----------
-    meshes : sequence of Mesh
-    instances : sequence of Instance
+    position : sequence of (V, 3) float32, metres
+        Vertices of each mesh.
+    triangles : sequence of int
+        Triangles of each mesh.
+    placed : sequence of (int, (4, 4) float64)
+        Mesh and world matrix of each object.
     """
-    shapes = [_middle_and_size(mesh.position) for mesh in meshes]
-    centre, size, weight = np.zeros((len(instances), 3)), np.zeros(len(instances)), np.zeros(len(instances))
-    for k, instance in enumerate(instances):
-        middle, half = shapes[instance.mesh]
-        linear = instance.world_from_object[:3, :3]
-        centre[k] = linear @ middle + instance.world_from_object[:3, 3]
+    shapes = [_middle_and_size(vertices) for vertices in position]
+    centre, size, weight = np.zeros((len(placed), 3)), np.zeros(len(placed)), np.zeros(len(placed))
+    for k, (mesh, world_from_object) in enumerate(placed):
+        middle, half = shapes[mesh]
+        linear = world_from_object[:3, :3]
+        centre[k] = linear @ middle + world_from_object[:3, 3]
         size[k] = 2.0 * float(np.linalg.norm(np.abs(linear) @ half))
-        weight[k] = np.sqrt(len(meshes[instance.mesh].triangle))
+        weight[k] = np.sqrt(triangles[mesh])
     usable = (size > 0) & np.isfinite(centre).all(axis=1)
     centre, size, weight = centre[usable], size[usable], weight[usable]
     nowhere = np.zeros(3)

@@ -250,7 +250,11 @@ class Scene:
     @cached_property
     def origin(self) -> NDArray[np.float64]:
         """Return what world positions of a bake are relative to, (3,) float64, metres; see `core.origin`."""
-        return scene_origin(self.meshes, self.instances)
+        return scene_origin(
+            [mesh.position for mesh in self.meshes],
+            [len(mesh.triangle) for mesh in self.meshes],
+            [(instance.mesh, instance.world_from_object) for instance in self.instances],
+        )
 
     @cached_property
     def local_lights(self) -> tuple[PunctualLight, ...]:

@@ -10,12 +10,13 @@ Conty Estevez and Kulla, Importance sampling of many lights with adaptive tree s
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.sampling import triangle_barycentric
+from baker.kernels.shading import Shading
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
@@ -88,7 +89,7 @@ def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
     return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node, apart)
 
 
-def needed_shading(emitters: Emitters, shading: Any) -> Any:
+def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
     """Return what kernels have to know of materials: None if no emitter is textured and nothing has holes.
 
     Numba compiles them for None without what looks up textures.

@@ -11,7 +11,6 @@ Based on: see `kernels.emitters`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +30,7 @@ from baker.kernels.emitters import (
     TWO_SIDED,
     Emitters,
 )  # fmt: skip
+from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -66,7 +66,7 @@ class _Pieces:
     root: NDArray[np.int32]
 
 
-def build_emitters(geometry: Geometry, shading: Any, most_parts: int = MOST_PARTS) -> Emitters:
+def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_PARTS) -> Emitters:
     """Find the triangles that emit and group them.
 
     Parameters
@@ -132,7 +132,7 @@ def build_emitters(geometry: Geometry, shading: Any, most_parts: int = MOST_PART
     )
 
 
-def _find_pieces(geometry: Geometry, shading: Any, most_parts: int) -> _Pieces:
+def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Pieces:
     """List the triangles that emit, textured ones in parts."""
     candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
     material = geometry.material[candidate]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
 from baker.lights.texture_levels import TextureLevels, fair_limit
 from baker.lights.uv_integral import uv_means
@@ -90,13 +91,14 @@ class EmissiveTextures:
         self._bring_near()
 
     @classmethod
-    def of(cls, shading: Any, triangle: NDArray[np.int64]) -> EmissiveTextures:
+    def of(cls, shading: Shading, triangle: NDArray[np.int64]) -> EmissiveTextures:
         """Prepare triangles (n,) of the scene, all of materials with an emissive texture."""
         material = shading.material[triangle]
-        uv = shading.emission_uv
-        uv = uv[shading.triangle[triangle]] if len(uv) > 1 else np.zeros((len(triangle), 3, 2))
+        uv = np.zeros((len(triangle), 3, 2))
+        if len(shading.emission_uv) > 1:
+            uv = shading.emission_uv[shading.triangle[triangle]].astype(np.float64)
         factor = shading.emission[material].astype(np.float64)
-        return cls(shading.pack, shading.emission_texture[material], factor, uv.astype(np.float64))
+        return cls(shading.pack, shading.emission_texture[material], factor, uv)
 
     def _bring_near(self) -> None:
         """Move uv by whole repeats to the first ones."""

@@ -7,7 +7,6 @@ the second is complete and lights the surfaces that later bounces start from.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
 from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.shading import Shading
 from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.triangle_lookup import HitTable
 from baker.lights.family import LIGHT_FAMILIES
@@ -64,7 +64,7 @@ def direct_light(
     table: HitTable,
     lights: tuple[PunctualLight, ...],
     emitters: Emitters,
-    shading: Any,
+    shading: Shading,
     tracer: Tracer,
     *,
     n_light: int,
@@ -106,7 +106,7 @@ def direct_light(
     few_shared = shared_bits_mask(N_HEMISPHERE)
 
     cast = np.zeros(-(-n // TILE), np.int64)
-    shading = needed_shading(emitters, shading)
+    needed = needed_shading(emitters, shading)
 
     def from_emitters(
         choice: Choice,
@@ -125,7 +125,7 @@ def direct_light(
             own, second = np.zeros_like(out), np.zeros(len(out), np.float32)
             complete = done if lamps is choice.seen else np.zeros(len(out), np.uint8)
             n_cast += light_samples(
-                origin, normal, lamps, shading, caster, begin, own_net, shared_bits_mask(len(own_net)),
+                origin, normal, lamps, needed, caster, begin, own_net, shared_bits_mask(len(own_net)),
                 weigh[near], complete, own, second,
             )  # fmt: skip
             out += own
@@ -134,7 +134,7 @@ def direct_light(
             n_cast += N_HEMISPHERE * len(out)
             found = np.zeros((len(out), N_COLUMNS), np.float32)
             gather(
-                origin, normal, table, dark, choice.found, shading, caster, begin, few, few_shared,
+                origin, normal, table, dark, choice.found, needed, caster, begin, few, few_shared,
                 black, limits, done, found,
             )  # fmt: skip
             out[:, 3:] += found[:, DIRECT : DIRECT + 3]

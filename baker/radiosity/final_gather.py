@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
+from baker.kernels.shading import Shading
 from baker.kernels.surface import Surface
 from baker.kernels.triangle_lookup import HitTable
 from baker.radiosity.direct import TILE, batch_variance
@@ -53,7 +53,7 @@ def final_gather(
     seen: SeenLight,
     exact: NDArray[np.uint8],
     emitters: Emitters,
-    shading: Any,
+    shading: Shading,
     tracer: Tracer,
     *,
     n_samples: int,
@@ -87,7 +87,7 @@ def final_gather(
     shared = shared_bits_mask(n_samples)
     limits = np.array([ao_distance, n_light], np.float64)
     radiance = np.array(sky, np.float32)
-    shading = needed_shading(emitters, shading)
+    needed = needed_shading(emitters, shading)
     chooser = LampChooser.build(emitters, n_light, chart)
 
     def work(begin: int, end: int) -> Part:
@@ -100,7 +100,7 @@ def final_gather(
             if part.start >= part.stop:
                 break
             gather(
-                origin[part], normal[part], table, seen, choice.found, shading, caster,
+                origin[part], normal[part], table, seen, choice.found, needed, caster,
                 begin + part.start, net, shared, radiance, limits, exact[begin:end][part], out[part],
             )  # fmt: skip
         spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, SURFACE, TEXTURE, UV, AlphaTable, no_alpha
+from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
 from baker.kernels.transmittance import TintTable
 from baker.topology.unique_rows import compact, first_equal
@@ -65,7 +64,7 @@ def build_alpha(
     return AlphaTable(slot, row)
 
 
-def see_through(shading: Any, tint: TintTable | None = None) -> SeeThrough | None:
+def see_through(shading: Shading, tint: TintTable | None = None) -> SeeThrough | None:
     """Return what the ray tree has to know of triangles that let light through, None without any.
 
     Parameters

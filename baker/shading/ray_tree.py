@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from baker.core.geometry import Geometry
+from baker.kernels.shading import Shading
 from baker.shading.alpha import see_through
 from baker.shading.transmittance import build_tint, tint
 from baker.trace.embree import RayScene
 
 
-def build_ray_tree(geometry: Geometry, shading: Any, *, threads: int) -> RayScene:
+def build_ray_tree(geometry: Geometry, shading: Shading, *, threads: int) -> RayScene:
     """Return the tree of all triangles.
 
     Parameters

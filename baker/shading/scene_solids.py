@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +10,11 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
+from baker.kernels.shading import Shading
 from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
 
 
-def scene_solids(scene: Scene, geometry: Geometry, shading: Any) -> Solids:
+def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
     """Tell solids from rooms and open sheets.
 
     Parameters
@@ -36,7 +36,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Any) -> Solids:
     return find_solids(surfaces, lamps_and_cameras(scene))
 
 
-def hide_backs(scene: Scene, geometry: Geometry, shading: Any) -> tuple[Geometry, NDArray[np.uint8]]:
+def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
     """Return the geometry with faces of solids one-sided, and what each triangle tells rays.
 
     No light gets to the backs of a solid without holes, whatever its material says of them.
@@ -53,7 +53,7 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Any) -> tuple[Geometry
     return geometry, tell_tales(geometry, shading, solids)
 
 
-def tell_tales(geometry: Geometry, shading: Any, solids: Solids) -> NDArray[np.uint8]:
+def tell_tales(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
     """Return (T,) uint8 for `kernels.probe`: what a ray from inside of something meets.
 
     Backs of one-sided sheets are black, those of covers as good as black; those of rooms and of what lets
@@ -68,7 +68,7 @@ def tell_tales(geometry: Geometry, shading: Any, solids: Solids) -> NDArray[np.u
     return tells
 
 
-def _opaque(geometry: Geometry, shading: Any) -> NDArray[np.bool_]:
+def _opaque(geometry: Geometry, shading: Shading) -> NDArray[np.bool_]:
     """Return (T,) bool: triangles that let no light through anywhere."""
     slot = shading.alpha.slot
     found: NDArray[np.bool_] = slot < 0 if len(slot) else np.ones(len(geometry.triangle), bool)

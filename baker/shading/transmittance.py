@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from baker.kernels.alpha import ALPHA, CUTOFF
+from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
 from baker.kernels.transmittance import COLOUR, ROW_LENGTH, TintTable
 from baker.trace.embree import SeeThrough
 
 
-def build_tint(shading: Any) -> TintTable | None:
+def build_tint(shading: Shading) -> TintTable | None:
     """Find the BLEND triangles, but for those without alpha anywhere; None if there are none.
 
     Parameters
@@ -49,7 +50,7 @@ def build_tint(shading: Any) -> TintTable | None:
     return TintTable(slot, row, bool((there & ~white).any()))
 
 
-def tint(shading: Any, table: TintTable | None) -> SeeThrough | None:
+def tint(shading: Shading, table: TintTable | None) -> SeeThrough | None:
     """Return what the ray tree has to know of triangles that let a share of light through, None without any.
 
     Parameters

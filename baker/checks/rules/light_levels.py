@@ -100,7 +100,7 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
         met = False
         for side in sides:
             normal = side * world.normal[chosen]
-            origin = world.lifted(points_inside(subject, chosen, random), chosen, normal)
+            origin = world.lifted(points_inside(world, chosen, random), chosen, normal)
             way = cosine_ways(normal, 1, random)
             hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
             met = met or bool((hit >= 0).any())

@@ -10,7 +10,6 @@ from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 from PIL import Image
 
 from baker.checks.context import Subject
-from baker.checks.direct_light import estimate_levels
 from baker.checks.rules.light_sources import emissive_black, no_light
 from baker.core.settings import BakeSettings
 from baker.io.load import load_scene
@@ -49,7 +48,7 @@ def test_the_mean_is_that_of_the_texture(tmp_path, repeats, scale):
 
 def test_light_levels_are_those_of_the_lit_texel(tmp_path):
     one = subject(tmp_path, UV)
-    levels = estimate_levels(one)
+    levels = one.levels
     low = QUAD.min(axis=0)
     spot = low[:2] + np.array([40.5, 10.5]) / 64 * np.ptp(QUAD, axis=0)[:2]
     facing = levels.position[:, 2] > 0.5
