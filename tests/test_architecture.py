@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -195,3 +196,18 @@ def test_checks_page_is_current():
 def test_settings_page_is_current():
     page = run(sys.executable, str(ROOT / "docs" / "make_settings_page.py"), "--print")
     assert (ROOT / "docs" / "SETTINGS.md").read_text("utf-8") == page
+
+
+def test_code_map_is_current():
+    page = run(sys.executable, str(ROOT / "docs" / "make_code_map.py"), "--print")
+    assert (ROOT / "docs" / "ARCHITECTURE.md").read_text("utf-8") == page
+    packages = {name_of(path.parent) + "/" for path in (ROOT / "baker").rglob("__init__.py")} - {"baker/"}
+    for package in {*packages, "cli/"}:
+        assert re.search(rf"^\| `{package}` \| \w.+ \|$", page, re.MULTILINE), package
+
+
+def test_every_package_is_installed():
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        listed = tomllib.load(file)["tool"]["setuptools"]["packages"]
+    found = {name_of(path.parent).replace("/", ".") for path in (ROOT / "baker").rglob("__init__.py")}
+    assert set(listed) == found | {"baker.cli"}

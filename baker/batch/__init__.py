@@ -1,1 +1,1 @@
-"""Many bakes: what is to be done, and doing it."""
+"""Bakes many scenes: which are out of date, worker processes, limits on memory."""

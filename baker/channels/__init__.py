@@ -1,1 +1,1 @@
-"""What can be baked, one channel a file."""
+"""Plugins: what can be baked, one channel a file."""

@@ -1,1 +1,1 @@
-"""Checks of a scene before it is baked: the runner, its reports, and shared facts."""
+"""Checks of a scene before it is baked: what rules share, the runner, reports."""

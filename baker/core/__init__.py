@@ -1,1 +1,1 @@
-"""Data and checks that everything shares; knows nothing above it."""
+"""Scene, settings, results, errors, and the interfaces of plugins; imports no other package."""

@@ -1,1 +1,1 @@
-"""One bake, or many, on a dask.distributed cluster."""
+"""The tiles of one bake, or whole bakes, on a dask.distributed cluster."""

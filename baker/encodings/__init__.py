@@ -1,1 +1,1 @@
-"""How a map is stored, one encoding a file."""
+"""Plugins: one image format a file."""

@@ -1,1 +1,1 @@
-"""One file an engine: what it needs to show a bake."""
+"""Plugins: one engine a file; an export reads a finished folder and nothing else."""

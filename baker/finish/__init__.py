@@ -1,1 +1,1 @@
-"""Repairs of finished maps: invalid texels, denoise, dilation."""
+"""Finished pages from the values of texels: invalid texels filled, noise removed, charts extended."""

@@ -1,1 +1,1 @@
-"""Scene files in; GLB, manifest and folders out."""
+"""Scene files, images and JUnit reports; importers are found here."""

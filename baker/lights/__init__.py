@@ -1,4 +1,4 @@
-"""Light families, one a file."""
+"""Plugins: one family of lights a file; emissive triangles as a table of emitters."""
 
 from baker.trace.kernel_cache import keep_kernels
 

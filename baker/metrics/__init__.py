@@ -1,1 +1,1 @@
-"""Figures of error, limits on them, and reports."""
+"""Measures of error between maps, and limits on them."""

@@ -1,4 +1,4 @@
-"""Path-traced truth: shares rays with the bake and nothing else."""
+"""The reference: irradiance, ambient occlusion and pictures by path tracing."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -1,1 +1,1 @@
-"""Wires the stages of a bake in order: world, transport, finished pages."""
+"""The stages of a bake in order, and what each hands to the next; the only place that wires them."""

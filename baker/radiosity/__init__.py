@@ -1,1 +1,1 @@
-"""Patches, form factors, solve, final gather."""
+"""Light transport between texels: direct light, patches, form factors, solve, final gather."""

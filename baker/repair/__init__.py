@@ -1,1 +1,1 @@
-"""`baker check --fix` and `--repair`: meshes rewritten where that keeps their look."""
+"""Rewrites the meshes of a file where that keeps their look: `baker check --fix` and `--repair`."""

@@ -1,1 +1,1 @@
-"""Materials and what lets light through, resolved for triangles."""
+"""Materials resolved for triangles, what lets light through, and the ray tree."""

@@ -1,4 +1,4 @@
-"""The only part that knows Embree."""
+"""Embree's C API, ray packets, and how kernels are compiled and kept; nothing else knows Embree."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -1,4 +1,4 @@
-"""Judges a finished bake against path tracing."""
+"""Judges a finished bake against the path tracer."""
 
 from baker.verification.settings import VerifySettings
 from baker.verification.summary import verification_json

@@ -1,4 +1,4 @@
-"""A local page that shows a bake: what it is made of, and the server that hands it out."""
+"""The local page that shows a bake, its server, and the data it hands out."""
 
 from baker.viewer.script import ThreeScript, find_three
 from baker.viewer.server import ViewServer, make_server

@@ -1,1 +1,1 @@
-"""A bake's output folder: written as a whole, locked, read back; the manifest."""
+"""The output folder of a bake: replaced as a whole, locked, read back; its manifest."""

@@ -1,1 +1,1 @@
-"""Scenes made of plain meshes, for formats without nodes; OBJ materials."""
+"""Scenes of plain meshes, for formats without nodes; materials of OBJ files."""

@@ -1,4 +1,4 @@
-"""Filter functions that Embree calls at hits of surfaces with transparency."""
+"""Filter functions that Embree calls at hits on triangles that let light through."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -1,1 +1,1 @@
-"""What a bake is judged by: one file for each kind of fault, all with the interface of `judgement`."""
+"""One kind of fault a file, all with the interface of `judgement`."""
