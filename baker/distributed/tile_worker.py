@@ -9,16 +9,19 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
-from baker.core.parallel import Part
+from baker.core.parallel import Part, TileRunner
 from baker.core.progress import Progress, silent
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+
+if TYPE_CHECKING:
+    from baker.pipeline.world import World
 
 Span = tuple[int, int]
 Result = list[tuple[int, int, Part]]
@@ -37,7 +40,7 @@ class TileWorker:
     atlas: Atlas
     settings: BakeSettings
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _world: Any = None
+    _world: World | None = None
     _made: dict[str, Any] = field(default_factory=dict)
 
     def work(self, stage: str, arrays: Mapping[str, NDArray[Any]], spans: list[Span]) -> Result:
@@ -67,7 +70,7 @@ class TileWorker:
         STAGES[stage](self.scene, world, made, self.settings, run)
         return found
 
-    def _build(self, inside: NDArray[np.uint16]) -> Any:
+    def _build(self, inside: NDArray[np.uint16]) -> World:
         from baker.pipeline.record import Record
         from baker.pipeline.world import prepare
 
@@ -76,28 +79,28 @@ class TileWorker:
         return replace(world, kept=None)
 
 
-def _no_more(world: Any, arrays: Mapping[str, NDArray[Any]]) -> None:
+def _no_more(world: World, arrays: Mapping[str, NDArray[Any]]) -> None:
     return None
 
 
-def _make_patches(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def _make_patches(world: World, arrays: Mapping[str, NDArray[Any]]) -> Any:
     from baker.radiosity.patches import build_patches
 
     patches = build_patches(world.texels, arrays["depth"], link=world.sides.link)
     return patches, world.sides.seen_patches(patches.patch)
 
 
-def _make_image(world: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def _make_image(world: World, arrays: Mapping[str, NDArray[Any]]) -> Any:
     return world.sides.seen_light(np.array(arrays["exitance"])), arrays["exact"]
 
 
-def _direct(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:
+def _direct(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
     from baker.pipeline.transport import light_directly
 
     light_directly(scene, world, settings, silent, run)
 
 
-def _form_factors(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:
+def _form_factors(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
     from baker.pipeline.transport import patch_rays
     from baker.radiosity.form_factors import cast_rows
 
@@ -118,26 +121,26 @@ def _form_factors(scene: Scene, world: Any, made: Any, settings: BakeSettings, r
     )
 
 
-def _gather(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:
+def _gather(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
     from baker.pipeline.transport import gather_light
 
     gather_light(world, made, settings, silent, run)
 
 
-def _open(scene: Scene, world: Any, made: Any, settings: BakeSettings, run: Any) -> None:
+def _open(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
     from baker.pipeline.transport import open_sky
 
     open_sky(world, settings, silent, run)
 
 
 # What a stage needs beyond the world, made once, and the stage itself, for some tiles.
-PREPARE: dict[str, Callable[[Any, Mapping[str, NDArray[Any]]], Any]] = {
+PREPARE: dict[str, Callable[[World, Mapping[str, NDArray[Any]]], Any]] = {
     "direct light": _no_more,
     "form factors": _make_patches,
     "final gather": _make_image,
     "ambient occlusion": _no_more,
 }
-STAGES: dict[str, Callable[[Scene, Any, Any, BakeSettings, Any], None]] = {
+STAGES: dict[str, Callable[[Scene, World, Any, BakeSettings, TileRunner], None]] = {
     "direct light": _direct,
     "form factors": _form_factors,
     "final gather": _gather,

@@ -1,14 +1,14 @@
+"""JUnit reports: counts, escapes, and files that are whole or not there."""
+
 from __future__ import annotations
 
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 from baker.core.errors import ResourceError
 from baker.io.junit import Case, junit_text, write_text
-from baker.metrics.flip import flip_error
 
 
 def test_junit_counts_and_escapes():
@@ -30,19 +30,3 @@ def test_a_report_is_whole_or_not_there(tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ResourceError, match="report"):
         write_text(tmp_path / "file" / "r.xml", "text")
-
-
-def test_flip_of_equal_pictures_is_nothing_and_grows():
-    image = np.random.default_rng(0).random((24, 24, 3)).astype(np.float32)
-    means = [flip_error(image, image * factor)[1] for factor in (1.0, 1.1, 2.0)]
-    assert means[0] == 0
-    assert 0 < means[1] < means[2] < 1
-    error, mean = flip_error(image[..., :1], image[..., :1])
-    assert error.shape == (24, 24)
-    assert mean == 0
-
-
-def test_flip_of_black():
-    black, grey = np.zeros((8, 8, 3), np.float32), np.full((8, 8, 3), 0.5, np.float32)
-    assert flip_error(black, black)[1] == 0
-    assert flip_error(black, grey)[1] == 1

@@ -1,0 +1,69 @@
+"""Locks of output folders end with their process, and what dead writers left is swept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+from baker.io.bake.lock import OutputLock, dead_writers, sweep
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from baker.io.bake.lock import OutputLock
+lock = OutputLock(Path(sys.argv[1]))
+print(lock.acquire(), flush=True)
+time.sleep(60)
+"""
+
+
+def test_one_holds_it_and_leaves_nothing(tmp_path):
+    out = tmp_path / "deep" / "out"
+    first, second = OutputLock(out), OutputLock(out)
+    assert first.acquire()
+    assert not second.acquire()
+    assert OutputLock(tmp_path / "deep" / "other").acquire()
+    first.release()
+    assert second.acquire()
+    second.release()
+    (tmp_path / "deep" / ".other.baker.lock").unlink()
+    assert list((tmp_path / "deep").iterdir()) == []
+
+
+def test_folders_made_for_nothing_are_removed(tmp_path):
+    lock = OutputLock(tmp_path / "a" / "b" / "out")
+    assert lock.acquire()
+    lock.release()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_holder_does_not_leave_it_locked(tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", HOLDER, str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "True\n"
+    lock = OutputLock(out)
+    assert not lock.acquire()
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert lock.acquire()
+    lock.release()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_leavings_of_the_dead_are_swept(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    out = tmp_path / "out"
+    half, old = tmp_path / f".out.baker-{dead.pid}-0123abcd", tmp_path / f".out.baker-{dead.pid}-0123abcd-old"
+    living = tmp_path / f".out.baker-{os.getpid()}-0123abcd"
+    other = tmp_path / f".out2.baker-{dead.pid}-0123abcd"
+    for folder in (half, old, living, other):
+        folder.mkdir()
+    (old / "bake.json").write_text("yesterday")
+    assert dead_writers(out) == {dead.pid}
+    sweep(out)
+    assert sorted(tmp_path.iterdir()) == sorted([out, living, other])
+    assert (out / "bake.json").read_text() == "yesterday", "it was moved aside and comes back"
