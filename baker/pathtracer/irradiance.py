@@ -70,6 +70,7 @@ def irradiance_pass(
         out = np.zeros((end - begin, 3))
         places = (position[rows], normal[rows], face_normal[rows])
         if how.both:
+            # Here: other estimators need not load its kernels.
             from baker.pathtracer.bidirectional_pass import surface_tile
 
             counted[begin // _TILE] = surface_tile(reference, places, begin, net, setting, out)

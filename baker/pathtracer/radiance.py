@@ -52,6 +52,7 @@ def radiance_pass(
     net = sobol_reversed(samples, seed, 1 + number)
     setting = path_setting(how, how.strata, max_bounces, seed, number)
     if how.both:
+        # Here: other estimators need not load its kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
         picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
