@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from baker.checks.emission import Emission
 from baker.checks.scene_rays import World
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.scene import PunctualLight, Scene
 from baker.core.settings import BakeSettings
 
 # Receivers, a multiple of 16; rays from each to emissive surfaces, and into the sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
 
 @dataclass(frozen=True)

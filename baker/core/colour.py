@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+# Weights of red, green and blue in the luminance of a linear Rec. 709 colour (ITU-R BT.709, item 3.2).
+LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
+
 
 def linear_from_srgb(value: NDArray[Any]) -> NDArray[np.float32]:
     """Return linear Rec.709 values of sRGB-encoded ones, any shape, both 0 to 1."""

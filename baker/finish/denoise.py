@@ -27,6 +27,7 @@ import contextlib
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.progress import Progress, silent
 from baker.finish.kernels.page_charts import chart_sums
 from baker.finish.kernels.page_fill import nearest_texel, reflect_outwards
@@ -54,7 +55,7 @@ _BORDER_TEXELS = 4096
 FITTED = 1.2
 # Charts so many times brighter or darker than the page's median are filtered as if they were not.
 LEVEL = 8.0
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 
 
 def denoise_page(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.geometry import Geometry
 from baker.kernels.emitters import (
     AREA,
@@ -33,7 +34,7 @@ from baker.kernels.emitters import (
 from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # At most so many clusters are weighed for every tile of texels.
 MAX_CLUSTERS = 256
 # Parts that all textured triangles together are cut into, beside what they were.

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.sampling import triangle_barycentric
@@ -23,7 +24,7 @@ from baker.lights.emissive import build_emitters
 from baker.lights.point import range_window
 from baker.trace.jit import inner
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Columns of an emissive triangle or part of one: three corners, face normal, area, two-sided, chance,
 # radiance without texture, textured, which part it is (see `kernels.emitters`).
 CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED, INSIDE = 0, 9, 12, 13, 14, 15, 18, 19

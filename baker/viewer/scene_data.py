@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Material, Texture
@@ -20,7 +21,7 @@ from baker.io.bake.read_bake import StoredBake
 from baker.shading.materials import corner_uv, vertex_colour
 
 # Rec.709 luminance.
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 _TYPES = {"float32": "float", "uint32": "uint"}
 
 

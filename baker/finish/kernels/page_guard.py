@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Kernels that hold a denoised page to what its noisy samples allow.
 
 A denoiser may remove noise, not light: over a small in-chart window the difference between noisy and
@@ -12,6 +13,7 @@ import math
 
 import numpy as np
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.trace.jit import kernel, larger, scratch, smaller
 
 RADIUS = 2
@@ -23,11 +25,12 @@ TEXEL_SIGMAS = 5.0
 OWN_ERROR = 0.005
 # The same within two texels of a chart's border, where partly covered texels step from row to row.
 OWN_ERROR_BORDER = 0.02
+_RED, _GREEN, _BLUE = LUMINANCE_WEIGHTS
 _three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
 
 
 @kernel
-def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no-untyped-def]
+def high_pass(grey, chart, covered, out, first_row, end_row):
     """Filter a page by the kernel that is blind to planes, [1 -2 1; -2 4 -2; 1 -2 1] / 6.
 
     For white noise the result has the noise's own standard deviation.
@@ -60,7 +63,7 @@ def high_pass(grey, chart, covered, out, first_row, end_row):  # type: ignore[no
 
 
 @kernel
-def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):  # type: ignore[no-untyped-def]
+def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):
     """Correct a denoised page where it leaves the noisy one by more than noise explains.
 
     Parameters
@@ -103,9 +106,9 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
             mean_error = texel_error * math.sqrt(sww) / sw
             grey = (
-                0.2126 * float(denoised[r, c, 0])
-                + 0.7152 * float(denoised[r, c, 1])
-                + 0.0722 * float(denoised[r, c, 2])
+                _RED * float(denoised[r, c, 0])
+                + _GREEN * float(denoised[r, c, 1])
+                + _BLUE * float(denoised[r, c, 2])
             )
             for j in range(3):
                 # A channel's noise stands to its value as the luminance's does to the luminance.
