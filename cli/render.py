@@ -129,6 +129,7 @@ def work(
             threads=resolved.threads,
         )
         check_image(out, layers)
+        session.will_write(str(out))
         picture = render(scene, wanted, progress)
         write_picture(out, picture)
     rate = picture.rays / max(picture.seconds, 1e-9) / 1e6

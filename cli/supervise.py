@@ -177,12 +177,12 @@ class _Watch:
         return self._tell("resource", f"{why}; {hint}", RESOURCE)
 
     def _tidy(self) -> None:
-        from baker.cli.leftovers import remove_leftovers
+        from baker.cli.leftovers import restore
 
         lines = os.pread(self.notes, os.fstat(self.notes).st_size, 0).splitlines(keepends=True)
         for line in lines:
             if line.endswith(b"\n"):
-                remove_leftovers(line)
+                restore(line)
 
     def _tell(self, kind: str, message: str, code: int) -> int:
         sys.stderr.write(f"baker: {message}\n")

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from baker.batch.jobs_file import Job
 from baker.core.child_process import start_module
 from baker.io.bake.output_folder import remove_leftovers
+from baker.io.temporary import temporaries
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,8 @@ class _Worker:
                 with contextlib.suppress(OSError):
                     pipe.close()
         if job is not None and job.out is not None:
-            remove_leftovers(job.out, self.process.pid)
+            left = [found for found in temporaries(job.out) if found.process == self.process.pid]
+            remove_leftovers(job.out, left)
 
 
 def _death(status: int) -> dict[str, Any]:

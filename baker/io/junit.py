@@ -5,14 +5,12 @@ Based on: the junit-10.xsd of the Jenkins xUnit plugin.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from baker.core.errors import ResourceError
+from baker.io.temporary import write_atomically
 
 
 @dataclass(frozen=True)
@@ -70,16 +68,4 @@ def write_text(path: Path, text: str) -> None:
     ResourceError
         If it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            Path(name).chmod(0o644)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise ResourceError(f"the report cannot be written ({error.strerror})", file=str(path)) from None
+    write_atomically(path, text.encode(), "report")

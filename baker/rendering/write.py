@@ -7,7 +7,6 @@ an ambient occlusion picture is stored as it is, without any curve. The file say
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Collection
 from importlib.metadata import version
 from pathlib import Path
@@ -15,9 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.errors import ResourceError, SettingsError
 from baker.encodings.exr import encode_layers
 from baker.io.png import encode_png, grey_levels, srgb_levels
+from baker.io.temporary import atomic_path
 from baker.rendering.render import Picture
 
 SUFFIXES = (".exr", ".png")
@@ -56,23 +57,12 @@ def write_picture(path: Path, picture: Picture) -> None:
     ResourceError
         If it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
-        os.close(handle)
-        try:
-            if path.suffix.lower() == ".png":
-                text = {"tone mapping": tone_of(path, picture) or "", "software": _signature()}
-                Path(name).write_bytes(encode_png(tone_mapped(picture), text))
-            else:
-                encode_layers(Path(name), exr_layers(picture), header=_header(picture))
-            Path(name).chmod(0o644)
-            Path(name).replace(path)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise ResourceError(f"the picture cannot be written ({error.strerror})", file=str(path)) from None
+    with atomic_path(path, "picture") as temporary:
+        if path.suffix.lower() == ".png":
+            text = {"tone mapping": tone_of(path, picture) or "", "software": _signature()}
+            temporary.write_bytes(encode_png(tone_mapped(picture), text))
+        else:
+            encode_layers(temporary, exr_layers(picture), header=_header(picture))
 
 
 def tone_of(path: Path, picture: Picture) -> str | None:
@@ -87,7 +77,7 @@ def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
     colour = picture.colour
     if picture.unit == "1":
         return grey_levels(colour)
-    luminance = colour @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    luminance = colour @ np.array(LUMINANCE_WEIGHTS, np.float32)
     lit = luminance[luminance > 0]
     middle = float(np.median(lit)) if lit.size else 1.0
     return srgb_levels(colour / (colour + np.float32(middle)))

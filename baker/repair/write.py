@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import secrets
-import shutil
 from pathlib import Path
 
 from baker.core.errors import ResourceError, SettingsError
+from baker.io.temporary import write_atomically
 
 
 def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
@@ -52,16 +51,4 @@ def write_fixed(out: Path, data: bytes) -> None:
     ResourceError
         If it cannot be written; what was there before is as it was.
     """
-    target = out.resolve()
-    # A folder of this name is what the supervising process removes if this one is killed.
-    folder = target.with_name(f".{target.name}.baker-{os.getpid()}-{secrets.token_hex(4)}")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        folder.mkdir()
-        try:
-            (folder / target.name).write_bytes(data)
-            (folder / target.name).replace(target)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
-    except OSError as error:
-        raise ResourceError(f"the mended scene cannot be written ({error.strerror})", file=str(out)) from None
+    write_atomically(out, data, "mended scene")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 def bake(scene, *, out, settings, progress, force):
     out = Path(out)
-    temporary = out.with_name(f".{out.name}.baker-0123abcd")
+    temporary = out.with_name(f".{out.name}.baker-{os.getpid()}-0123abcd")
     temporary.mkdir(parents=True)
     (temporary / "half.exr").write_bytes(b"half")
     if HOW == "swapped" and out.exists():

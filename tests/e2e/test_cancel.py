@@ -70,7 +70,7 @@ def test_stop_is_quick_and_clean(how, number, tmp_path):
 
 
 def test_hard_end_leaves_folders_of_others_and_removes_parents_it_made(tmp_path):
-    other = tmp_path / ".out.baker-ffff0000"
+    other = tmp_path / ".out.baker-1-ffff0000"
     other.mkdir()
     process = subprocess.Popen(
         [sys.executable, str(FAKE), "deaf", "bake", "s.glb", "-o", "out"], cwd=tmp_path

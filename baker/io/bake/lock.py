@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from baker.core.errors import ResourceError
 from baker.io.bake.output_folder import remove_leftovers
+from baker.io.temporary import temporaries
 
 
 class OutputLock:
@@ -99,20 +99,13 @@ def held(out: Path) -> Iterator[None]:
 
 def sweep(out: Path) -> None:
     """Remove what runs that were killed left of a bake into `out`; call it with the lock held."""
-    for process in dead_writers(out):
-        remove_leftovers(out, process)
+    dead = dead_writers(out)
+    remove_leftovers(out, [found for found in temporaries(out) if found.process in dead])
 
 
 def dead_writers(out: Path) -> set[int]:
     """Return the ids of processes that left temporary folders of `out` and no longer live."""
-    folder = out.resolve()
-    found = set()
-    for home, prefix in ((folder.parent, f".{folder.name}"), (folder, "")):
-        pattern = re.compile(re.escape(prefix) + r"\.baker-(\d+)-[0-9a-f]+(-old)?")
-        with contextlib.suppress(OSError):
-            matches = [pattern.fullmatch(path.name) for path in home.iterdir()]
-            found |= {int(match.group(1)) for match in matches if match}
-    return {process for process in found if not _alive(process)}
+    return {found.process for found in temporaries(out) if not _alive(found.process)}
 
 
 def _alive(process: int) -> bool:

@@ -7,16 +7,16 @@ be renamed (a mount point, the current folder) the files are exchanged one by on
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import json
 import os
-import secrets
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
 from baker.core.errors import ResourceError, SettingsError
+from baker.io.temporary import Temporary, old_path, temporary_path
 
 MANIFEST_NAME = "bake.json"
 AS_BAKED = "as baked"
@@ -87,7 +87,7 @@ class OutputFolder:
     """Collects the files of a bake in `path` until `commit` puts them in place.
 
     Use it as a context manager: leaving it without `commit`, by whatever exception, removes the temporary
-    folder. `abort` may also be called from elsewhere (a second Ctrl-C) and more than once.
+    folder. `abort` may be called more than once.
 
     Parameters
     ----------
@@ -103,12 +103,8 @@ class OutputFolder:
     def __init__(self, out: Path) -> None:
         self.out = out.resolve()
         self._in_place = self.out.is_dir() and _cannot_move(self.out)
-        suffix = f"baker-{os.getpid()}-{secrets.token_hex(4)}"
-        if self._in_place:
-            self.path = self.out / f".{suffix}"
-        else:
-            self.path = self.out.with_name(f".{self.out.name}.{suffix}")
-        self._aside = self.path.with_name(self.path.name + "-old")
+        self.path = temporary_path(self.out, inside=self._in_place)
+        self._aside = old_path(self.path)
         self._journal: list[tuple[Path, Path]] = []
         self._made: list[Path] = []
 
@@ -196,28 +192,32 @@ class OutputFolder:
             raise
 
 
-def remove_leftovers(out: Path, process: int) -> None:
-    """Clean up after a process that was killed while it wrote: the old bake comes back, if it was moved.
+def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
+    """Clean up after a process that was killed while it wrote: the old files come back, if they were moved.
 
     Parameters
     ----------
     out : Path
-        The output folder it wrote to.
-    process : int
-        Its id; what other processes are writing is left alone.
+        The output folder, or the file, it wrote to.
+    left : iterable of Temporary
+        Its temporary folders, among those that `temporaries` finds.
     """
-    folder = out.resolve()
-    for home, prefix in ((folder.parent, f".{folder.name}"), (folder, "")):
-        if not home.is_dir():
-            continue
-        for path in sorted(home.glob(f"{glob.escape(prefix)}.baker-{process}-*"), reverse=True):
-            if path.name.endswith("-old") and not (folder / MANIFEST_NAME).exists():
-                if home != folder and not folder.exists():
-                    path.rename(folder)
-                elif home == folder:
-                    for file in [p for p in path.rglob("*") if p.is_file()]:
-                        file.replace(folder / file.relative_to(path))
-            shutil.rmtree(path, ignore_errors=True)
+    target, left = out.resolve(), list(left)
+    for temporary in left:
+        if temporary.old:
+            _put_back(temporary.path, target)
+    for temporary in left:
+        shutil.rmtree(temporary.path, ignore_errors=True)
+
+
+def _put_back(aside: Path, target: Path) -> None:
+    if aside.parent != target:
+        if not target.exists():
+            aside.rename(target)
+    elif not (target / MANIFEST_NAME).exists():
+        # The manifest is exchanged last: without it the new files are not all there.
+        for path in sorted(path for path in aside.rglob("*") if path.is_file()):
+            path.replace(target / path.relative_to(aside))
 
 
 def _cannot_move(folder: Path) -> bool:

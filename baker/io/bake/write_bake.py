@@ -15,11 +15,11 @@ from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.io.bake.manifest import make_manifest, manifest_text
-from baker.io.bake.output_folder import MANIFEST_NAME, OutputFolder, check_out, remove_leftovers
+from baker.io.bake.output_folder import MANIFEST_NAME, OutputFolder, check_out
 from baker.io.gltf.write_baked import make_glb
 from baker.io.png import encode_palette_png, encode_png, grey_levels
 
-__all__ = ["OutputFolder", "check_out", "remove_leftovers", "write_bake"]
+__all__ = ["check_out", "write_bake"]
 
 # Colours told apart in grey and by eyes that mix red and green.
 STATUS_COLOURS = {
@@ -46,7 +46,6 @@ def write_bake(
     force: bool = False,
     progress: Progress = silent,
     created: datetime | None = None,
-    open_folders: list[OutputFolder] | None = None,
 ) -> dict[str, Any]:
     """Write a bake to `out`, all of it or nothing.
 
@@ -61,9 +60,6 @@ def write_bake(
         Is told of each file; may cancel.
     created : datetime or None
         Time to write into the manifest; None is now.
-    open_folders : list of OutputFolder or None
-        The folder at work is appended here while it is open, so that a program that has to stop at once can
-        call `abort` on it.
 
     Returns
     -------
@@ -80,11 +76,8 @@ def write_bake(
         If `progress` says so; the folder is then as it was.
     """
     check_out(out, force=force, scene_path=result.scene.path)
-    folder = OutputFolder(out)
-    if open_folders is not None:
-        open_folders.append(folder)
     try:
-        with folder:
+        with OutputFolder(out) as folder:
             manifest = _write_files(result, folder, progress, created)
             folder.commit()
     except OSError as error:
@@ -94,9 +87,6 @@ def write_bake(
     except ResourceError as error:
         # The file named by the error lay in the temporary folder, which is gone.
         raise ResourceError(error.message, file=str(out)) from error
-    finally:
-        if open_folders is not None:
-            open_folders.remove(folder)
     return manifest
 
 

@@ -22,7 +22,9 @@ from baker.encodings.exr import decode_exr
 from baker.io.bake import output_folder
 from baker.io.bake import write_bake as output
 from baker.io.bake.manifest import manifest_schema
-from baker.io.bake.write_bake import OutputFolder, check_encodings, check_out, remove_leftovers, write_bake
+from baker.io.bake.output_folder import OutputFolder, check_out, remove_leftovers
+from baker.io.bake.write_bake import check_encodings, write_bake
+from baker.io.temporary import Temporary, temporaries
 
 NOON = datetime(2024, 1, 2, 12, 0, tzinfo=UTC)
 NAMES = ["ao_0.exr", "bake.json", "irradiance_0.exr", "scene.glb", "status_0.png"]
@@ -35,6 +37,10 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 def names(folder: Path) -> list[str]:
     return sorted(p.name for p in folder.iterdir())
+
+
+def left_by(out: Path, process: int) -> list[Temporary]:
+    return [found for found in temporaries(out) if found.process == process]
 
 
 def test_the_folder_holds_what_was_baked(tmp_path: Path) -> None:
@@ -248,23 +254,6 @@ def test_the_current_folder_is_written_file_by_file(tmp_path: Path, monkeypatch:
     assert names(out) == sorted([*NAMES, "notes.txt"])
 
 
-def test_open_folders_can_be_given_up_from_outside(tmp_path: Path) -> None:
-    open_folders: list[OutputFolder] = []
-
-    def stop(stage: str, fraction: float, detail: str = "", /) -> bool:
-        (folder,) = open_folders
-        assert folder.path.is_dir()
-        folder.abort()
-        folder.abort()
-        assert not folder.path.exists()
-        return True
-
-    with pytest.raises(Cancelled):
-        write_bake(quad_result(tmp_path / "in"), tmp_path / "out", progress=stop, open_folders=open_folders)
-    assert open_folders == []
-    assert names(tmp_path) == ["in"]
-
-
 @pytest.mark.parametrize("killed_after", [0, 1, 2])
 @pytest.mark.parametrize("inside", [False, True])
 def test_what_a_killed_process_left_is_cleaned_up(
@@ -295,9 +284,9 @@ def test_what_a_killed_process_left_is_cleaned_up(
         else:
             write_bake(result, out, created=NOON)
     assert any(".baker-" in name for name in names(out if inside else tmp_path))
-    remove_leftovers(out, os.getpid() + 1)
+    remove_leftovers(out, left_by(out, os.getpid() + 1))
     assert any(".baker-" in name for name in names(out if inside else tmp_path)), "another process's"
-    remove_leftovers(out, os.getpid())
+    remove_leftovers(out, left_by(out, os.getpid()))
     assert tree(out) == before
     assert names(tmp_path) == ["in", "out"]
     assert names(out) == NAMES

@@ -1,0 +1,109 @@
+"""Temporary folders that files are written into before they are moved to their place, and their names.
+
+The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or
+`.baker-{process}-{random hex digits}` in it where `out` is a folder that cannot be moved. What the output
+replaces waits in a folder of the same name with `-old` at its end until the new files are in place.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from baker.core.errors import ResourceError
+
+_NAME = re.compile(r"\.baker-(\d+)-[0-9a-f]+(-old)?")
+
+
+@dataclass(frozen=True)
+class Temporary:
+    """A temporary folder that was found.
+
+    Attributes
+    ----------
+    path : Path
+    process : int
+        Id of the process that made it.
+    old : bool
+        It holds files that were about to be replaced.
+    """
+
+    path: Path
+    process: int
+    old: bool
+
+
+def temporary_path(out: Path, *, inside: bool = False) -> Path:
+    """Return the name of a new temporary folder for `out`, an absolute path; `inside` of it or beside it."""
+    suffix = f".baker-{os.getpid()}-{secrets.token_hex(4)}"
+    return out / suffix if inside else out.with_name(f".{out.name}{suffix}")
+
+
+def old_path(temporary: Path) -> Path:
+    """Return the folder for what the files in `temporary` replace."""
+    return temporary.with_name(temporary.name + "-old")
+
+
+def temporaries(out: Path) -> list[Temporary]:
+    """Return all temporary folders for `out`, of any process, by name; none where they cannot be listed."""
+    target = out.resolve()
+    found = []
+    for home, prefix in ((target.parent, f".{target.name}"), (target, "")):
+        with contextlib.suppress(OSError):
+            for path in sorted(home.iterdir()):
+                match = (
+                    _NAME.fullmatch(path.name.removeprefix(prefix)) if path.name.startswith(prefix) else None
+                )
+                if match:
+                    found.append(Temporary(path, int(match.group(1)), match.group(2) is not None))
+    return found
+
+
+@contextlib.contextmanager
+def atomic_path(path: Path, what: str) -> Iterator[Path]:
+    """Yield the name of a file to write, which takes the place of `path` at the end of the `with` block.
+
+    Parameters
+    ----------
+    path : Path
+        Its parents are made. If the block ends with an exception, a file there is as it was.
+    what : str
+        What the file is, for the error message: "picture".
+
+    Yields
+    ------
+    Path
+        A name with the same suffix, in a temporary folder beside `path`.
+
+    Raises
+    ------
+    ResourceError
+        If it cannot be written.
+    """
+    try:
+        target = path.resolve()
+        folder = temporary_path(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir()
+        try:
+            yield folder / path.name
+            (folder / path.name).replace(target)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+    except OSError as error:
+        raise ResourceError(f"the {what} cannot be written ({error.strerror})", file=str(path)) from None
+    except ResourceError as error:
+        # The file named by the error lay in the temporary folder, which is gone.
+        raise ResourceError(error.message, file=str(path)) from error
+
+
+def write_atomically(path: Path, data: bytes, what: str) -> None:
+    """Write a file so that it is either whole or as it was before; see `atomic_path`."""
+    with atomic_path(path, what) as temporary:
+        temporary.write_bytes(data)
