@@ -29,7 +29,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Found:
-    """What a check function yields; the check's own severity and advice are added by `run_checks`.
+    """What a check function yields; the check's own severity and advice are added by `run_check`.
 
     Attributes
     ----------

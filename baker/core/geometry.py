@@ -24,10 +24,8 @@ class Geometry:
     position : (V, 3) float32, metres, world, relative to `origin`
     normal : (V, 3) float32, unit shading normals, world
     uv : (V, 2) float32, lightmap uv of the page, 0 to 1
-    vertex_instance : (V,) int32
     vertex_source : (V,) int32, the mesh vertex each came from
     triangle : (T, 3) int32, counter-clockwise seen from the front
-    corner : (T, 3) int32, mesh vertex of each corner (same order as `triangle`)
     face_normal : (T, 3) float32, unit
     area : (T,) float32, m2
     page, instance, chart, material : (T,) int32

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from functools import cache
-from importlib.metadata import PackageNotFoundError, files, version
+from importlib.metadata import PackageNotFoundError, files
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,11 +90,6 @@ def embree_version() -> str:
     number = int(library.rtcGetDeviceProperty(device, _PROPERTY_VERSION))
     library.rtcReleaseDevice(device)
     return f"{number // 10000}.{number // 100 % 100}.{number % 100}"
-
-
-def embreex_version() -> str:
-    """Return the version of the wheel that carries Embree."""
-    return version("embreex")
 
 
 class Tracer(NamedTuple):

@@ -62,11 +62,6 @@ class _Piece:
     kept: bool
 
 
-def write_glb(path: Path, scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None) -> None:
-    """Write the baked scene to `path`; see `make_glb`."""
-    path.write_bytes(make_glb(scene, atlas, ao_png).data)
-
-
 def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None) -> GlbFile:
     """Build the GLB of a baked scene in memory.
 

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Places chart outlines in a page: conservative outlines, then first fit from the bottom up.
 
 An outline is one texel span per row, so a free place is found by jumping from occupied run to
@@ -15,7 +16,7 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 
 @kernel
-def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):  # type: ignore[no-untyped-def]
+def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
     """Write the span of texels that each row of each shape touches.
 
     Parameters
@@ -62,7 +63,7 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):  
 
 
 @inner
-def _fill(next_used, next_free, y, start, end):  # type: ignore[no-untyped-def]
+def _fill(next_used, next_free, y, start, end):
     """Mark texels `start` to `end` of row `y` as used."""
     width = next_used.shape[1] - 1
     after = next_free[y, end + 1] if end + 1 < width else width
@@ -80,7 +81,7 @@ def _fill(next_used, next_free, y, start, end):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):  # type: ignore[no-untyped-def]
+def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
     """Return (x, y) of the lowest, then leftmost free place, or (-1, -1)."""
     height = next_used.shape[0]
     width = next_used.shape[1] - 1
@@ -107,13 +108,14 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):  # ty
 
 
 @kernel
-def place(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):  # type: ignore[no-untyped-def]
+def place(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):
     """Place items one after the other; stop at the first that has no place.
 
     Parameters
     ----------
     next_used, next_free : (H, W + 1) int16
-        The page: next used and next free column at or after each column; see `empty_page`.
+        The page: next used and next free column at or after each column.
+        On an empty page the first is W everywhere and the second each column itself.
     order : (N,) int64
         Items to place, in this order.
     item_shape : (I,) int64
