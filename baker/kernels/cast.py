@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Casts given rays and tells the triangle and the distance of each first hit."""
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from baker.trace.packets import GEOM_ID, NO_HIT, PRIM_ID, TFAR, TNEAR, set_ray, 
 
 
 @njit(cache=True, nogil=True)
-def first_hits(caster, origin, way, near, far, triangle, distance):  # type: ignore[no-untyped-def]
+def first_hits(caster, origin, way, near, far, triangle, distance):
     """Trace n rays.
 
     origin, way : (n, 3) float32; near, far : (n,) float32, in units of the direction's length

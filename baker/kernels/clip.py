@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Triangles cut by the square of a texel: area, and points uniform in what is left.
 
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
@@ -19,7 +20,7 @@ new_polygon = scratch((MAX_CORNERS, 2), np.float64)
 
 
 @inner
-def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
+def clip_to_square(corner, x0, y0, out, spare):
     """Cut a triangle (3, 2) by the unit square at (x0, y0); return the corner count of `out`.
 
     `out` and `spare` are (MAX_CORNERS, 2) float64 working memory.
@@ -54,7 +55,7 @@ def clip_to_square(corner, x0, y0, out, spare):  # type: ignore[no-untyped-def]
 
 
 @inner
-def polygon_area(corner, n):  # type: ignore[no-untyped-def]
+def polygon_area(corner, n):
     """Return the area of the convex polygon of the first n corners (never negative)."""
     twice = 0.0
     for i in range(1, n - 1):
@@ -66,7 +67,7 @@ def polygon_area(corner, n):  # type: ignore[no-untyped-def]
 
 
 @inner
-def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
+def polygon_point(corner, n, u, v):
     """Return the point (x, y) that a uniform (u, v) of the unit square maps to, uniform in the polygon."""
     if n < 3:
         x = 0.0
@@ -91,7 +92,7 @@ def polygon_point(corner, n, u, v):  # type: ignore[no-untyped-def]
 
 
 @inner
-def square_touches(corner, x0, y0):  # type: ignore[no-untyped-def]
+def square_touches(corner, x0, y0):
     """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 square inside."""
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]

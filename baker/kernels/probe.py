@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """A few rays from points of texels to find those that lie inside other geometry."""
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ ELSEWHERE = 16
 
 
 @kernel
-def inside_hits(origin, normal, table, tells, caster, begin, net, shared, rays_per_point, proof, hits):  # type: ignore[no-untyped-def]
+def inside_hits(origin, normal, table, tells, caster, begin, net, shared, rays_per_point, proof, hits):
     """Count what the rays of points say about being inside, until that is clear.
 
     origin, normal : (m, w, 3) float32; every point casts `rays_per_point` cosine-weighted rays

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Hemisphere rays of sixteen texels at a time, in loops that the compiler turns into vector code.
 
 What depends on the texel's point only (origin and tangent frame) is kept by lane in rows of `frame`;
@@ -22,7 +23,7 @@ new_frame = scratch((FRAME_ROWS * LANES,), np.float32)
 
 
 @inner
-def lane_seeds(first, lanes, salt, seeds):  # type: ignore[no-untyped-def]
+def lane_seeds(first, lanes, salt, seeds):
     """Write the two scramble seeds of items first to first + lanes to `seeds` (2 * 16,) uint32."""
     for lane in range(lanes):
         seeds[lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt))
@@ -30,7 +31,7 @@ def lane_seeds(first, lanes, salt, seeds):  # type: ignore[no-untyped-def]
 
 
 @inner
-def load_frames(rays, frame, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
+def load_frames(rays, frame, origin, normal, group, lanes, k):
     """Write origins of point k of texels group to group + lanes to `rays`, tangent frames to `frame`.
 
     origin, normal : (n, w, 3) float32; rays : (21 * 16,) float32; frame : (9 * 16,) float32
@@ -48,7 +49,7 @@ def load_frames(rays, frame, origin, normal, group, lanes, k):  # type: ignore[n
 
 
 @inner
-def aim_lanes(rays, words, frame, seeds, first, second, shared, far):  # type: ignore[no-untyped-def]
+def aim_lanes(rays, words, frame, seeds, first, second, shared, far):
     """Write the cosine-weighted directions of one sample into all lanes.
 
     first, second : uint32, the sample's bit-reversed Sobol numbers; shared : uint32, see `sampling`

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """The surface as kernels see it, and the points in a texel that rays start from.
 
 Each texel has 16 points, uniform in the area that its triangles take of its square, stratified by a
@@ -60,7 +61,7 @@ class Surface(NamedTuple):
 
 
 @inner
-def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
+def inverse_uv(uv, triangle, size, t):
     """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f of triangle t for texel-space (x, y)."""
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     ax, ay = float(uv[i0, 0]) * size, float(uv[i0, 1]) * size
@@ -76,7 +77,7 @@ def inverse_uv(uv, triangle, size, t):  # type: ignore[no-untyped-def]
 
 
 @inner
-def offset_step(x, y, z, size, least):  # type: ignore[no-untyped-def]
+def offset_step(x, y, z, size, least):
     """Return how far a ray origin at (x, y, z) leaves a triangle of this size, metres.
 
     size : largest edge component of the triangle; least : see `Surface`
@@ -86,7 +87,7 @@ def offset_step(x, y, z, size, least):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  # type: ignore[no-untyped-def]
+def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):
     """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
 
     p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; least : see `Surface`
@@ -143,7 +144,7 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):  
 
 
 @inner
-def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-def]
+def load_flat(p, m, face, triangle, t, sign, row):
     """Tell if all of triangle t is shaded with its face normal.
 
     row : (5, 3) float64, becomes what `place_flat` needs: corner 0, the edges from it, the normal times sign,
@@ -164,7 +165,7 @@ def load_flat(p, m, face, triangle, t, sign, row):  # type: ignore[no-untyped-de
 
 
 @inner
-def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-untyped-def]
+def place_flat(row, least, b1, b2, origin, normal, n, k):
     """Do the work of `place` for a point inside a flat triangle, away from its border."""
     px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
     py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
@@ -179,7 +180,7 @@ def place_flat(row, least, b1, b2, origin, normal, n, k):  # type: ignore[no-unt
 
 
 @kernel
-def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):  # type: ignore[no-untyped-def]
+def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):
     """Write points of texel entries: origin and normal (m, w, 3) float32, world.
 
     mask : (n,) uint16, bit k is set where point k of a texel is not buried; a buried point is replaced
@@ -262,7 +263,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
 
 
 @inner
-def free_point(bits, k):  # type: ignore[no-untyped-def]
+def free_point(bits, k):
     """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
     bits = np.int64(bits)
     k = np.int64(k)

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """What each texel is made of: centre, normal, area and albedo from the triangles inside it."""
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _shares = scratch((N_POINTS,), np.float64)
 
 
 @kernel
-def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):  # type: ignore[no-untyped-def]
+def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):
     """Fill the geometry of front entries begin to end.
 
     triangle_scale : (T,) float32, m2 of surface per texel of uv
@@ -66,7 +67,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
 
 
 @inner
-def _centroid(polygon, n):  # type: ignore[no-untyped-def]
+def _centroid(polygon, n):
     """Return the area centroid of a convex polygon; the mean of its corners if it has no area."""
     total = polygon_area(polygon, n)
     x = y = 0.0
@@ -88,7 +89,7 @@ def _centroid(polygon, n):  # type: ignore[no-untyped-def]
 
 
 @inner
-def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
+def uv_at(uv, triangle, t, b1, b2):
     """Interpolate a per-vertex (V, 2) uv at barycentrics of triangle t."""
     b0 = 1.0 - b1 - b2
     i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
@@ -96,7 +97,7 @@ def uv_at(uv, triangle, t, b1, b2):  # type: ignore[no-untyped-def]
 
 
 @inner
-def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
+def texel_footprint(surface, image_uv, t):
     """Return the width in image uv of the part of a texel that one of its points stands for."""
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
     lightmap = abs(
@@ -111,7 +112,7 @@ def texel_footprint(surface, image_uv, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def texel_albedo(surface, shading, free, begin, end, albedo, area):  # type: ignore[no-untyped-def]
+def texel_albedo(surface, shading, free, begin, end, albedo, area):
     """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32.
 
     Of surfaces that let light through, only what is there counts: `area` (n,) float32 is cut to its share.

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """From what a ray hit to the texel that lies there.
 
 Every surface blocks light from both sides; the back of a one-sided surface is black.
@@ -32,13 +33,13 @@ class HitTable(NamedTuple):
 # The functions below take the table's arrays one by one: handing a tuple of arrays to a function costs
 # Numba an atomic reference count per array and call, which tripled the time of a hit.
 @inner
-def front_facing(row, prim, dx, dy, dz):  # type: ignore[no-untyped-def]
+def front_facing(row, prim, dx, dy, dz):
     """Tell whether a ray of direction d meets the front of the triangle."""
     return row[prim, 8] * dx + row[prim, 9] * dy + row[prim, 10] * dz < np.float32(0.0)
 
 
 @inner
-def hit_pixel(row, size, n_pixels, prim, u, v, front):  # type: ignore[no-untyped-def]
+def hit_pixel(row, size, n_pixels, prim, u, v, front):
     """Return the flat pixel at barycentrics (u, v) of a triangle (+ n_pixels on its back), or BACK_FACE."""
     if not front and row[prim, 7] == np.float32(0.0):
         return np.int64(BACK_FACE)

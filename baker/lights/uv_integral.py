@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Exact means of a texture over triangles in its uv space, at any size: one texel's corner or many repeats.
 
     integral of f over a triangle = closed integral of F(x, y) dy along its edges,   dF / dx = f     (Green)
@@ -50,7 +51,7 @@ class RowSums(NamedTuple):
 
 
 @kernel
-def fill_row_sums(pixels, offset, weight, block):  # type: ignore[no-untyped-def]
+def fill_row_sums(pixels, offset, weight, block):
     """Fill `block` (see `RowSums`) with the sums of w texels a row from `pixels[offset]` on.
 
     The order of additions is that of `_sum_before`, so black texels change no bit of a sum.
@@ -72,7 +73,7 @@ def fill_row_sums(pixels, offset, weight, block):  # type: ignore[no-untyped-def
 
 
 @inner
-def _add_texel(pixels, at, weight, sums):  # type: ignore[no-untyped-def]
+def _add_texel(pixels, at, weight, sums):
     square = weight[3] * np.float64(pixels[at, 3])
     for c in range(3):
         value = np.float64(pixels[at, c])
@@ -82,7 +83,7 @@ def _add_texel(pixels, at, weight, sums):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _sum_before(pixels, w, weight, block, j, i, out):  # type: ignore[no-untyped-def]
+def _sum_before(pixels, w, weight, block, j, i, out):
     """Write the sums of texels 0 to i (0 <= i <= w) of row j."""
     b = i // BLOCK
     for c in range(4):
@@ -92,14 +93,14 @@ def _sum_before(pixels, w, weight, block, j, i, out):  # type: ignore[no-untyped
 
 
 @inner
-def _read(pixels, w, weight, j, i, out):  # type: ignore[no-untyped-def]
+def _read(pixels, w, weight, j, i, out):
     for c in range(4):
         out[c] = 0.0
     _add_texel(pixels, j * w + i, weight, out)
 
 
 @inner
-def _running(pixels, w, weight, block, mode, j, i, out, spare):  # type: ignore[no-untyped-def]
+def _running(pixels, w, weight, block, mode, j, i, out, spare):
     """Write the sums of row j from texel 0 to any whole number i, continued by the wrap mode."""
     if mode == 2:
         inside = smaller(larger(i, 0), w)
@@ -122,7 +123,7 @@ def _running(pixels, w, weight, block, mode, j, i, out, spare):  # type: ignore[
 
 
 @inner
-def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: ignore[no-untyped-def]
+def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
     """Write the filtered texel at lattice coordinates, and the weighted sum of its squares."""
     i, j = np.int64(math.floor(x)), np.int64(math.floor(y))
     if nearest:
@@ -144,7 +145,7 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):  # type: igno
 
 
 @inner
-def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):  # type: ignore[no-untyped-def]
+def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):
     """Write what F is made of in cell (i, j), of two rows: sums since column `first`, both texels."""
     for r in range(1 if nearest else 2):
         line = wrapped(j + r, h, wrap[1])
@@ -168,7 +169,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
 
 
 @inner
-def _primitive(terms, nearest, c, fx, fy):  # type: ignore[no-untyped-def]
+def _primitive(terms, nearest, c, fx, fy):
     """Return F of one channel at (fx, fy) inside the loaded cell."""
     upper = terms[0, 0, c] + terms[0, 1, c] * fx
     if nearest:
@@ -179,7 +180,7 @@ def _primitive(terms, nearest, c, fx, fy):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _next(at, step, start, low, high):  # type: ignore[no-untyped-def]
+def _next(at, step, start, low, high):
     """Return where on an edge (0 to 1) the lattice line `at` is met; 2 if never or outside of low to high."""
     if step == 0.0 or (step > 0.0 and at > high) or (step < 0.0 and at < low):
         return 2.0
@@ -187,7 +188,7 @@ def _next(at, step, start, low, high):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total, size):  # type: ignore[no-untyped-def]
+def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total, size):
     """Add an edge to `total` (4,) and the sizes of its terms to `size` (4,).
 
     ends : x, y of both ends, and the weights at both ends of the integral of f along the edge; with `along`
@@ -241,7 +242,7 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
 
 
 @inner
-def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):  # type: ignore[no-untyped-def]
+def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):
     """Return E[f^2] / E[f]^2 - 1 from the centroids of sixteen equal parts of a triangle."""
     a, b, mean = _prefix(), _texel(), _four()
     for part in range(16):
@@ -265,7 +266,7 @@ def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):  # type:
 
 
 @kernel
-def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):  # type: ignore[no-untyped-def]
+def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
     """Average a texture over n triangles.
 
     Parameters

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Paths from lamps and paths from the eye, connected in all ways, many at once in packets.
 
 Each sample starts a subpath at a lamp, keeps its vertices, then walks from the eye; every vertex there looks
@@ -81,7 +82,7 @@ _new_values = scratch((3, MAX_WIDTH), np.float64)
 
 
 @inner
-def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):  # type: ignore[no-untyped-def]
+def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):
     """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
     at_surface = n_subpaths == 0.0
     start_path(path, row, lane, where, toward, normal, at_surface, sizes)
@@ -97,7 +98,7 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, siz
 
 
 @inner
-def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ignore[no-untyped-def]
+def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
     """Choose the direction in which a subpath goes on; return False where it ends.
 
     eye : whether it began at the eye; choice, u, w : uniform numbers; value, spare : (3,) working memory
@@ -140,7 +141,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):  # type: ign
 
 
 @inner
-def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: ignore[no-untyped-def]
+def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):
     """Connect an eye subpath's end to vertex k of `kept`, the s-th of a lamp's; return if that brings light.
 
     value : (3,) output, the light if nothing is in the way; way : (6,) output, unit direction and reach
@@ -175,7 +176,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):  # type: 
 
 
 @inner
-def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-untyped-def]
+def show(path, row, lane, camera, n_subpaths, value, way):
     """Connect a lamp's subpath to the camera; return the pixel it is seen through, or -1.
 
     value : (3,) output, light for the sum over the subpaths of all pixels; way : (6,) output, see `connect`
@@ -209,7 +210,7 @@ def show(path, row, lane, camera, n_subpaths, value, way):  # type: ignore[no-un
 
 
 @kernel
-def trace_both_ways(  # type: ignore[no-untyped-def]
+def trace_both_ways(
     where, toward, normal, begin, camera, n_subpaths, surfaces, lamps, shading, sphere, caster, net, how, out,
     splat_pixel, splat,
 ):  # fmt: skip

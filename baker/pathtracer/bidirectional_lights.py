@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Lamps as both ends of a path see them: where light starts, how it is aimed at, how it is met by chance.
 
 A lamp is chosen as `light_table` says. From a triangle light starts at a uniform point, cosine-weighted; from
@@ -56,14 +57,14 @@ _INV_4_PI = 0.25 / math.pi
 
 
 @inner
-def turned(nx, ny, nz, a, b, c):  # type: ignore[no-untyped-def]
+def turned(nx, ny, nz, a, b, c):
     """Return direction (a, b, c) of the frame around the unit normal n, in world space."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     return a * tx + b * bx + c * nx, a * ty + b * by + c * ny, a * tz + b * bz + c * nz
 
 
 @inner
-def spread(point, e):  # type: ignore[no-untyped-def]
+def spread(point, e):
     """Return the density per steradian of directions that start at point or spot light e."""
     if point[e, KIND] == 1.0:
         return 0.5 * INV_PI / max(1.0 - point[e, OUTER], 1.0e-12)
@@ -71,7 +72,7 @@ def spread(point, e):  # type: ignore[no-untyped-def]
 
 
 @inner
-def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, choice, u, w, a, b, spot):  # type: ignore[no-untyped-def]
+def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, choice, u, w, a, b, spot):
     """Begin a path at a lamp, ready for its first ray; choice, u, w, a, b : uniform numbers.
 
     spot : (2,) output, for a triangle the barycentrics of the start (its texture is not looked up yet)
@@ -161,7 +162,7 @@ def start_at_lamp(path, lane, triangle, point, cumulative, sky, sphere, least, c
 
 
 @inner
-def range_of_lamp(point, lamp, n):  # type: ignore[no-untyped-def]
+def range_of_lamp(point, lamp, n):
     """Return 1 / range^2 of a lamp that stands behind n triangles; 0 if it has no range."""
     if n <= lamp < n + len(point):
         return point[lamp - n, INVERSE_RANGE]
@@ -169,7 +170,7 @@ def range_of_lamp(point, lamp, n):  # type: ignore[no-untyped-def]
 
 
 @inner
-def fade(path, lane, distance, inverse_range):  # type: ignore[no-untyped-def]
+def fade(path, lane, distance, inverse_range):
     """Fade light that has gone `distance` metres from a point light of a range; return if any is left.
 
     The light's own share is not known before its first hit; its densities do not depend on it.
@@ -181,7 +182,7 @@ def fade(path, lane, distance, inverse_range):  # type: ignore[no-untyped-def]
 
 
 @inner
-def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):  # type: ignore[no-untyped-def]
+def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
     """Put the start of parallel light of direction d on a disc in front of everything."""
     radius = sphere[3]
     r = radius * math.sqrt(u)
@@ -197,7 +198,7 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):  # type: ignore[no-unty
 
 
 @inner
-def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, choice, u, w, value, way):  # type: ignore[no-untyped-def]
+def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, choice, u, w, value, way):
     """Aim at one lamp from an eye subpath's end; see `vertex.aim`, whose arguments and answer these are.
 
     The light is weighed against all other ways to make the same path.
@@ -255,7 +256,7 @@ def aim_both_ways(path, row, lane, triangle, point, cumulative, sky, sphere, cho
 
 
 @inner
-def lamp_cosine(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
+def lamp_cosine(triangle, e, dx, dy, dz):
     """Return the cosine at emitter e of a ray of unit direction d; below 0 if it meets the dark side."""
     cosine = -(
         dx * triangle[e, LAMP_NORMAL] + dy * triangle[e, LAMP_NORMAL + 1] + dz * triangle[e, LAMP_NORMAL + 2]
@@ -264,13 +265,13 @@ def lamp_cosine(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 
 @inner
-def emission_density(triangle, e):  # type: ignore[no-untyped-def]
+def emission_density(triangle, e):
     """Return the density per steradian and cosine of directions that start on emitter e."""
     return INV_PI * (0.5 if triangle[e, TWO_SIDED] > 0.0 else 1.0)
 
 
 @inner
-def meet_emitter(path, lane, surface, prim, triangle, e, seen, value):  # type: ignore[no-untyped-def]
+def meet_emitter(path, lane, surface, prim, triangle, e, seen, value):
     """Write to `value` (3,) what triangle prim, met by the eye's subpath, sends along the path, weighed.
 
     Its texture is not looked up yet.
@@ -298,7 +299,7 @@ def meet_emitter(path, lane, surface, prim, triangle, e, seen, value):  # type: 
 
 
 @inner
-def meet_sky(path, lane, sky, sphere, seen, value):  # type: ignore[no-untyped-def]
+def meet_sky(path, lane, sky, sphere, seen, value):
     """Do the same for the sky, where the path leaves the scene."""
     weight = 1.0
     if not seen and sky[3] > 0.0:

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """How likely each way to make a path is, beside the way it was made: the weights of `bidirectional`.
 
 A path x_0 (lamp) .. x_k-1 (eye) can be made with s vertices from the lamp and t = k - s from the eye, at
@@ -35,7 +36,7 @@ N_ROWS_BOTH = CHAIN + MOST_FROM_LAMP
 
 
 @inner
-def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):  # type: ignore[no-untyped-def]
+def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
     """Evaluate the vertex in column k for light that comes from l and goes to e (unit, world, outwards).
 
     value : (3,) output, f(e, l) |n.l| / |ng.l| with n the shading and ng the geometric normal: what is left
@@ -73,7 +74,7 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):  # type: ignore[no-untype
 
 
 @inner
-def leave_vertex(path, lane, density, reverse, smooth, depth):  # type: ignore[no-untyped-def]
+def leave_vertex(path, lane, density, reverse, smooth, depth):
     """Carry the sums past a vertex that the path leaves towards `GO`.
 
     density : per steradian, of that direction; 1 at a mirror
@@ -100,14 +101,14 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):  # type: ignore[n
 
 
 @inner
-def carry(path, lane, factor, depth):  # type: ignore[no-untyped-def]
+def carry(path, lane, factor, depth):
     """Multiply the sums by what turns a density per steradian at the next vertex into one per area here."""
     for r in range(depth):
         path[CHAIN + r, lane] *= factor
 
 
 @inner
-def reach_vertex(path, lane, distance, depth):  # type: ignore[no-untyped-def]
+def reach_vertex(path, lane, distance, depth):
     """Do what a vertex asks for on arrival; its geometric normal is in `path`, the ray still in `GO`.
 
     Returns
@@ -133,7 +134,7 @@ def reach_vertex(path, lane, distance, depth):  # type: ignore[no-untyped-def]
 
 
 @inner
-def towards_eye(path, lane, density, reverse, left):  # type: ignore[no-untyped-def]
+def towards_eye(path, lane, density, reverse, left):
     """Return the sum of p_s' / p_s over more lamp vertices, for an eye subpath that ends in column `lane`.
 
     density : per area, with which the lamp's subpath would reach this vertex
@@ -146,13 +147,13 @@ def towards_eye(path, lane, density, reverse, left):  # type: ignore[no-untyped-
 
 
 @inner
-def towards_lamp(path, k, density, reverse):  # type: ignore[no-untyped-def]
+def towards_lamp(path, k, density, reverse):
     """Return the sum of p_s' / p_s over less lamp vertices, for a lamp's subpath that ends in column k."""
     return density * path[INVERSE, k] * (path[OPEN, k] + reverse * path[CHAIN, k])
 
 
 @inner
-def pixel_density(camera, way):  # type: ignore[no-untyped-def]
+def pixel_density(camera, way):
     """Return the density per steradian of a pixel's own rays in unit direction `way` (3,); 0 from behind."""
     cosine = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]
     if cosine <= 0.0:
@@ -162,7 +163,7 @@ def pixel_density(camera, way):  # type: ignore[no-untyped-def]
 
 
 @inner
-def pixel_of(camera, way):  # type: ignore[no-untyped-def]
+def pixel_of(camera, way):
     """Return the number of the pixel that unit direction `way` (3,) from the eye passes, or -1."""
     z = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]
     if z <= 0.0:

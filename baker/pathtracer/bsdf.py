@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """How surfaces scatter light: Lambert, and glTF's metallic-roughness model with its mirror limit.
 
     f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
@@ -28,34 +29,34 @@ N_PARAMETERS = 5
 
 
 @inner
-def fresnel(f0, cosine):  # type: ignore[no-untyped-def]
+def fresnel(f0, cosine):
     """Return Schlick's reflectance for the cosine between direction and half vector."""
     m = min(max(1.0 - cosine, 0.0), 1.0)
     return f0 + (1.0 - f0) * m * m * m * m * m
 
 
 @inner
-def ggx_density(nh, a):  # type: ignore[no-untyped-def]
+def ggx_density(nh, a):
     """Return D of a half vector with cosine nh."""
     t = nh * nh * (a * a - 1.0) + 1.0
     return a * a / max(math.pi * t * t, 1.0e-300)
 
 
 @inner
-def ggx_masking(nv, a):  # type: ignore[no-untyped-def]
+def ggx_masking(nv, a):
     """Return Smith's G1 for a direction with cosine nv."""
     return 2.0 * nv / max(nv + math.sqrt(a * a + (1.0 - a * a) * nv * nv), 1.0e-300)
 
 
 @inner
-def ggx_visibility(nl, nv, a):  # type: ignore[no-untyped-def]
+def ggx_visibility(nl, nv, a):
     """Return V = G2 / (4 nl nv), height-correlated."""
     s = nl * math.sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * math.sqrt(nl * nl * (1.0 - a * a) + a * a)
     return 0.5 / max(s, 1.0e-300)
 
 
 @inner
-def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
+def specular_chance(row, lane, nv):
     """Return the chance to sample the specular lobe of parameters row[:, lane], seen at cosine nv."""
     if row[WIDTH, lane] < 0.0:
         return 0.0
@@ -69,7 +70,7 @@ def specular_chance(row, lane, nv):  # type: ignore[no-untyped-def]
 
 
 @inner
-def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untyped-def]
+def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
     """Write f(v, l) n.l (RGB) to `out` (3,) and return the density with which `bsdf_sample` finds l.
 
     row : (5, n) parameters, those of `lane` in one column
@@ -79,7 +80,7 @@ def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):  # type: ignore[no-untype
 
 
 @inner
-def bsdf_cosines(row, lane, nv, nl, vl, out):  # type: ignore[no-untyped-def]
+def bsdf_cosines(row, lane, nv, nl, vl, out):
     """Do the same from the cosines n.v, n.l and v.l, which are all that an isotropic surface asks for."""
     out[0] = out[1] = out[2] = 0.0
     if nv <= 0.0 or nl <= 0.0:
@@ -104,13 +105,13 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):  # type: ignore[no-untyped-def]
+def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):
     """Return the density per steradian with which `bsdf_sample` finds l from v, mirrors left out."""
     return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
 
 
 @inner
-def cosines_pdf(row, lane, nv, nl, vl):  # type: ignore[no-untyped-def]
+def cosines_pdf(row, lane, nv, nl, vl):
     """Return the same density from the cosines n.v, n.l and v.l."""
     if nv <= 0.0 or nl <= 0.0:
         return 0.0
@@ -126,7 +127,7 @@ def cosines_pdf(row, lane, nv, nl, vl):  # type: ignore[no-untyped-def]
 
 
 @inner
-def visible_normal(vx, vy, vz, a, u, w):  # type: ignore[no-untyped-def]
+def visible_normal(vx, vy, vz, a, u, w):
     """Return a half vector, distributed as the GGX normals that v sees (Heitz 2018, listing 1)."""
     sx, sy, sz = a * vx, a * vy, vz
     length = math.sqrt(sx * sx + sy * sy + sz * sz)
@@ -151,7 +152,7 @@ def visible_normal(vx, vy, vz, a, u, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def cosine_sample(u, w):  # type: ignore[no-untyped-def]
+def cosine_sample(u, w):
     """Map the unit square to the cosine-weighted hemisphere about +z."""
     r = math.sqrt(u)
     phi = 2.0 * math.pi * w
@@ -159,7 +160,7 @@ def cosine_sample(u, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):  # type: ignore[no-untyped-def]
+def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):
     """Sample a direction; write f n.l / density (RGB) to `weight` (3,).
 
     choice, u, w : uniform numbers

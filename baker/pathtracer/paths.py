@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Many paths at once, eight side by side: those that end leave no gaps, new ones take their places.
 
     L = L_e + int f L cos        estimated path by path; Russian roulette ends paths without bias
@@ -89,7 +90,7 @@ _new_lamp, _new_filled = scratch((LANES,), np.int64), scratch((BINS,), np.int64)
 
 
 @inner
-def see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value):  # type: ignore[no-untyped-def]
+def see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value):
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
     Its texture is not looked up yet.
@@ -120,7 +121,7 @@ def see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value
 
 
 @inner
-def see_sky(s, base, lane, sky, mode, power, value):  # type: ignore[no-untyped-def]
+def see_sky(s, base, lane, sky, mode, power, value):
     """Do the same for the sky, where a path leaves the scene."""
     value[0] = value[1] = value[2] = 0.0
     weight = 1.0
@@ -134,7 +135,7 @@ def see_sky(s, base, lane, sky, mode, power, value):  # type: ignore[no-untyped-
 
 
 @inner
-def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):  # type: ignore[no-untyped-def]
+def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):
     """Begin paths: at white Lambertian points (light leaving them is E / pi), or as rays; see `trace_paths`.
 
     following : number of the first path; first : number of the first sample of all
@@ -164,7 +165,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
 
 
 @inner
-def fetch_lanes(s, words, base, surface, material):  # type: ignore[no-untyped-def]
+def fetch_lanes(s, words, base, surface, material):
     """Copy what Lambertian vertices are made of: the triangles' rows and base colours."""
     base = unsigned(base)
     for lane in range(LANES):
@@ -178,7 +179,7 @@ def fetch_lanes(s, words, base, surface, material):  # type: ignore[no-untyped-d
 
 
 @inner
-def choose_lamps(s, words, base, every, cumulative, lamp):  # type: ignore[no-untyped-def]
+def choose_lamps(s, words, base, every, cumulative, lamp):
     """Choose a lamp for each lane: its number to `lamp` (8,) int64, its row of `every` to `s`."""
     base = unsigned(base)
     for lane in range(LANES):
@@ -197,7 +198,7 @@ def choose_lamps(s, words, base, every, cumulative, lamp):  # type: ignore[no-un
 
 
 @inner
-def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ignore[no-untyped-def]
+def turn_alone(path, row, lane, s, words, base, hemisphere, value):
     """Choose the direction in which one lane's path goes on, or end it."""
     choice = np.float64(words[base + LOBE * LANES + lane]) * _INV_2_32
     u, w = np.float64(s[base + U_WAY * LANES + lane]) - 1.0, np.float64(s[base + W_WAY * LANES + lane]) - 1.0
@@ -218,7 +219,7 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):  # type: ign
 
 
 @inner
-def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value, way):  # type: ignore[no-untyped-def]
+def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value, way):
     """Aim at one lamp from one lane's vertex; return its number, -1 if it brings nothing."""
     choice = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32
     u, w = (
@@ -239,7 +240,7 @@ def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky,
 
 
 @kernel
-def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, memory, net, how, out):  # type: ignore[no-untyped-def]
+def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, memory, net, how, out):
     """Add the light that paths bring to each of m points, and count path segments and shadow rays.
 
     where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Shadow rays that wait until they fill a packet: rays to the same lamp together, of whichever paths."""
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _f = np.float32
 
 
 @inner
-def cast_packet(bins, filled, k, occluded, scene, tint, on, out):  # type: ignore[no-untyped-def]
+def cast_packet(bins, filled, k, occluded, scene, tint, on, out):
     """Trace packet k, add the light of rays that nothing blocks to their points, and empty it.
 
     tint : of the path memory; out : (m, 3) float64
@@ -44,7 +45,7 @@ def cast_packet(bins, filled, k, occluded, scene, tint, on, out):  # type: ignor
 
 
 @inner
-def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, on, out):  # type: ignore[no-untyped-def]
+def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, on, out):
     """Put the lanes' rays to lamps into packets, those to one lamp together; trace what is full.
 
     lamp : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet

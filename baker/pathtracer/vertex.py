@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
 
 A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
@@ -51,7 +52,7 @@ SURE, MOST = 3, 0.98
 
 
 @inner
-def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
+def set_frame(path, lane, nx, ny, nz):
     """Write the frame around a unit shading normal."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     path[FRAME, lane], path[FRAME + 1, lane], path[FRAME + 2, lane] = tx, ty, tz
@@ -60,7 +61,7 @@ def set_frame(path, lane, nx, ny, nz):  # type: ignore[no-untyped-def]
 
 
 @inner
-def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
+def local(path, lane, dx, dy, dz):
     """Return a world direction in the frame of the vertex."""
     return (
         dx * path[FRAME, lane] + dy * path[FRAME + 1, lane] + dz * path[FRAME + 2, lane],
@@ -70,7 +71,7 @@ def local(path, lane, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place_off(path, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
+def place_off(path, lane, x, y, z, least, size):
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
 
     least : see `Surfaces`; size : of the triangle, metres, or `Surfaces.most` where it is not known
@@ -83,7 +84,7 @@ def place_off(path, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
 
 
 @inner
-def size_of(corner, t):  # type: ignore[no-untyped-def]
+def size_of(corner, t):
     """Return the largest component of the edges from corner 0 of row t, whose first columns are corners."""
     size = 0.0
     for a in range(3):
@@ -92,7 +93,7 @@ def size_of(corner, t):  # type: ignore[no-untyped-def]
 
 
 @inner
-def start_path(path, row, lane, where, toward, normal, at_surface, sizes):  # type: ignore[no-untyped-def]
+def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
     """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
 
     where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
@@ -119,7 +120,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):  # ty
 
 
 @inner
-def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  # type: ignore[no-untyped-def]
+def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
@@ -158,7 +159,7 @@ def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):  
 
 
 @inner
-def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-untyped-def]
+def paint(row, lane, shading, prim, u, v, material, rgba):
     """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory."""
     m = shading.material[prim]
     base_colour(shading, prim, m, u, v, rgba)
@@ -172,7 +173,7 @@ def paint(row, lane, shading, prim, u, v, material, rgba):  # type: ignore[no-un
 
 
 @inner
-def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
+def base_colour(shading, prim, m, u, v, out):
     """Write what texture and vertex colours multiply a base colour by to `out` (4,)."""
     out[0] = out[1] = out[2] = 1.0
     if shading.base_texture[m] >= 0:
@@ -187,7 +188,7 @@ def base_colour(shading, prim, m, u, v, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def heuristic(own, other, power):  # type: ignore[no-untyped-def]
+def heuristic(own, other, power):
     """Return the MIS weight of a technique of density `own` against one of density `other`."""
     if power:
         own, other = own * own, other * other
@@ -195,7 +196,7 @@ def heuristic(own, other, power):  # type: ignore[no-untyped-def]
 
 
 @inner
-def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):  # type: ignore[no-untyped-def]
+def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):
     """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
 
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
@@ -253,7 +254,7 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
 
 
 @inner
-def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-def]
+def glow(shading, prim, u, v, value, rgba, aimed):
     """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
 
     aimed : also by its alpha: rays that hit it know that already
@@ -270,7 +271,7 @@ def glow(shading, prim, u, v, value, rgba, aimed):  # type: ignore[no-untyped-de
 
 
 @inner
-def scatter(path, row, lane, hemisphere, choice, u, w, weight):  # type: ignore[no-untyped-def]
+def scatter(path, row, lane, hemisphere, choice, u, w, weight):
     """Choose the direction in which the path goes on; return False where it ends.
 
     hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers; weight : (3,) working memory

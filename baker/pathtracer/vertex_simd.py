@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """One vertex of eight paths at once on Lambertian surfaces, in loops that become vector code.
 
 Says for eight lanes in float32 what `vertex` says for one in float64: how a hit becomes a vertex, the light
@@ -71,7 +72,7 @@ _L = LANES
 
 
 @inner
-def stand(s, base, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
+def stand(s, base, lane, x, y, z, least, size):
     """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
 
     least, size : float32, metres, see `vertex.place_off`
@@ -93,7 +94,7 @@ def stand(s, base, lane, x, y, z, least, size):  # type: ignore[no-untyped-def]
 
 
 @inner
-def stand_lanes(s, base, least, most):  # type: ignore[no-untyped-def]
+def stand_lanes(s, base, least, most):
     """Make the lanes' places on surfaces vertices; least, most : float32, metres, see `Surfaces`."""
     base = unsigned(base)
     for lane in range(LANES):
@@ -102,14 +103,14 @@ def stand_lanes(s, base, least, most):  # type: ignore[no-untyped-def]
 
 
 @inner
-def edge_lane(s, base, lane, a):  # type: ignore[no-untyped-def]
+def edge_lane(s, base, lane, a):
     """Return the larger one along axis a of the two edges from corner 0 of a lane's triangle."""
     at = base + _T + (CORNER + a) * _L + lane
     return max(abs(s[at + 3 * _L] - s[at]), abs(s[at + 6 * _L] - s[at]))
 
 
 @inner
-def weighted(s, base, column, lane, b, u, v):  # type: ignore[no-untyped-def]
+def weighted(s, base, column, lane, b, u, v):
     """Return what a lane's triangle has at barycentrics (b, u, v), by three corners from a column on."""
     at = base + _T + column * _L + lane
     return (
@@ -120,7 +121,7 @@ def weighted(s, base, column, lane, b, u, v):  # type: ignore[no-untyped-def]
 
 
 @inner
-def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
+def arrive_lanes(s, base, least):
     """Make the lanes' hits, whose triangles' rows have been copied, vertices; black backs end the path.
 
     least : float32, metres, see `Surfaces`
@@ -158,7 +159,7 @@ def arrive_lanes(s, base, least):  # type: ignore[no-untyped-def]
 
 
 @inner
-def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
+def aim_lanes(s, base, mode, power):
     """Aim at the lanes' lamps, whose rows have been copied: write direction, reach and the light they bring.
 
     mode, power : `Estimator.aim` and `.power`. What cannot light a vertex brings 0.
@@ -257,7 +258,7 @@ def aim_lanes(s, base, mode, power):  # type: ignore[no-untyped-def]
 
 
 @inner
-def scatter_lanes(s, base):  # type: ignore[no-untyped-def]
+def scatter_lanes(s, base):
     """Choose the directions in which the lanes' paths go on; others end."""
     base = unsigned(base)
     for lane in range(LANES):

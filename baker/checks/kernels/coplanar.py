@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Finds triangles of different objects that overlap within one plane."""
 
 from __future__ import annotations
@@ -7,7 +8,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def coplanar_partners(corner, low, high, first, owner, slack, partner):  # type: ignore[no-untyped-def]
+def coplanar_partners(corner, low, high, first, owner, slack, partner):
     """Write for each triangle one of another owner that it overlaps in its plane.
 
     Two triangles overlap if no direction perpendicular to a side keeps them apart (separating axes).
@@ -41,7 +42,7 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):  # type:
 
 
 @njit(cache=True, nogil=True)
-def _apart(a, b, slack):  # type: ignore[no-untyped-def]
+def _apart(a, b, slack):
     """Tell whether a side of `a` has all of `b` on its far side, but for `slack`."""
     turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
     sign = 1.0 if turn > 0.0 else -1.0

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Finds which triangles of a uv layout cover the same samples."""
 
 from __future__ import annotations
@@ -7,7 +8,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def cover_pairs(corner, slack, owner, pairs, counts):  # type: ignore[no-untyped-def]
+def cover_pairs(corner, slack, owner, pairs, counts):
     """Mark the samples that each triangle covers; note who had them before.
 
     Sample (r, c) lies at (c + 0.5, r + 0.5) and counts for a triangle if it is further than `slack` inside.

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """What the charts of a lightmap page hold: largest values, mean light, boxes."""
 
 from __future__ import annotations
@@ -6,7 +7,7 @@ from baker.trace.jit import kernel, larger, smaller
 
 
 @kernel
-def chart_maxima(value, chart, covered, highest):  # type: ignore[no-untyped-def]
+def chart_maxima(value, chart, covered, highest):
     """Raise `highest` (n_charts, C) float32 to the largest value of each chart's covered texels.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
@@ -20,7 +21,7 @@ def chart_maxima(value, chart, covered, highest):  # type: ignore[no-untyped-def
 
 
 @kernel
-def chart_sums(value, weight, chart, covered, total, count):  # type: ignore[no-untyped-def]
+def chart_sums(value, weight, chart, covered, total, count):
     """Add the weighted sum over channels of covered texels to `total`, and 1 to `count`, of their chart.
 
     value : (H, W, C) float32; weight : (C,) float32; chart : (H, W) int32; covered : (H, W) bool
@@ -38,7 +39,7 @@ def chart_sums(value, weight, chart, covered, total, count):  # type: ignore[no-
 
 
 @kernel
-def chart_boxes(chart, chosen, low, high):  # type: ignore[no-untyped-def]
+def chart_boxes(chart, chosen, low, high):
     """Write the first and last row and column of each chart's chosen texels.
 
     chart : (H, W) int32; chosen : (H, W) bool

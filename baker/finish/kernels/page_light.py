@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Kernels that give a filtered page the light of its samples, by sums over blocks of texels of one chart."""
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ LEAST, MOST = -0.5, 1.0
 
 
 @kernel
-def group_blocks(chart, chosen, label, first, owner):  # type: ignore[no-untyped-def]
+def group_blocks(chart, chosen, label, first, owner):
     """Number the groups: chosen texels of one chart in one block. Returns how many there are.
 
     chart : (H, W) int32; chosen : (H, W) bool
@@ -42,7 +43,7 @@ def group_blocks(chart, chosen, label, first, owner):  # type: ignore[no-untyped
 
 
 @inner
-def _group_of(begin, end, owner, chart):  # type: ignore[no-untyped-def]
+def _group_of(begin, end, owner, chart):
     """Return the group of a chart among the groups begin to end, or -1."""
     for group in range(begin, end):
         if owner[group] == chart:
@@ -51,7 +52,7 @@ def _group_of(begin, end, owner, chart):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sum_groups(noisy, filtered, label, light, sums):  # type: ignore[no-untyped-def]
+def sum_groups(noisy, filtered, label, light, sums):
     """Add up what the filter took and what it left, relative to the mean light of each group.
 
     noisy, filtered : (H, W, C) float32; label : (H, W) int32
@@ -80,7 +81,7 @@ def sum_groups(noisy, filtered, label, light, sums):  # type: ignore[no-untyped-
 
 
 @kernel
-def missing_shares(first, owner, across, sums, share):  # type: ignore[no-untyped-def]
+def missing_shares(first, owner, across, sums, share):
     """Write the share (G, C) float64 of light that windows around groups lack, as far as it is believed.
 
     across : int, blocks in a row; others as above
@@ -108,7 +109,7 @@ def missing_shares(first, owner, across, sums, share):  # type: ignore[no-untype
 
 
 @kernel
-def add_shares(label, first, owner, across, share, page):  # type: ignore[no-untyped-def]
+def add_shares(label, first, owner, across, share, page):
     """Multiply a page (H, W, C) float32 by 1 + share, interpolated between the middles of blocks."""
     height, width, channels = page.shape
     down = (len(first) - 1) // across
@@ -132,7 +133,7 @@ def add_shares(label, first, owner, across, share, page):  # type: ignore[no-unt
 
 
 @inner
-def _group_or(block, first, owner, chart, otherwise):  # type: ignore[no-untyped-def]
+def _group_or(block, first, owner, chart, otherwise):
     """Return a chart's group in a block, or another one."""
     group = _group_of(first[block], first[block + 1], owner, chart)
     return group if group >= 0 else otherwise

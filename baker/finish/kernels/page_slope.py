@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Planes fitted to windows of a lightmap page, and values moved or continued along them.
 
 The plane at a texel is the weighted least-squares plane through the covered texels of its own chart in a
@@ -56,7 +57,7 @@ NO_OFFSET = np.zeros((0, 0, 2), np.float32)
 
 
 @inner
-def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):  # type: ignore[no-untyped-def]
+def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
     """Sum over the texels of one chart around texel (r, c), weighted by 1 / (flat + distance^2).
 
     offset : (H, W, 2) float32, column and row offset of each value's place from its texel centre, texels;
@@ -100,9 +101,7 @@ def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):  # typ
 
 
 @inner
-def fit_plane(  # type: ignore[no-untyped-def]
-    value, chart, covered, offset, r, c, radius, flat, sums, planes, slot
-):
+def fit_plane(value, chart, covered, offset, r, c, radius, flat, sums, planes, slot):
     """Fit a plane per channel to the texels of one chart around texel (r, c); written to planes[slot]."""
     _sum_window(value, chart, covered, offset, r, c, radius, flat, sums)
     weight = sums[W]
@@ -127,13 +126,13 @@ def fit_plane(  # type: ignore[no-untyped-def]
 
 
 @inner
-def _step(along, reach):  # type: ignore[no-untyped-def]
+def _step(along, reach):
     """Return the nearest of -1, 0, 1 to along / reach."""
     return 1 if along > 0.5 * reach else (-1 if along < -0.5 * reach else 0)
 
 
 @inner
-def _trend(value, chart, covered, r, c, x, y, trend):  # type: ignore[no-untyped-def]
+def _trend(value, chart, covered, r, c, x, y, trend):
     """Write how much further values may rise and fall from texel (r, c) along (x, y) texels, both >= 0.
 
     The two steps between a texel and those behind it must go the same way: then the value goes on as it
@@ -162,7 +161,7 @@ def _trend(value, chart, covered, r, c, x, y, trend):  # type: ignore[no-untyped
 
 
 @inner
-def _limited(planes, slot, j, estimate, trend, highest):  # type: ignore[no-untyped-def]
+def _limited(planes, slot, j, estimate, trend, highest):
     """Return an estimate cut to the window's range, and a little more where there is a trend.
 
     Light never turns negative, and is brighter than the brightest texel of its chart, `highest`, only where
@@ -181,15 +180,13 @@ def _limited(planes, slot, j, estimate, trend, highest):  # type: ignore[no-unty
 
 
 @inner
-def _off_centre(covered, offset, smallest, r, c):  # type: ignore[no-untyped-def]
+def _off_centre(covered, offset, smallest, r, c):
     """Return whether texel (r, c) is covered and its centroid further than `smallest` from its centre."""
     return covered[r, c] and larger(abs(offset[r, c, 0]), abs(offset[r, c, 1])) >= smallest
 
 
 @kernel
-def move_to_centre(  # type: ignore[no-untyped-def]
-    value, chart, covered, offset, smallest, highest, out, first_row, end_row
-):
+def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_row, end_row):
     """Move each texel's value from the centroid of its covered part to the texel centre.
 
     Parameters
@@ -220,9 +217,7 @@ def move_to_centre(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def match_lookups(  # type: ignore[no-untyped-def]
-    value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row
-):
+def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row):
     """Set each partly covered texel so that a bilinear lookup at its centroid finds what was measured there.
 
     Only where all texels of that lookup are covered and of one chart. What differs from `move_to_centre` by
@@ -264,9 +259,7 @@ def match_lookups(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def extrapolate_outwards(  # type: ignore[no-untyped-def]
-    value, chart, covered, nearest, offset, highest, pixels, grown, first_row, end_row
-):
+def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels, grown, first_row, end_row):
     """Continue each chart by its own slope into the empty texels near it, in place.
 
     Parameters
@@ -311,7 +304,7 @@ def extrapolate_outwards(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def noisy_planes(value, chart, covered, offset, texel, radius, out):  # type: ignore[no-untyped-def]
+def noisy_planes(value, chart, covered, offset, texel, radius, out):
     """Fit a plane per channel around chosen texels of a noisy page, slopes shrunk by how sure they are.
 
     Parameters

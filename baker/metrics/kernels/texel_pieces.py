@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Pieces of triangles inside texels, for a judge who shares no code with the baker's own raster.
 
 Triangles are cut to a texel's square one by one (Sutherland and Hodgman, 1974, by way of `clip`).
@@ -14,7 +15,7 @@ from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, polygo
 
 
 @njit(cache=True, error_model="numpy")
-def _box(corner, size):  # type: ignore[no-untyped-def]
+def _box(corner, size):
     """Return first column, last column, first row, last row of texels that a triangle (3, 2) may touch."""
     low_x, high_x = min(corner[:, 0]), max(corner[:, 0])
     low_y, high_y = min(corner[:, 1]), max(corner[:, 1])
@@ -25,7 +26,7 @@ def _box(corner, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def texel_owners(uv, triangle, page, instance, size, owner, most):  # type: ignore[no-untyped-def]
+def texel_owners(uv, triangle, page, instance, size, owner, most):
     """Write to `owner` the instance that covers most of each pixel; `most` is that area, in texels."""
     corner = np.zeros((3, 2))
     cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
@@ -44,7 +45,7 @@ def texel_owners(uv, triangle, page, instance, size, owner, most):  # type: igno
 
 
 @njit(cache=True, error_model="numpy")
-def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):  # type: ignore[no-untyped-def]
+def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):
     """Count the pieces of triangles inside wanted texels (no `write`), or store them from `at` on."""
     corner = np.zeros((3, 2))
     cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
@@ -70,7 +71,7 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
 
 
 @njit(cache=True, error_model="numpy")
-def spread_pieces(  # type: ignore[no-untyped-def]
+def spread_pieces(
     uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):
     """Choose places uniform in the area of a texel's pieces: their triangles, weights and area in all.

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Irradiance of texels from emissive triangles: shadow rays to sampled points, weighted for MIS.
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
@@ -46,13 +47,13 @@ _parts = scratch((N_POINTS, 6 * LANES), _f)
 
 
 @inner
-def mis_weighted(cosine, density, n_light, n_hemisphere):  # type: ignore[no-untyped-def]
+def mis_weighted(cosine, density, n_light, n_hemisphere):
     """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
     return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
 
 
 @inner
-def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[no-untyped-def]
+def load_points(rays, facing, origin, normal, group, lanes, k):
     """Write origins of point k of texels group to group + lanes to `rays`, normals to `facing` (3 * 16,)."""
     for lane in range(lanes):
         for a in range(3):
@@ -61,7 +62,7 @@ def load_points(rays, facing, origin, normal, group, lanes, k):  # type: ignore[
 
 
 @inner
-def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):  # type: ignore[no-untyped-def]
+def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):
     """Choose an emitter for every lane and copy what is needed of it.
 
     row, starts, chance, cumulative : see `emitters.Lamps`
@@ -104,7 +105,7 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
 
 
 @inner
-def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  # type: ignore[no-untyped-def]
+def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):
     """Write the shadow ray of every lane and its two weights; lanes that see no light get weight 0.
 
     uv : (2 * 16,) float32, becomes the barycentrics b1 and b2 on the emitter
@@ -140,7 +141,7 @@ def aim_at_lamps(rays, facing, uv, lamp, n_light, first_n, second_n, weight):  #
 
 
 @kernel
-def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, exact, out, second):  # type: ignore[no-untyped-def]
+def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, hemisphere, exact, out, second):
     """Add the light-sampled share of irradiance of texels, and return the number of shadow rays cast.
 
     Sixteen neighbouring texels first look: one ray from each of their points. If none of these up to 256
@@ -284,7 +285,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
 
 
 @inner
-def emitter_hit(  # type: ignore[no-untyped-def]
+def emitter_hit(
     row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
 ):
     """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0: back)."""

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """One step of the conjugate gradients that solve the radiosity equation, in one pass over memory per vector.
 
 Based on: Saad, Iterative methods for sparse linear systems, 2003, algorithm 9.1.
@@ -13,9 +14,7 @@ _three = scratch((3,), np.float64)
 
 
 @kernel
-def conjugate_step(  # type: ignore[no-untyped-def]
-    product, albedo, weight, direction, exitance, rest, allowed, dark, active, size, worst
-):
+def conjugate_step(product, albedo, weight, direction, exitance, rest, allowed, dark, active, size, worst):
     """Advance the solution of (I - rho F) x = rest by one step, for each colour of its own.
 
     product : (P, 3) float64, F direction; overwritten

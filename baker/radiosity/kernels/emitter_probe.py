@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Finds which clusters of emitters the texels of a tile can see at all, by a few shadow rays."""
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _INV_2_24 = np.float32(5.9604645e-08)
 
 
 @kernel
-def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, asked, seen):  # type: ignore[no-untyped-def]
+def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, asked, seen):
     """Count the rays to each cluster that could carry light, and those that nothing blocks.
 
     origin, normal : (m, 16, 3) float32, points of neighbouring texels
@@ -57,12 +58,12 @@ def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, a
 
 
 @inner
-def _uniform(code, dimension):  # type: ignore[no-untyped-def]
+def _uniform(code, dimension):
     return _f(hash_combine(code, np.uint32(_SALT + dimension)) >> np.uint32(8)) * _INV_2_24
 
 
 @inner
-def _aim(rays, lane, normal, i, k, row, start, end, code):  # type: ignore[no-untyped-def]
+def _aim(rays, lane, normal, i, k, row, start, end, code):
     """Write a ray to a point of a cluster's emitters start to end; return -1 if light may come from there."""
     u = _uniform(code, 2)
     m, high = np.int64(start), np.int64(end) - 1

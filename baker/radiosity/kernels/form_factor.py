@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Form factors of patches by cosine-weighted rays, and products with their matrix.
 
     F_ij = share of what leaves patch i that arrives at j = share of i's cosine rays that hit j
@@ -34,9 +35,7 @@ LOST, SKY, SPLIT = -1, -2, -3
 
 
 @kernel
-def cast_form_factors(  # type: ignore[no-untyped-def]
-    origin, normal, table, seen, caster, begin, net, shared, target, tally, colour
-):
+def cast_form_factors(origin, normal, table, seen, caster, begin, net, shared, target, tally, colour):
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
@@ -108,7 +107,7 @@ def cast_form_factors(  # type: ignore[no-untyped-def]
 
 
 @inner
-def _note_colour(tint, colour, group, lanes, r):  # type: ignore[no-untyped-def]
+def _note_colour(tint, colour, group, lanes, r):
     if tint is None or len(colour) == 0:
         return
     for lane in range(lanes):
@@ -117,7 +116,7 @@ def _note_colour(tint, colour, group, lanes, r):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-untyped-def]
+def multiply(first, column, value, exitance, irradiance):
     """Write irradiance = F exitance, both (P, 3) float64."""
     for i in range(len(first) - 1):
         red = green = blue = 0.0
@@ -133,7 +132,7 @@ def multiply(first, column, value, exitance, irradiance):  # type: ignore[no-unt
 
 
 @kernel
-def multiply_coloured(first, column, value, tint, exitance, irradiance):  # type: ignore[no-untyped-def]
+def multiply_coloured(first, column, value, tint, exitance, irradiance):
     """Write the same where light is multiplied by `tint` (nnz, 3) float32 on its way."""
     for i in range(len(first) - 1):
         red = green = blue = 0.0
@@ -149,7 +148,7 @@ def multiply_coloured(first, column, value, tint, exitance, irradiance):  # type
 
 
 @kernel
-def transpose(first, column, value, at, out_column, out_value):  # type: ignore[no-untyped-def]
+def transpose(first, column, value, at, out_column, out_value):
     """Write column and value of the transpose of a square CSR matrix; columns rise.
 
     at : (P,) int64, where each row of the transpose begins; moved to where it ends
@@ -163,7 +162,7 @@ def transpose(first, column, value, at, out_column, out_value):  # type: ignore[
 
 
 @kernel
-def weigh_reciprocal(  # type: ignore[no-untyped-def]
+def weigh_reciprocal(
     first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
 ):
     """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
@@ -202,7 +201,7 @@ def weigh_reciprocal(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def scale_symmetric(first, column, value, goal, slack, factor, steps):  # type: ignore[no-untyped-def]
+def scale_symmetric(first, column, value, goal, slack, factor, steps):
     """Turn F_ij into d_i F_ij d_j, with factors d (P,) that make row sums `goal`; A_i F_ij stays symmetric.
 
     `slack` (P,) is how uncertain a goal is: d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without it a

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Final gather: what a texel's hemisphere rays see, and how far they go.
 
     E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit (emitters aside)
@@ -46,9 +47,7 @@ _numbers, _counts, _rgba = scratch((LANES,), np.int64), scratch((LANES,), np.int
 
 
 @kernel
-def gather(  # type: ignore[no-untyped-def]
-    origin, normal, table, seen, lamps, shading, caster, begin, net, shared, sky, limits, exact, out
-):
+def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shared, sky, limits, exact, out):
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
@@ -205,7 +204,7 @@ def gather(  # type: ignore[no-untyped-def]
 
 
 @inner
-def _add_coloured_sky(tint, words, sky, missed, part):  # type: ignore[no-untyped-def]
+def _add_coloured_sky(tint, words, sky, missed, part):
     """Add the sky's light where it passed coloured surfaces; those rays do not count as `missed`."""
     if tint is None:
         return
@@ -223,7 +222,7 @@ def _add_coloured_sky(tint, words, sky, missed, part):  # type: ignore[no-untype
 
 
 @kernel
-def open_share(origin, normal, caster, begin, net, shared, distance, look, out):  # type: ignore[no-untyped-def]
+def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
     """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Irradiance from evenly shining triangles with nothing in between, in closed form.
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
@@ -33,7 +34,7 @@ _SMALL_VIEW = np.float32(1.0e-4)
 
 
 @inner
-def angle_over_sine(x, sine):  # type: ignore[no-untyped-def]
+def angle_over_sine(x, sine):
     """Return an angle over its sine from its cosine x in [-1, 1], float32; relative error under 1e-6.
 
     Both are asked for: near a straight angle the cosine alone does not tell the sine any more.
@@ -57,7 +58,7 @@ def angle_over_sine(x, sine):  # type: ignore[no-untyped-def]
 
 
 @inner
-def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-untyped-def]
+def clear_light(origin, normal, group, lanes, row, found):
     """Write the irradiance of sixteen texels from all emitters, as if nothing stood in between.
 
     origin, normal : (m, 16, 3) float32, texels group to group + lanes are lit
@@ -85,7 +86,7 @@ def clear_light(origin, normal, group, lanes, row, found):  # type: ignore[no-un
 
 
 @pasted
-def _reach_for(work, j, x, y, z):  # type: ignore[no-untyped-def]
+def _reach_for(work, j, x, y, z):
     """Write the arms to corner j of a triangle and its heights above the surfaces."""
     for lane in range(LANES):
         ax, ay, az = x - work[lane], y - work[LANES + lane], z - work[2 * LANES + lane]
@@ -97,7 +98,7 @@ def _reach_for(work, j, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
+def _reach_for_corners(work, row, m, lanes):
     """Write the arms to the corners of what of triangle m lies above each surface.
 
     Returns how many corners that are at most, 3 or 4, and 0 if no lane sees any of it.
@@ -153,7 +154,7 @@ def _reach_for_corners(work, row, m, lanes):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _cut(work, lane):  # type: ignore[no-untyped-def]
+def _cut(work, lane):
     """Cut off what of a lane's triangle lies below its surface: three or four corners remain."""
     corner = _corners()
     n = 0
@@ -177,7 +178,7 @@ def _cut(work, lane):  # type: ignore[no-untyped-def]
 
 
 @pasted
-def _add_edge(work, first, second):  # type: ignore[no-untyped-def]
+def _add_edge(work, first, second):
     """Add the edge between two corners of every lane to its sum; one without length adds nothing."""
     for lane in range(LANES):
         ax, bx = work[(_ARM + 3 * first) * LANES + lane], work[(_ARM + 3 * second) * LANES + lane]
@@ -195,7 +196,7 @@ def _add_edge(work, first, second):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _add_edges(work, corners):  # type: ignore[no-untyped-def]
+def _add_edges(work, corners):
     """Write the sum over the edges between the corners of every lane."""
     for lane in range(LANES):
         work[_SUM * LANES + lane] = _f(0.0)

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Regions of charts: texels that see each other along the surface, by links between neighbours."""
 
 from __future__ import annotations
@@ -6,7 +7,7 @@ from baker.trace.jit import kernel
 
 
 @kernel
-def join_linked(link, root):  # type: ignore[no-untyped-def]
+def join_linked(link, root):
     """Write the smallest node that each node is linked to, directly or over others: union-find.
 
     link : (m, 2) int32; root : (n,) int32, each node's own number on entry
@@ -29,7 +30,7 @@ def join_linked(link, root):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
+def flood_regions(chart, region, queue):
     """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
 
     chart, region : (H, W) int32, -1: empty, no region yet; queue : (H * W,) int64, memory
@@ -57,7 +58,7 @@ def flood_regions(chart, region, queue):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):  # type: ignore[no-untyped-def]
+def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):
     """List neighbouring entries of one chart and side; return how many pairs were written.
 
     pixel (n,) int64, back (n,) bool, chart (n,) int32, lookup (P * H * W,) int32 and back_entry (n_front,)

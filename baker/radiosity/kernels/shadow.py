@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Sums light over a texel's points where the shadow ray meets nothing that blocks it."""
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ _f = np.float32
 
 
 @kernel
-def add_visible(caster, origin, ray, weight, colour, out):  # type: ignore[no-untyped-def]
+def add_visible(caster, origin, ray, weight, colour, out):
     """Add colour * mean over a texel's 16 points of weight * visibility to `out`, both column blocks.
 
     origin : (n, 16, 3) float32; ray : (n, 16, 4) float32, direction and reach in units of its length

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Texels that lie on both sides of a surface passing through them: which of their points see each other.
 
 A floor that runs on under a wall has texels with points on both sides of that wall. Two points of a texel lie
@@ -48,7 +49,7 @@ _frame = scratch((12 * LANES,), np.float32)
 
 
 @kernel
-def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[no-untyped-def]
+def crossed_texels(surface, begin, end, caster, crossed, side):
     """Find texels that some surface may pass through: a line just above their square is blocked.
 
     Entries begin to end are examined.
@@ -134,7 +135,7 @@ def crossed_texels(surface, begin, end, caster, crossed, side):  # type: ignore[
 
 
 @inner
-def _between(rays, lane, origin, normal, height, m, i, k):  # type: ignore[no-untyped-def]
+def _between(rays, lane, origin, normal, height, m, i, k):
     """Write the segment between points i of item m and k of the same arrays into a lane."""
     h = smaller(height[m, i], height[m, k])
     return segment(
@@ -147,7 +148,7 @@ def _between(rays, lane, origin, normal, height, m, i, k):  # type: ignore[no-un
 
 
 @kernel
-def point_heights(origin, normal, side, caster, height):  # type: ignore[no-untyped-def]
+def point_heights(origin, normal, side, caster, height):
     """Write the height at which segments from points run, (n,) float32: see the module.
 
     origin, normal : (n, 3) float32; side : (n,) float32, metres, of the texel of each
@@ -172,7 +173,7 @@ def point_heights(origin, normal, side, caster, height):  # type: ignore[no-unty
 
 
 @kernel
-def group_points(origin, normal, height, mask, caster, label):  # type: ignore[no-untyped-def]
+def group_points(origin, normal, height, mask, caster, label):
     """Group the points of texels by mutual visibility.
 
     origin, normal : (m, 16, 3) float32; height : (m, 16) float32, from `point_heights`
@@ -232,7 +233,7 @@ def group_points(origin, normal, height, mask, caster, label):  # type: ignore[n
 
 
 @kernel
-def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, hidden):  # type: ignore[no-untyped-def]
+def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, hidden):
     """Find texels with a corner of their surface that none of their points sees, or with a blocked outline.
 
     A surface that cuts off a corner leaves no point behind itself, but rays may hit what lies there. An edge
@@ -284,7 +285,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
 
 
 @inner
-def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m, k):  # type: ignore[no-untyped-def]
+def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m, k):
     """Write the segment from corner j to point k of item m into a lane."""
     h = smaller(headroom[0, j], height[m, k])
     return segment(
@@ -297,9 +298,7 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 
 
 @inner
-def _look_for_corners(  # type: ignore[no-untyped-def]
-    point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden
-):
+def _look_for_corners(point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden):
     """Set hidden[m] if no point of item m sees one of `found` corners (1, 16, 3), or one not the next.
 
     Returns the number of rays cast.
@@ -375,9 +374,7 @@ def _look_for_corners(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def free_segments(  # type: ignore[no-untyped-def]
-    origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, free
-):
+def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, free):
     """Find out which pairs of points see each other.
 
     origin_*, normal_* : (n, 3) float32; height_* : (n,) float32; free : (n,) uint8 output
@@ -405,7 +402,7 @@ def free_segments(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_backs(origin, normal, table, caster, net, shared, count):  # type: ignore[no-untyped-def]
+def count_backs(origin, normal, table, caster, net, shared, count):
     """Count how many rays, one from each point of a texel, meet the back of a one-sided surface first.
 
     origin, normal : (m, 16, 3) float32; net : (16, 2) uint32; shared : uint32, see `sampling`

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Hits on edges that triangles of one surface share: a ray through such an edge crosses the surface once.
 
 Embree's ROBUST test never lets a ray slip between two triangles. In turn it may report both of them where a
@@ -23,13 +24,13 @@ SAME = np.float32(4.0e-6)
 
 
 @inner
-def on_edge(b1, b2):  # type: ignore[no-untyped-def]
+def on_edge(b1, b2):
     """Tell whether barycentric coordinates lie on an edge of a triangle."""
     return b1 <= EDGE or b2 <= EDGE or 1.0 - b1 - b2 <= EDGE
 
 
 @inner
-def crossed_before(context, words, number, surface, distance):  # type: ignore[no-untyped-def]
+def crossed_before(context, words, number, surface, distance):
     """Tell whether ray `number` met an edge of the same surface at the same distance; if not, remember it.
 
     context, words : what the filter function finds behind the query's context, as float32 and uint32

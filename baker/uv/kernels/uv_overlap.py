@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Counts the samples of a uv layout that lie strictly inside more than one triangle."""
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from baker.trace.jit import kernel, larger, smaller
 
 
 @kernel
-def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):  # type: ignore[no-untyped-def]
+def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):
     """Mark the samples each triangle covers and count those that were covered before.
 
     Sample (r, c) lies at (c + 0.5, r + 0.5). A sample closer than `slack` to an edge does not count,
@@ -66,7 +67,7 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
 
 
 @kernel
-def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
+def mark_charts(corner, chart, owner):
     """Write chart + 1 into each free texel whose square a triangle enters.
 
     Parameters
@@ -106,7 +107,7 @@ def mark_charts(corner, chart, owner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_close(owner, gap):  # type: ignore[no-untyped-def]
+def count_close(owner, gap):
     """Count owned texels that have another owner's texel within `gap` rows and columns."""
     height, width = owner.shape
     count = 0
