@@ -44,7 +44,11 @@ def imports(texts):
 def test_packages_name_what_their_kernels_are_made_of(texts, imports):
     """Else an update of one package would leave yesterday's kernels of another one in use."""
     kernels = {name for name, text in texts.items() if KERNEL.search(text)}
-    assert {"baker.radiosity.kernels.gather", "baker.pathtracer.paths", "baker.lights.spot"} <= kernels
+    assert {
+        "baker.radiosity.kernels.gather",
+        "baker.pathtracer.paths",
+        "baker.lights.families.spot",
+    } <= kernels
     named = {}
     for name, text in texts.items():
         for call in KEEPS.findall(text):

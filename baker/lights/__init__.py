@@ -1,4 +1,4 @@
-"""Plugins: one family of lights a file; emissive triangles as a table of emitters."""
+"""What a family of lights offers, and their register; emissive triangles as a table of emitters."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -35,4 +35,4 @@ class LightFamily(Protocol):
         """
 
 
-LIGHT_FAMILIES: Registry[LightFamily] = Registry("baker.lights")
+LIGHT_FAMILIES: Registry[LightFamily] = Registry("baker.lights.families")

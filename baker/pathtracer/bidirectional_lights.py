@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from baker.kernels.sampling import tangent_frame, triangle_barycentric
-from baker.lights.point import range_window
+from baker.lights.families.point import range_window
 from baker.pathtracer.bidirectional_weights import (
     BACK,
     CHAIN,

@@ -21,7 +21,7 @@ from baker.core.scene import Scene
 from baker.kernels.sampling import triangle_barycentric
 from baker.kernels.shading import Shading
 from baker.lights.emissive import build_emitters
-from baker.lights.point import range_window
+from baker.lights.families.point import range_window
 from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)

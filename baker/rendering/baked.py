@@ -21,7 +21,7 @@ from baker.pathtracer.vertex import glow
 from baker.trace.jit import kernel, scratch
 from baker.trace.kernel_cache import keep_kernels
 
-keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.lights", "baker.pathtracer")
+keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.lights.families", "baker.pathtracer")
 
 _new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.scene import PunctualLight
+from baker.lights.families.point import inverse_square
 from baker.lights.family import LIGHT_FAMILIES
-from baker.lights.point import inverse_square
 from baker.trace.jit import kernel, larger, smaller
 
 
