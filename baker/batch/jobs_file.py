@@ -11,16 +11,15 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from baker.core.errors import InputError, SettingsError
+from baker.core.names import unknown_name
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.bake.output_folder import own_files
 
 _TABLES = ("defaults", "job")
-_PLACEHOLDERS = ("stem", "parent")
 _WILD = re.compile(r"[*?\[]")
 
 
@@ -67,7 +66,7 @@ def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
     tables = document.get("job", [])
     for name in document:
         if name not in _TABLES:
-            raise _error(path, name, f"there is no table '{name}'{_nearest(name, _TABLES)}")
+            raise unknown_name("table", name, _TABLES, file=str(path), object=name)
     if not isinstance(defaults, dict):
         raise _error(path, "defaults", "it must be a table, written [defaults]")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -104,7 +103,7 @@ def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, .
     for key in table:
         name = key.replace("-", "_")
         if name not in known:
-            raise _error(path, where, f"there is no setting '{key}'{_nearest(name, known)}")
+            raise unknown_name("setting", key, known, file=str(path), object=where)
         if name in seen:
             raise _error(path, where, f"'{key}' is given twice")
         seen.add(name)
@@ -149,14 +148,14 @@ def _find(path: Path, where: str, pattern: str) -> list[Path]:
     """Return the scene files that a pattern finds, without hidden files and without what bakes wrote."""
     import glob
 
-    from baker.io.load import importers
+    from baker.io.load import IMPORTERS
 
     base = path.parent
     found = []
     # Not Path.glob: it takes no absolute pattern and finds hidden files.
     for name in sorted(glob.glob(pattern, root_dir=base, recursive=True)):  # noqa: PTH207
         scene = base / name
-        if not scene.is_file() or scene.suffix.lower() not in importers.names():
+        if not scene.is_file() or scene.suffix.lower() not in IMPORTERS.names():
             continue
         if not _written_by_a_bake(scene, base):
             found.append(scene)
@@ -182,8 +181,7 @@ def _output(path: Path, where: str, pattern: str, scene: Path) -> Path:
     def put(match: re.Match[str]) -> str:
         name = match.group(1)
         if name not in words:
-            hint = _nearest(name, _PLACEHOLDERS) or "; it knows {stem} and {parent}"
-            raise _error(path, where, f"out knows no {{{name}}}{hint}")
+            raise unknown_name("placeholder of out", name, words, file=str(path), object=where)
         return words[name]
 
     return path.parent / re.sub(r"\{([^{}]*)\}", put, pattern)
@@ -211,11 +209,6 @@ def _check_outputs(path: Path, jobs: list[Job]) -> None:
                     f"the output '{job.out}' lies inside '{other.out}', which is an output too; move one",
                     file=str(path),
                 )
-
-
-def _nearest(name: str, known: Any) -> str:
-    near = get_close_matches(name, list(known), n=1)
-    return f"; did you mean '{near[0]}'?" if near else ""
 
 
 def _error(path: Path, where: str, message: str) -> SettingsError:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 
 from baker.checks.rule import CHECKS
-from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,7 @@ def parse_ignore(rules: Iterable[str]) -> list[Ignore]:
     for rule in rules:
         code, at, name = rule.partition("@")
         if not any(fnmatchcase(entry, code) for entry in known):
-            near = get_close_matches(code, known, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else "; docs/CHECKS.md lists all codes"
-            raise SettingsError(f"there is no finding '{code}' to ignore{hint}", object="ignore")
+            listed = "docs/CHECKS.md lists all codes"
+            raise unknown_name("finding", code, known, object="ignore", listed=listed)
         out.append(Ignore(code, name if at else "*"))
     return out

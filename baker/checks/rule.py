@@ -64,7 +64,7 @@ def check(
 
 def all_checks() -> list[Check]:
     """Return every check, by group, then by code."""
-    found = [entry for name in CHECKS.names() if (entry := CHECKS.get(name)) is not None]
+    found = [CHECKS.require(name, "check") for name in CHECKS.names()]
     return sorted(found, key=lambda entry: (GROUPS.index(entry.group), entry.code))
 
 

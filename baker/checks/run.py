@@ -113,8 +113,7 @@ def _run(
 
 def _index_range(error: IndexRangeError) -> Finding:
     # Some formats cannot be taken apart any further once an index is wrong.
-    entry = CHECKS.get("index-range")
-    assert entry is not None
+    entry = CHECKS.require("index-range", "check")
     found = Found(error.message, Place(error.object or ""))
     return Finding(entry.code, entry.severity, error.message, entry.fix, found)
 

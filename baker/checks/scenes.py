@@ -13,7 +13,7 @@ from baker.checks.settings import CheckSettings
 from baker.core.errors import InputError
 from baker.core.progress import Progress, silent
 from baker.core.settings import BakeSettings
-from baker.io.load import importers
+from baker.io.load import IMPORTERS
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
     InputError
         For a folder or a pattern without any scene file.
     """
-    known = set(importers.names())
+    known = set(IMPORTERS.names())
     found: dict[Path, None] = {}
     for path in paths:
         if path.is_dir():

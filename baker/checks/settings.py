@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
 from typing import Any
 
 from baker.checks.context import DEFAULT_MIP
 from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 from baker.core.scene import Scene
 
 LIMITS = ("warning", "error")
@@ -64,9 +64,7 @@ def make_check_settings(values: Mapping[str, Any], *, where: str = "") -> CheckS
     for key, value in values.items():
         name = key.replace("-", "_")
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(known)}"
-            raise fail(f"there is no check setting '{key}'{hint}", key)
+            raise unknown_name("check setting", key, known, file=where or None, object=key)
         clean[name] = value
     limit, ignore = clean.get("fail_on"), clean.get("ignore", ())
     if limit is not None and limit not in LIMITS:

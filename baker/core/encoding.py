@@ -167,6 +167,6 @@ ENCODINGS: Registry[Encoding] = Registry("baker.encodings")
 
 def encoding_of(name: str) -> Encoding | None:
     """Return the encoding whose suffix ends a file's name (the longest one that does), or None."""
-    plugins = [plugin for key in ENCODINGS.names() if (plugin := ENCODINGS.get(key)) is not None]
+    plugins = [ENCODINGS.require(key, "encoding") for key in ENCODINGS.names()]
     fitting = [plugin for plugin in plugins if name.lower().endswith(plugin.suffix)]
     return max(fitting, key=lambda plugin: len(plugin.suffix), default=None)

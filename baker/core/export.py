@@ -38,11 +38,7 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     SettingsError
     """
     for name in names:
-        export = EXPORTS.get(name)
-        if export is None:
-            known = ", ".join(EXPORTS.names())
-            raise SettingsError(f"there is no export '{name}'; known are {known}", object="export")
-        for channel in export.needs:
+        for channel in EXPORTS.require(name, "export", setting="export").needs:
             if channel not in channels:
                 message = f"the export '{name}' needs the channel {channel}; add it to --channels"
                 raise SettingsError(message, object="export")

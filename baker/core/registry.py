@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Generic, TypeVar
+
+from baker.core.names import unknown_name
 
 T = TypeVar("T")
 
@@ -54,3 +56,27 @@ class Registry(Generic[T]):
         """Return the plugin of that name, or None."""
         self._search()
         return self._plugins.get(name)
+
+    def require(self, name: str, what: str, *, setting: str | None = None, hidden: Collection[str] = ()) -> T:
+        """Return the plugin of that name.
+
+        Parameters
+        ----------
+        name : str
+        what : str
+            What the plugins of this registry are, in the singular, for the message: "channel".
+        setting : str or None
+            The setting that gave the name, for the message.
+        hidden : collection of str
+            Names that the message does not offer, because the setting does not take them.
+
+        Raises
+        ------
+        SettingsError
+            If there is none; it tells the nearest name and all names.
+        """
+        plugin = self.get(name)
+        if plugin is None:
+            known = [other for other in self.names() if other not in hidden]
+            raise unknown_name(what, name, known, object=setting)
+        return plugin

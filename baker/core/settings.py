@@ -5,13 +5,13 @@ The command line, the configuration file and the settings page of the docs are m
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
+from baker.core.names import unknown_name
 
 # Hemisphere rays per texel for each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
@@ -146,9 +146,7 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
     for key, value in values.items():
         name = key.replace("-", "_")
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else f"; known settings are {', '.join(known)}"
-            raise SettingsError(f"there is no setting '{key}'{hint}", object=key)
+            raise unknown_name("setting", key, known, object=key)
         if name in {"ao_distance", "sky", "rgbm_range"} and isinstance(value, int | float):
             value = str(value)
         if name == "sky" and isinstance(value, list | tuple):

@@ -49,7 +49,7 @@ class SceneFile:
 
 
 Importer = Callable[[SceneFile], Scene]
-importers: Registry[Importer] = Registry("baker.io.importers")
+IMPORTERS: Registry[Importer] = Registry("baker.io.importers")
 
 
 def load_scene(
@@ -66,7 +66,7 @@ def load_scene(
     Parameters
     ----------
     path : Path or str
-        A file whose suffix one of the `importers` knows.
+        A file whose suffix one of the `IMPORTERS` knows.
     up : str
         "y" or "z", the up axis of OBJ, PLY, STL and OFF files. glTF is always +Y up.
     scale : float
@@ -100,9 +100,9 @@ def load_scene(
     if not (math.isfinite(scale) and scale > 0):
         raise SettingsError(f"scale {scale} is not a positive number of metres per unit", object="scale")
     data = read_scene_file(path)
-    importer = importers.get(path.suffix.lower())
+    importer = IMPORTERS.get(path.suffix.lower())
     if importer is None:
-        known = ", ".join(importers.names())
+        known = ", ".join(IMPORTERS.names())
         what = (
             f"'{path.suffix}' is not a known scene format" if path.suffix else "the file name has no suffix"
         )

@@ -6,7 +6,6 @@ their size, so that a bake too dark fails like one too bright.
 
 from __future__ import annotations
 
-import difflib
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 
 _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
@@ -88,8 +88,9 @@ def parse_limits(text: str, channels: Iterable[str], figures: Iterable[str]) -> 
                 f"'{part.strip()}' is not of the form channel.figure > number", object="--fail-if"
             )
         channel, figure, sign, number = match.groups()
-        _known(channel, channels, "channel")
-        _known(figure, figures, "figure")
+        for what, name, known in (("channel", channel, channels), ("figure", figure, figures)):
+            if name not in known:
+                raise unknown_name(what, name, known, object="--fail-if")
         try:
             value = float(number)
         except ValueError:
@@ -98,14 +99,6 @@ def parse_limits(text: str, channels: Iterable[str], figures: Iterable[str]) -> 
             raise SettingsError("a limit of nan is never reached", object="--fail-if")
         limits.append(Limit(channel, figure, sign, value))
     return limits
-
-
-def _known(name: str, names: list[str], what: str) -> None:
-    if name in names:
-        return
-    near = difflib.get_close_matches(name, names, 1)
-    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(names)}"
-    raise SettingsError(f"there is no {what} '{name}'; {hint}", object="--fail-if")
 
 
 def judge(

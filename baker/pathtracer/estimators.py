@@ -10,10 +10,9 @@ simulation, 1997, ch. 8 and 9.
 
 from __future__ import annotations
 
-import difflib
 from typing import NamedTuple
 
-from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 
 
 class Estimator(NamedTuple):
@@ -60,8 +59,6 @@ def estimator_named(name: str) -> Estimator:
     SettingsError
         If there is none of that name.
     """
-    if name in ESTIMATORS:
-        return ESTIMATORS[name]
-    near = difflib.get_close_matches(name, ESTIMATORS, 1)
-    hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(ESTIMATORS)}"
-    raise SettingsError(f"there is no estimator '{name}'{hint}", object="estimator")
+    if name not in ESTIMATORS:
+        raise unknown_name("estimator", name, ESTIMATORS, object="estimator")
+    return ESTIMATORS[name]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from baker.channels.channel import CHANNELS, Channel
 from baker.checks.in_bake import bake_warnings
-from baker.core.errors import ResourceError, SettingsError
+from baker.core.errors import ResourceError
 from baker.core.executor import Farm, LocalFarm
 from baker.core.export import check_exports
 from baker.core.lightmap import BakeResult
@@ -104,10 +104,4 @@ def bake(
 
 def _channels(settings: BakeSettings) -> dict[str, Channel]:
     """Look up the channels asked for, in the order asked."""
-    found: dict[str, Channel] = {}
-    for name in settings.channels:
-        channel = CHANNELS.get(name)
-        if channel is None:
-            raise SettingsError(f"there is no channel '{name}'; known are {', '.join(CHANNELS.names())}")
-        found[name] = channel
-    return found
+    return {name: CHANNELS.require(name, "channel", setting="channels") for name in settings.channels}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 from baker.pathtracer.estimators import estimator_named
 
 AOVS = ("albedo", "normal", "depth")
@@ -80,7 +81,7 @@ class RenderSettings:
         estimator_named(self.estimator)
         unknown = [name for name in self.aov if name not in AOVS]
         if unknown:
-            raise SettingsError(f"there is no AOV '{unknown[0]}'; known are {', '.join(AOVS)}", object="aov")
+            raise unknown_name("AOV", unknown[0], AOVS, object="aov")
 
     @property
     def goal(self) -> int | None:

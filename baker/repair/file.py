@@ -18,7 +18,7 @@ from baker.io.gltf.edited_primitive import MendedPrimitive, RemadePrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
 from baker.io.gltf.write_fixed import write_mended
 from baker.io.gltf.write_source import raw_glb
-from baker.io.load import SceneFile, importers, load_scene
+from baker.io.load import IMPORTERS, SceneFile, load_scene
 from baker.repair.inside_out import faces_to_turn
 from baker.repair.lightmap_uv import new_lightmap_uv
 from baker.repair.mesh import repair_mesh
@@ -256,9 +256,7 @@ def _names_files(source: SourceDocument) -> bool:
 
 
 def _read_glb(path: Path, data: bytes) -> Scene:
-    importer = importers.get(".glb")
-    assert importer is not None
-    return importer(SceneFile(path, data, lenient=True))
+    return IMPORTERS.require(".glb", "importer")(SceneFile(path, data, lenient=True))
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:

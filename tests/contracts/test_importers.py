@@ -9,7 +9,7 @@ import pytest
 from gltf_builder import QUAD, QUAD_TRIANGLE, quad_builder
 
 from baker.core.errors import BakerError, InputError
-from baker.io.load import importers, load_scene
+from baker.io.load import IMPORTERS, load_scene
 
 _OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 _OFF = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
@@ -33,7 +33,7 @@ SQUARES = {
 
 
 def test_every_importer_has_a_square():
-    assert importers.names() == sorted(SQUARES)
+    assert IMPORTERS.names() == sorted(SQUARES)
 
 
 @pytest.mark.parametrize("suffix", sorted(SQUARES))

@@ -141,9 +141,7 @@ def _write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
 
 def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
     """Write one export into a folder of its name; return its files for the manifest."""
-    export = EXPORTS.get(name)
-    if export is None:
-        raise SettingsError(f"there is no export '{name}'; known are {', '.join(EXPORTS.names())}")
+    export = EXPORTS.require(name, "export", setting="export")
     target = folder / name
     target.mkdir()
     export.write(folder, target)
@@ -205,11 +203,8 @@ def encoding_named(name: str) -> Encoding:
     SettingsError
         If there is none.
     """
-    encoding = ENCODINGS.get(name)
-    if encoding is None:
-        known = ", ".join(other for other in ENCODINGS.names() if other != "exr")
-        raise SettingsError(f"there is no encoding '{name}'; known are {known}", object="encode")
-    return encoding
+    # The EXR is always written, so `encode` does not take it.
+    return ENCODINGS.require(name, "encoding", setting="encode", hidden=("exr",))
 
 
 def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:

@@ -26,7 +26,7 @@ from baker.io.gltf.mesh import read_primitives
 from baker.io.gltf.node import Placed, place_nodes
 from baker.io.gltf.skin import Poser
 from baker.io.gltf.unread import unneeded_faults
-from baker.io.load import SceneFile, importers
+from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.build import build_mesh
 from baker.topology.triangle_check import LARGEST_COORDINATE
 
@@ -57,8 +57,8 @@ class _Built:
     place: NDArray[np.float64] | None
 
 
-@importers.register(".glb")
-@importers.register(".gltf")
+@IMPORTERS.register(".glb")
+@IMPORTERS.register(".gltf")
 def import_gltf(source: SceneFile) -> Scene:
     """Read a glTF file.
 

@@ -17,7 +17,7 @@ from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
 from baker.core.scene import Material, Scene
 from baker.core.source_mesh import PrimitiveArrays
-from baker.io.load import SceneFile, importers
+from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
 # It logs what it could not read with a traceback, which Python prints where no program asked for logs.
@@ -26,9 +26,9 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 
 
-@importers.register(".ply")
-@importers.register(".stl")
-@importers.register(".off")
+@IMPORTERS.register(".ply")
+@IMPORTERS.register(".stl")
+@IMPORTERS.register(".off")
 def import_mesh_file(source: SceneFile) -> Scene:
     """Read a PLY, STL or OFF file as a grey mesh, with its vertex colours if it has any.
 

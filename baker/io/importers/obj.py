@@ -21,7 +21,7 @@ from baker.core.errors import IndexRangeError, InputError
 from baker.core.scene import Material, Scene, SceneWarning
 from baker.core.source_mesh import PrimitiveArrays
 from baker.io.images import decode_image
-from baker.io.load import SceneFile, importers
+from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.mtl import read_mtl
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
@@ -31,7 +31,7 @@ _VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
 _NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
 
 
-@importers.register(".obj")
+@IMPORTERS.register(".obj")
 def import_obj(source: SceneFile) -> Scene:
     """Read an OBJ file and the MTL files and images that it names.
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import pytest
 
 from baker.core.errors import BakerError, Cancelled, InputError, ResourceError, SettingsError
+from baker.core.names import unknown_name
 from baker.core.registry import Registry
 
 
@@ -42,11 +44,51 @@ def test_files_register_themselves(plugins):
 
 
 def test_a_name_is_taken_once():
-    registry = Registry("baker.lights")
+    registry = Registry("baker.lights.families")
     assert registry.register("mine")(len) is len
-    with pytest.raises(ValueError, match=r"'mine' is registered twice in baker\.lights"):
+    with pytest.raises(ValueError, match=r"'mine' is registered twice in baker\.lights\.families"):
         registry.register("mine")(max)
     assert registry.get("mine") is len
+
+
+@pytest.mark.parametrize(
+    ("name", "hidden", "message"),
+    [
+        ("zeat", (), "there is no thing 'zeat'; did you mean 'zeta'? (known are alpha, zeta)"),
+        ("ALPHA", (), "there is no thing 'ALPHA'; did you mean 'alpha'? (known are alpha, zeta)"),
+        ("xyz", (), "there is no thing 'xyz'; known are alpha, zeta"),
+        ("zeat", ("zeta",), "there is no thing 'zeat'; known are alpha"),
+    ],
+)
+def test_a_required_plugin_that_is_missing(plugins, name, hidden, message):
+    from some_plugins.base import THINGS
+
+    assert THINGS.require("zeta", "thing", hidden=hidden)() == "zeta!"
+    with pytest.raises(SettingsError) as caught:
+        THINGS.require(name, "thing", setting="things", hidden=hidden)
+    assert (caught.value.message, caught.value.object) == (message, "things")
+
+
+def test_a_name_that_is_no_plugin():
+    error = unknown_name("setting", "Ao-Smaples", ["seed", "ao_samples"], file="a.toml", object="job 1")
+    assert error.message == (
+        "there is no setting 'Ao-Smaples'; did you mean 'ao_samples'? (known are seed, ao_samples)"
+    )
+    assert (error.file, error.object) == ("a.toml", "job 1")
+    error = unknown_name("code", "xyz", ["a"], listed="see there")
+    assert error.message == "there is no code 'xyz'; see there"
+    assert unknown_name("code", "aaa", ["aab"], listed="see there").message.endswith("'aab'? (see there)")
+
+
+def test_only_one_file_looks_for_the_nearest_name():
+    root = Path(__file__).parents[3]
+    homes = [
+        path.name
+        for folder in ("baker", "cli")
+        for path in (root / folder).rglob("*.py")
+        if "get_close_matches" in path.read_text("utf-8")
+    ]
+    assert homes == ["names.py"]
 
 
 @pytest.mark.parametrize(

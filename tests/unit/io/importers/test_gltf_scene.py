@@ -10,7 +10,7 @@ import pytest
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, quad_builder, write
 
 from baker.core.errors import InputError, SettingsError
-from baker.io.load import importers, load_scene
+from baker.io.load import IMPORTERS, load_scene
 
 
 def load(tmp_path, builder, **options):
@@ -264,4 +264,4 @@ def test_up_and_scale_are_checked_and_not_applied_to_gltf(tmp_path):
 
 
 def test_every_known_suffix_has_an_importer():
-    assert importers.names() == [".glb", ".gltf", ".obj", ".off", ".ply", ".stl"]
+    assert IMPORTERS.names() == [".glb", ".gltf", ".obj", ".off", ".ply", ".stl"]
