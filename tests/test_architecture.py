@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import os
 import re
 import shutil
@@ -152,25 +153,78 @@ def test_no_variable_of_the_environment_is_read():
     assert found == []
 
 
-def is_registration(decorator):
-    called = decorator.func if isinstance(decorator, ast.Call) else None
-    return isinstance(called, ast.Attribute) and called.attr == "register"
+def registrations(path):
+    """List what a file registers: variable of the registry, name, and node of what is registered."""
+    tree = tree_of(path)
+    calls = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            calls |= dict.fromkeys(node.decorator_list, node)
+        elif isinstance(node, ast.Call):
+            calls[node.func] = node
+    return [
+        (call.func.value.id, call.args[0].value, plugin)
+        for call, plugin in calls.items()
+        if isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr == "register"
+        and isinstance(call.args[0], ast.Constant)
+    ]
+
+
+def is_plugin(path, registry):
+    """Tell whether a file registers something in a registry; checks do so by their own decorator."""
+    if registry == "CHECKS":
+        return re.search(r"^@check\(", path.read_text("utf-8"), re.MULTILINE) is not None
+    return any(variable == registry for variable, _, _ in registrations(path))
+
+
+def registries():
+    """Return each registry's variable, as the source names it, with the registry."""
+    found = {}
+    for path in sources("baker"):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for node in ast.walk(tree_of(path)):
+            made = node.value if isinstance(node, ast.AnnAssign) else None
+            if isinstance(made, ast.Call) and getattr(made.func, "id", None) == "Registry":
+                found[node.target.id] = getattr(importlib.import_module(module), node.target.id)
+    return found
 
 
 def test_a_plugin_file_registers_one_thing():
-    count = {}
+    count, seen = {}, {}
     for path in sources("baker"):
-        plugins = [
-            node.name
-            for node in ast.walk(tree_of(path))
-            if isinstance(node, ast.ClassDef | ast.FunctionDef)
-            and any(map(is_registration, node.decorator_list))
-        ]
+        found = registrations(path)
         # One importer may answer to several file suffixes: names are not counted, plugins are.
-        if plugins:
-            count[name_of(path)] = plugins
-    assert count
-    assert {name: plugins for name, plugins in count.items() if len(plugins) > 1} == {}
+        count[name_of(path)] = len({plugin for _, _, plugin in found})
+        for registry, name, _ in found:
+            seen.setdefault(registry, []).append(name)
+    assert {name: plugins for name, plugins in count.items() if plugins > 1} == {}
+    # Nothing registers in a way that is not counted here. Checks do so through a decorator of their own.
+    names = {variable: registry.names() for variable, registry in registries().items()}
+    assert names.pop("CHECKS")
+    assert {variable: sorted(found) for variable, found in seen.items()} == names
+
+
+def test_registries_are_constants_and_find_only_plugins():
+    """A module of a registry's package is a plugin, or a plugin of the package imports it."""
+    found = registries()
+    assert len(found) >= 6
+    assert [variable for variable in found if not variable.isupper()] == []
+    idle = []
+    for variable, registry in found.items():
+        folder = ROOT.joinpath(*registry.package.split("."))
+        modules = {path.stem: path for path in folder.glob("*.py") if path.stem != "__init__"}
+        used = {name for name, path in modules.items() if is_plugin(path, variable)}
+        todo = list(used)
+        while todo:
+            tree = tree_of(modules[todo.pop()])
+            named = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+            fresh = {name for name in modules if f"{registry.package}.{name}" in named} - used
+            used |= fresh
+            todo += fresh
+        idle += [name_of(path) for name, path in modules.items() if name not in used]
+    assert idle == []
 
 
 def test_no_path_of_one_machine():
