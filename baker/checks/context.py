@@ -15,6 +15,7 @@ from baker.checks.finding import Place
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.scene_rays import World
 from baker.checks.uv_facts import UvFacts
+from baker.core.light_kind import check_light_kinds
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
@@ -40,6 +41,11 @@ class Subject:
         Speed of an earlier bake.
     probe : bool
         Measure the speed if it is not known.
+
+    Raises
+    ------
+    InputError
+        If a light is of an unknown kind.
     """
 
     def __init__(
@@ -51,6 +57,7 @@ class Subject:
         rates: Rates | None = None,
         probe: bool = False,
     ) -> None:
+        check_light_kinds(scene)
         self.scene = scene
         self.settings = settings
         self.mip = mip

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from baker.checks.emission import Emission
 from baker.checks.scene_rays import World
 from baker.core.colour import LUMINANCE_WEIGHTS
+from baker.core.light_kind import kind_of
 from baker.core.scene import PunctualLight, Scene
 from baker.core.settings import BakeSettings
 
@@ -98,16 +99,11 @@ def points_inside(
 def _punctual(
     world: World, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    from baker.lights.family import LIGHT_FAMILIES
-
-    family = LIGHT_FAMILIES.get(light.kind)
-    if family is None:
-        return np.zeros((len(origin), 3))
-    # A family fills rows of 16 points.
+    # A kind of light fills rows of 16 points.
     shape = (len(origin) // 16, 16)
     ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
     at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
-    family(light, at, up, ray, weight)
+    kind_of(light).fill(light, at, up, ray, weight)
     rows = ray.reshape(-1, 4)
     hit, _ = world.first_hits(origin, rows[:, :3], np.zeros(len(rows)), rows[:, 3])
     seen = np.where(hit < 0, weight.reshape(-1), 0.0)

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.errors import InputError
-from baker.core.light_limits import BRIGHTEST
 from baker.core.origin import scene_origin
 from baker.core.source_mesh import RawScene
 
@@ -135,14 +133,14 @@ class Instance:
 
 @dataclass(frozen=True)
 class PunctualLight:
-    """A light without area: point, spot or directional (KHR_lights_punctual).
+    """A light without area; what its kind means is in `core.light_kind` and `baker.lights.families`.
 
     Attributes
     ----------
     kind : str
-        "point", "spot" or "directional".
+        Name of a `LightKind`: "point", "spot" or "directional" (KHR_lights_punctual).
     intensity : (3,) tuple
-        Colour times intensity: cd for point and spot, lx for directional.
+        Colour times intensity, in the unit of the kind.
     position, direction : (3,) tuple, world space; direction is where the light shines to, unit.
     inner_cone, outer_cone : float, radians (spot)
     range : float, metres
@@ -272,22 +270,3 @@ class Scene:
     def n_triangles(self) -> int:
         """Count the triangles of all instances."""
         return sum(len(self.meshes[i.mesh].triangle) for i in self.instances)
-
-
-def check_brightness(scene: Scene) -> None:
-    """Refuse lights too bright to reckon with.
-
-    Raises
-    ------
-    InputError
-        If an emission or an intensity is above `BRIGHTEST`.
-    """
-    named = [(f"material '{m.name}'", "emission", m.emission, "cd/m2") for m in scene.materials]
-    named += [
-        (f"light '{light.name}'", "intensity", light.intensity, "lx" if light.kind == "directional" else "cd")
-        for light in scene.lights
-    ]
-    for name, what, value, unit in named:
-        if max(value) > BRIGHTEST:
-            message = f"{name}: its {what} of {max(value):.3g} {unit} is above {BRIGHTEST:.0e}; lower it"
-            raise InputError(message, file=str(scene.path) if scene.path else None, object=name)

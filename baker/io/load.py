@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baker.core.errors import InputError, ResourceError, SettingsError
+from baker.core.light_kind import check_lights
 from baker.core.registry import Registry
-from baker.core.scene import Scene, check_brightness
+from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.io.choose import choose_objects
 
@@ -114,7 +115,7 @@ def load_scene(
     except MemoryError:
         raise ResourceError("the scene does not fit into memory", file=str(path)) from None
     if not lenient:
-        check_brightness(scene)
+        check_lights(scene)
     return scene
 
 

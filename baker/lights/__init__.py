@@ -1,4 +1,4 @@
-"""What a family of lights offers, and their register; emissive triangles as a table of emitters."""
+"""Emissive triangles as a table of emitters."""
 
 from baker.trace.kernel_cache import keep_kernels
 

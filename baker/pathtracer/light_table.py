@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.colour import LUMINANCE_WEIGHTS
+from baker.core.errors import InputError
 from baker.core.geometry import Geometry
-from baker.core.scene import Scene
+from baker.core.light_kind import Distribution, kind_of
+from baker.core.scene import PunctualLight, Scene
 from baker.kernels.sampling import triangle_barycentric
 from baker.kernels.shading import Shading
 from baker.lights.emissive import build_emitters
@@ -40,7 +42,8 @@ KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE, INVERSE_RANGE 
 LANE_CORNER, LANE_EDGE, LANE_NORMAL, LANE_GAIN, LANE_TWO_SIDED = 0, 3, 9, 12, 13
 LANE_OUTER, LANE_SCALE, LANE_RADIANCE, LANE_KIND = 14, 15, 16, 19
 LANE_INVERSE_RANGE = LANE_TWO_SIDED
-_KINDS = {"point": 0.0, "spot": 1.0, "directional": 2.0}
+# The number of each distribution in column KIND: kernels compare it.
+_KINDS = {Distribution.ISOTROPIC: 0.0, Distribution.CONE: 1.0, Distribution.PARALLEL: 2.0}
 # A directional light and the sky end nowhere; rays to other lamps end this share of their way before them.
 FAR = 1.0e30
 SHORT = 0.9999
@@ -93,24 +96,11 @@ def build_lamps(
     triangle[:, RADIANCE : RADIANCE + 3] = shading.emission[material]
     triangle[:, TEXTURED] = shading.emission_texture[material] >= 0
     triangle[:, INSIDE : INSIDE + 3] = found.row[:, 21:24]
-    lights = [light for light in scene.local_lights if max(light.intensity) > 0 and light.kind in _KINDS]
     disc = math.pi * (0.5 * geometry.diagonal) ** 2
-    point = np.zeros((len(lights), 16))
-    point_power = np.zeros(len(lights))
-    for row, light in enumerate(lights):
-        outer = math.cos(light.outer_cone)
-        point[row, KIND] = _KINDS[light.kind]
-        point[row, POSITION : POSITION + 3] = light.position
-        point[row, DIRECTION : DIRECTION + 3] = light.direction
-        point[row, INTENSITY : INTENSITY + 3] = light.intensity
-        point[row, OUTER] = outer
-        point[row, SCALE] = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
-        point[row, INVERSE_RANGE] = light.inverse_range if light.kind != "directional" else 0.0
-        solid = {"point": 4 * math.pi, "spot": 2 * math.pi * (1 - outer), "directional": disc}[light.kind]
-        point_power[row] = float(np.array(light.intensity) @ _LUMINANCE) * solid
+    point, point_power = _without_area(scene.local_lights, disc)
     sky_power = float(np.array(sky) @ _LUMINANCE) * math.pi * 4.0 * disc
     every = np.concatenate([power, point_power, [sky_power]])
-    chance = _chances(every, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(lights) + 1))])
+    chance = _chances(every, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(point) + 1))])
     triangle[:, CHANCE] = chance[:n]
     point[:, POINT_CHANCE] = chance[n:-1]
     cumulative = np.cumsum(chance)
@@ -120,6 +110,45 @@ def build_lamps(
     glows = int((triangle[:, TEXTURED] > 0).any())
     every = all_alike(triangle, point, last)
     return LampTable(triangle, point, found.triangle, found.root, found.node, cumulative, last, every, glows)
+
+
+def _without_area(
+    lights: tuple[PunctualLight, ...], disc: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return rows (P, 16), without their chances, and power (P,) of the lights without area that shine.
+
+    disc : float, m2, area of a disc as wide as the scene
+
+    Raises
+    ------
+    InputError
+        If a light is of an unknown kind, or of one that the kernels cannot trace.
+    """
+    number = [_kernel_number(light) for light in lights]
+    shining = [(light, n) for light, n in zip(lights, number, strict=True) if max(light.intensity) > 0]
+    point = np.zeros((len(shining), 16))
+    power = np.zeros(len(shining))
+    for row, (light, n) in enumerate(shining):
+        kind, outer = kind_of(light), math.cos(light.outer_cone)
+        point[row, KIND] = n
+        point[row, POSITION : POSITION + 3] = light.position
+        point[row, DIRECTION : DIRECTION + 3] = light.direction
+        point[row, INTENSITY : INTENSITY + 3] = light.intensity
+        point[row, OUTER] = outer
+        point[row, SCALE] = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
+        point[row, INVERSE_RANGE] = light.inverse_range if kind.has_position else 0.0
+        power[row] = float(np.array(light.intensity) @ _LUMINANCE) * kind.power(light, disc)
+    return point, power
+
+
+def _kernel_number(light: PunctualLight) -> float:
+    """Return the number by which kernels know a light without area."""
+    kind = kind_of(light)
+    number = _KINDS.get(kind.distribution)
+    if number is None or not kind.delta:
+        message = f"the path tracer has no kernels for {kind.name} lights; leave it out"
+        raise InputError(message, object=f"light '{light.name}'")
+    return number
 
 
 def all_alike(
@@ -137,7 +166,7 @@ def all_alike(
     area[:, LANE_TWO_SIDED] = triangle[:, TWO_SIDED]
     area[:, LANE_RADIANCE : LANE_RADIANCE + 3] = triangle[:, RADIANCE : RADIANCE + 3]
     way = point[:, DIRECTION : DIRECTION + 3]
-    parallel = point[:, KIND, None] == _KINDS["directional"]
+    parallel = point[:, KIND, None] == _KINDS[Distribution.PARALLEL]
     spot[:, LANE_CORNER : LANE_CORNER + 3] = np.where(parallel, -way, point[:, POSITION : POSITION + 3])
     spot[:, LANE_NORMAL : LANE_NORMAL + 3] = way
     spot[:, LANE_GAIN] = 1.0 / np.maximum(point[:, POINT_CHANCE], 1e-30)

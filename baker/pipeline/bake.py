@@ -14,10 +14,11 @@ from baker.checks.in_bake import bake_warnings
 from baker.core.errors import ResourceError
 from baker.core.executor import Farm, LocalFarm
 from baker.core.export import check_exports
+from baker.core.light_kind import check_lights
 from baker.core.lightmap import BakeResult
 from baker.core.precision import coarse_warnings
 from baker.core.progress import Progress, silent
-from baker.core.scene import Scene, check_brightness
+from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.io.load import load_for_bake
 from baker.kernels.not_kept import cache_warnings
@@ -69,7 +70,7 @@ def bake(
     try:
         with record.stage("load"):
             if isinstance(scene, Scene):
-                check_brightness(scene)
+                check_lights(scene)
             else:
                 scene = load_for_bake(scene, settings)
         compiling = precompile.suit(compiling, scene)

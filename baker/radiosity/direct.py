@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import kind_of
 from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import PunctualLight
@@ -19,7 +20,6 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shading import Shading
 from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.triangle_lookup import HitTable
-from baker.lights.family import LIGHT_FAMILIES
 from baker.radiosity.emitter_choice import Choice, LampChooser
 from baker.radiosity.kernels.area_light import light_samples
 from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
@@ -99,7 +99,7 @@ def direct_light(
     hidden_net = sobol_reversed(chooser.n_hidden, seed, 3)
     few = sobol_reversed(N_HEMISPHERE, seed, 2)
     weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
-    families = [(light, LIGHT_FAMILIES.get(light.kind)) for light in lights if max(light.intensity) > 0]
+    punctual = [(light, kind) for light in lights for kind in [kind_of(light)] if max(light.intensity) > 0]
 
     dark, black = nothing_seen(), np.zeros(3, np.float32)
     limits = np.array([0.0, n_light], np.float64)
@@ -157,22 +157,21 @@ def direct_light(
                 spread[part],
                 done[part],
             )
-        if families:
+        if punctual:
             ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
             weight = np.zeros((end - begin, N_POINTS), np.float32)
-            for light, family in families:
-                if family is not None:
-                    family(light, origin, normal, ray, weight)
-                    add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
+            for light, kind in punctual:
+                kind.fill(light, origin, normal, ray, weight)
+                add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
         return out[:, :3], out[:, 3:], spread, done, n_cast
 
     def keep(begin: int, end: int, part: Part) -> None:
         weighted[begin:end], complete[begin:end], variance[begin:end], exact[begin:end] = part[:4]
         cast[begin // TILE] = part[4]
 
-    rays = n_light * bool(len(emitters.power)) + N_POINTS * len(families)
+    rays = n_light * bool(len(emitters.power)) + N_POINTS * len(punctual)
     run(n, TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    return DirectLight(weighted, complete, variance, exact, int(cast.sum()) + N_POINTS * len(families) * n)
+    return DirectLight(weighted, complete, variance, exact, int(cast.sum()) + N_POINTS * len(punctual) * n)
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:

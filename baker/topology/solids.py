@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import light_positions
 from baker.core.scene import Scene
 from baker.topology.closed_parts import ClosedParts, face_areas, find_closed_parts
 from baker.topology.winding_number import MANY, Enclosure
@@ -83,9 +84,8 @@ class Solids(NamedTuple):
 
 def lamps_and_cameras(scene: Scene) -> NDArray[np.float64]:
     """Return where lamps and cameras are, (N, 3) float64, metres, relative to the scene's origin."""
-    places = [light.position for light in scene.lights if light.kind != "directional"]
-    places += [camera.position for camera in scene.cameras]
-    return np.array(places, np.float64).reshape(-1, 3) - scene.origin
+    cameras = np.array([camera.position for camera in scene.cameras], np.float64).reshape(-1, 3)
+    return np.concatenate([light_positions(scene), cameras]) - scene.origin
 
 
 def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:

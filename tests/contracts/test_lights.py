@@ -1,4 +1,4 @@
-"""What every family of lights promises, and the closed form of each."""
+"""What every kind of light promises, and the closed form of each."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from baker.core.light_kind import LIGHT_KINDS, kind_of, kinds_by_gltf_type
 from baker.core.scene import PunctualLight
-from baker.lights.family import LIGHT_FAMILIES
 
 POSITION, DIRECTION = np.array([0.3, 2.0, -0.4]), np.array([0.48, -0.8, 0.36])
 INNER, OUTER = 0.3, 0.8
@@ -36,7 +36,7 @@ def directional_truth(point, normal):
     return np.maximum(-(normal @ DIRECTION), 0)
 
 
-# A new family adds its own line.
+# A new kind adds its own line.
 TRUTH = {"point": point_truth, "spot": spot_truth, "directional": directional_truth}
 
 
@@ -55,14 +55,53 @@ def fill(kind, origin, normal, light=None):
     ray = np.full((*origin.shape[:2], 4), np.nan, np.float32)
     weight = np.full(origin.shape[:2], np.nan, np.float32)
     before = origin.copy(), normal.copy()
-    assert LIGHT_FAMILIES.get(kind)(light or light_of(kind), origin, normal, ray, weight) is None
+    light = light or light_of(kind)
+    assert kind_of(light).fill(light, origin, normal, ray, weight) is None
     assert (origin == before[0]).all()
     assert (normal == before[1]).all()
     return ray, weight
 
 
-def test_every_family_has_a_closed_form():
-    assert LIGHT_FAMILIES.names() == sorted(TRUTH)
+def test_every_kind_has_a_closed_form():
+    assert LIGHT_KINDS.names() == sorted(TRUTH)
+
+
+@pytest.mark.parametrize("name", sorted(TRUTH))
+def test_a_record_agrees_with_what_its_light_does(name):
+    """Moving, turning or widening a light changes its irradiance exactly if the record has that property."""
+    kind, light, (origin, normal) = LIGHT_KINDS.get(name), light_of(name), points()
+    assert kind.name == name
+    assert kinds_by_gltf_type()[kind.gltf_type] is kind
+    assert kind.unit == ("cd" if kind.has_position else "lx")
+    before = fill(name, origin, normal, light)[1]
+    assert before.max() > 0
+    changes = [
+        (kind.has_position, {"position": (-0.7, 1.5, 0.2)}),
+        (kind.has_position, {"range": 2.0}),
+        (kind.has_direction, {"direction": (0.6, -0.8, 0.0)}),
+        (kind.has_cone, {"inner_cone": 0.5}),
+        (kind.has_cone, {"outer_cone": 0.9}),
+    ]
+    for expected, change in changes:
+        after = fill(name, origin, normal, replace(light, **change))[1]
+        assert (after != before).any() == expected, change
+
+
+@pytest.mark.parametrize("name", ["point", "spot"])
+@pytest.mark.parametrize("inner", [0.0, 0.3, OUTER])
+def test_power_is_the_flux_or_a_bound_of_it(name, inner):
+    """Irradiance of a unit sphere around the light, summed over the sphere by a rule of equal areas."""
+    light = replace(light_of(name), inner_cone=inner)
+    n = 4000 * 16
+    z, turn = 1 - (2 * np.arange(n) + 1) / n, np.arange(n) * np.pi * (3 - 5**0.5)
+    way = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+    origin, normal = np.float32(POSITION + way).reshape(-1, 16, 3), np.float32(-way).reshape(-1, 16, 3)
+    flux = 4 * np.pi * fill(name, origin, normal, light)[1].mean(dtype=float)
+    power = kind_of(light).power(light, 1.0)
+    if name == "point" or inner == OUTER:
+        np.testing.assert_allclose(power, flux, rtol=5e-3)
+    else:
+        assert flux < power < 4 * flux
 
 
 @pytest.mark.parametrize("kind", ["point", "spot"])
@@ -109,7 +148,7 @@ def test_rays_end_just_before_the_light(kind):
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
 def test_a_candela_a_metre_and_a_lux(kind):
-    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, whatever the family."""
+    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, whatever the kind."""
     light = PunctualLight(kind, "", 0, (1, 1, 1), (0, 1, 0), (0, -1, 0), 0.2, 0.5)
     up = np.zeros((1, 16, 3), np.float32)
     up[..., 1] = 1

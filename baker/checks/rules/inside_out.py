@@ -13,6 +13,7 @@ from baker.checks.finding import Found
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
+from baker.core.light_kind import light_positions
 from baker.topology.winding_number import first_inside
 
 # Length of the summed area vectors over the area, above which a mesh cannot be closed all over.
@@ -109,7 +110,7 @@ def _inhabited(subject: Subject, mesh: int, rows: NDArray[np.int64], piece: int)
 def _things(subject: Subject, node: int) -> NDArray[np.float64]:
     """Return points of lights, cameras and all objects but that of `node`, (n, 3) float64, world."""
     scene = subject.scene
-    points = [np.array(light.position) for light in scene.lights if light.kind != "directional"]
+    points = list(light_positions(scene))
     points += [np.array(camera.position) for camera in scene.cameras]
     for instance in subject.raw.instances:
         facts = subject.meshes[instance.mesh]

@@ -12,14 +12,14 @@ from baker.checks.context import Subject
 from baker.checks.finding import Found, Place
 from baker.checks.rule import check
 from baker.core.colour import linear_from_srgb
+from baker.core.light_kind import kind_of, light_positions
 from baker.topology.winding_number import first_inside
 
 # Albedo above which light hardly ever dies away.
 MOST_REFLECTED = 0.95
 # Albedo from which closed rooms are worth a look.
 NEARLY_WHITE = 0.98
-# More than these is likelier a wrong unit than such a light.
-ABSURD = {"point": 1e6, "spot": 1e7, "directional": 2e5}
+# cd/m2; more is likelier a wrong unit than such a surface. Lights without area: `LightKind.plausible_max`.
 ABSURD_EMISSION = 1e8
 # Upward share of a normal that makes a face a floor.
 FLOOR = 0.5
@@ -102,7 +102,7 @@ def light_inside(subject: Subject) -> Iterator[Found]:
     """
     solids = None
     for light in subject.scene.lights:
-        if light.kind == "directional":
+        if not kind_of(light).has_position:
             continue
         solids = list(_solids(subject)) if solids is None else solids
         for name, corner in solids:
@@ -117,7 +117,7 @@ def _solids(subject: Subject) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Yield name and world corners of every closed part that looks outwards and lets no light through."""
     materials = subject.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
-    position = np.array([x.position for x in subject.scene.lights if x.kind != "directional"])
+    position = light_positions(subject.scene)
     for instance in subject.raw.instances:
         facts = subject.meshes[instance.mesh]
         if not len(facts.good):
@@ -150,13 +150,13 @@ def light_intensity(subject: Subject) -> Iterator[Found]:
     """
     for light in subject.scene.lights:
         place = Place(light.name, light.node)
-        at = None if light.kind == "directional" else light.position
-        unit = "lx" if light.kind == "directional" else "cd"
+        kind = kind_of(light)
+        at, unit = light.position if kind.has_position else None, kind.unit
         if min(light.intensity) < 0:
             yield Found(f"the {light.kind} light is negative", place, position=at, severity="error")
         elif max(light.intensity) == 0:
             yield Found(f"the {light.kind} light has no intensity", place, position=at)
-        elif max(light.intensity) > ABSURD[light.kind]:
+        elif max(light.intensity) > kind.plausible_max:
             most = max(light.intensity)
             text = f"the {light.kind} light has {most:.3g} {unit}; if watts were multiplied by 683 lm/W "
             text += f"(Blender's lighting mode Standard), export it as Unitless: {most / 683:.3g} {unit}"
@@ -264,7 +264,7 @@ def emissive_black(subject: Subject) -> Iterator[Found]:
 def sun_below(subject: Subject) -> Iterator[Found]:
     """A sun that comes from below every floor of the scene."""
     for light in subject.scene.lights:
-        if light.kind != "directional" or not max(light.intensity) > 0:
+        if kind_of(light).has_position or not max(light.intensity) > 0:
             continue
         world = subject.world
         floor = world.normal[:, 1] > FLOOR

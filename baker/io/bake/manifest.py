@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from baker.core.light_kind import kind_of
 from baker.core.lightmap import BakeResult
 from baker.core.scene import SceneWarning
 from baker.core.settings import BakeSettings
@@ -174,16 +175,17 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
     """List punctual lights, emissive materials in use and the sky."""
     lights: list[dict[str, Any]] = []
     for light in result.scene.lights:
+        kind = kind_of(light)
         entry: dict[str, Any] = {"kind": light.kind, "name": light.name, "node": light.node}
         entry["intensity"] = light.intensity
-        entry["unit"] = "lx" if light.kind == "directional" else "cd"
-        if light.kind != "directional":
+        entry["unit"] = kind.unit
+        if kind.has_position:
             entry["position"] = light.position
             if math.isfinite(light.range):
                 entry["range"] = light.range
-        if light.kind != "point":
+        if kind.has_direction:
             entry["direction"] = light.direction
-        if light.kind == "spot":
+        if kind.has_cone:
             entry |= {"inner_cone": light.inner_cone, "outer_cone": light.outer_cone}
         lights.append(entry)
     used = {int(m) for i in result.scene.instances for m in np.unique(result.scene.meshes[i.mesh].material)}

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.errors import InputError
+from baker.core.light_kind import kind_of
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, Texture
 from baker.io.gltf.ao_materials import BakedUse
 from baker.io.gltf.packer import Json, Packer
@@ -188,16 +190,20 @@ def _texture_transform(matrix: NDArray[np.float64]) -> Json:
 
 
 def _light(light: PunctualLight) -> Json:
+    kind = kind_of(light)
+    if kind.gltf_type is None:
+        message = f"KHR_lights_punctual has no {kind.name} lights, so a glTF file cannot hold it"
+        raise InputError(message, object=f"light '{light.name}'")
     strength = max(*light.intensity, 1e-30)
     result: Json = {
-        "type": light.kind,
+        "type": kind.gltf_type,
         "name": light.name,
         "color": [float(v) / strength for v in light.intensity],
         "intensity": float(strength),
     }
     if math.isfinite(light.range):
         result["range"] = light.range
-    if light.kind == "spot":
+    if kind.has_cone:
         result["spot"] = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
     return result
 

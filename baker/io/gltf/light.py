@@ -13,11 +13,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import kinds_by_gltf_type
 from baker.core.scene import PunctualLight, SceneWarning
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed
 
-_KINDS = ("point", "spot", "directional")
 # Length of the light's axis, as a share of the node's largest stretch, below which rounding aims the light:
 # exporters write single precision.
 _FLATTEST = 1e-6
@@ -39,30 +39,31 @@ def read_light(
     InputError
         For an unknown kind, a negative colour or intensity, cone angles out of range, or a range not above 0.
     """
-    kind = light.string("type")
-    if kind not in _KINDS:
-        light.fail(f"'{kind[:20]}' is none of {', '.join(_KINDS)}", "type")
+    known, wanted = kinds_by_gltf_type(), light.string("type")
+    if wanted not in known:
+        light.fail(f"'{wanted[:20]}' is none of {', '.join(known)}", "type")
+    kind = known[wanted]
     name = node.json.string("name", light.string("name", f"light_{node.index}"))
     strength = light.number("intensity", 1.0, low=-math.inf if lenient else 0.0)
     colour = light.numbers("color", 3, (1.0, 1.0, 1.0))
     if min(colour) < 0 and not lenient:
         light.fail("a colour is negative", "color")
-    reach = light.number("range") if "range" in light and kind != "directional" else math.inf
+    reach = light.number("range") if "range" in light and kind.has_position else math.inf
     if not reach > 0:
         light.fail(f"the light's range is {reach:g}; it must be above 0, or left out for no limit", "range")
-    inner, outer = _cone(light) if kind == "spot" else (0.0, math.pi / 4)
+    inner, outer = _cone(light) if kind.has_cone else (0.0, math.pi / 4)
     axis, share = _axis(node)
-    if kind != "point" and not share > _FLATTEST:
+    if kind.has_direction and not share > _FLATTEST:
         message = (
-            f"the scale of the node or its parents leaves the {kind} light no direction: the axis it shines "
-            f"along has {share:.1g} of the largest stretch; the light is left out"
+            f"the scale of the node or its parents leaves the {kind.name} light no direction: the axis it "
+            f"shines along has {share:.1g} of the largest stretch; the light is left out"
         )
         warnings.append(SceneWarning("flat-light", message, name))
         return None
     x, y, z = (float(v) for v in axis)
     px, py, pz = (float(v) for v in node.matrix[:3, 3])
     return PunctualLight(
-        kind=kind,
+        kind=kind.name,
         name=name,
         node=node.index,
         intensity=(colour[0] * strength, colour[1] * strength, colour[2] * strength),

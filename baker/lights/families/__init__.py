@@ -1,4 +1,4 @@
-"""Plugins: one family of lights without area a file."""
+"""Plugins: one kind of light without area a file."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import LIGHT_KINDS, Distribution, LightKind
 from baker.core.scene import PunctualLight
-from baker.lights.family import LIGHT_FAMILIES
 from baker.trace.jit import kernel, larger
 
 
-@LIGHT_FAMILIES.register("directional")
 def directional_light(
     light: PunctualLight,
     origin: NDArray[np.float32],
@@ -23,7 +22,7 @@ def directional_light(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
-    """Fill rays and weights of a directional light (see `LightFamily`)."""
+    """Fill rays and weights of a directional light (see `FillRays`)."""
     _parallel(np.array(light.direction, np.float64), normal, ray, weight)
 
 
@@ -40,3 +39,22 @@ def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
                 + direction[2] * normal[i, k, 2]
             )
             weight[i, k] = larger(cosine, 0.0)
+
+
+def _power(light: PunctualLight, disc: float) -> float:
+    return disc
+
+
+DIRECTIONAL = LIGHT_KINDS.register("directional")(
+    LightKind(
+        name="directional",
+        unit="lx",
+        delta=True,
+        distribution=Distribution.PARALLEL,
+        gltf_type="directional",
+        # The sun at its highest gives 1.2e5 lx.
+        plausible_max=2e5,
+        fill=directional_light,
+        power=_power,
+    )
+)

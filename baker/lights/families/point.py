@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import LIGHT_KINDS, Distribution, LightKind
 from baker.core.scene import PunctualLight
-from baker.lights.family import LIGHT_FAMILIES
 from baker.trace.jit import inner, kernel, larger
 
 # Shadow rays end this share of their length before the light's position.
@@ -27,7 +27,6 @@ def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
     return larger(1.0 - share * share, 0.0)
 
 
-@LIGHT_FAMILIES.register("point")
 def point_light(
     light: PunctualLight,
     origin: NDArray[np.float32],
@@ -35,7 +34,7 @@ def point_light(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
-    """Fill rays and weights of a point light (see `LightFamily`)."""
+    """Fill rays and weights of a point light (see `FillRays`)."""
     position = np.array(light.position, np.float64)
     inverse_square(position, light.inverse_range, origin, normal, ray, weight)
 
@@ -55,3 +54,21 @@ def inverse_square(position, inverse_range, origin, normal, ray, weight):  # typ
             cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / math.sqrt(square)
             ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3] = dx, dy, dz, _SHORT
             weight[i, k] = larger(cosine, 0.0) / square * range_window(square, inverse_range)
+
+
+def _power(light: PunctualLight, disc: float) -> float:
+    return 4 * math.pi
+
+
+POINT = LIGHT_KINDS.register("point")(
+    LightKind(
+        name="point",
+        unit="cd",
+        delta=True,
+        distribution=Distribution.ISOTROPIC,
+        gltf_type="point",
+        plausible_max=1e6,
+        fill=point_light,
+        power=_power,
+    )
+)

@@ -13,13 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.light_kind import LIGHT_KINDS, Distribution, LightKind
 from baker.core.scene import PunctualLight
 from baker.lights.families.point import inverse_square
-from baker.lights.family import LIGHT_FAMILIES
 from baker.trace.jit import kernel, larger, smaller
 
 
-@LIGHT_FAMILIES.register("spot")
 def spot_light(
     light: PunctualLight,
     origin: NDArray[np.float32],
@@ -27,7 +26,7 @@ def spot_light(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
-    """Fill rays and weights of a spot light (see `LightFamily`)."""
+    """Fill rays and weights of a spot light (see `FillRays`)."""
     position = np.array(light.position, np.float64)
     inverse_square(position, light.inverse_range, origin, normal, ray, weight)
     outer = math.cos(light.outer_cone)
@@ -45,3 +44,21 @@ def _cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
             cosine = -(dx * direction[0] + dy * direction[1] + dz * direction[2]) / length
             share = smaller(larger((cosine - outer) * scale, 0.0), 1.0)
             weight[i, k] *= share * share
+
+
+def _power(light: PunctualLight, disc: float) -> float:
+    return 2 * math.pi * (1 - math.cos(light.outer_cone))
+
+
+SPOT = LIGHT_KINDS.register("spot")(
+    LightKind(
+        name="spot",
+        unit="cd",
+        delta=True,
+        distribution=Distribution.CONE,
+        gltf_type="spot",
+        plausible_max=1e7,
+        fill=spot_light,
+        power=_power,
+    )
+)
