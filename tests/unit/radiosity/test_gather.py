@@ -301,10 +301,7 @@ def test_a_lamp_with_nothing_in_the_way_shines_by_lamberts_formula(n_light):
 
 
 def test_dark_lights_cast_nothing(room):
-    lights = (
-        PunctualLight("point", "off", 0, (0, 0, 0)),
-        PunctualLight("unheard of", "odd", 1, (1, 1, 1)),
-    )
+    lights = (PunctualLight("point", "off", 0, (0, 0, 0)),)
     world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))])
     direct = direct_light(
         world.surface,
