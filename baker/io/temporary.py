@@ -79,7 +79,7 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     Yields
     ------
     Path
-        A name with the same suffix, in a temporary folder beside `path`.
+        A name with the same suffix, in a temporary folder beside `path`; `path` itself if that is a device.
 
     Raises
     ------
@@ -88,6 +88,10 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     """
     try:
         target = path.resolve()
+        if target.exists() and not target.is_file():
+            # A device or a pipe is written to, not replaced.
+            yield target
+            return
         folder = temporary_path(target)
         target.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir()

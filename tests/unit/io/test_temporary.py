@@ -70,3 +70,9 @@ def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
     with pytest.raises(ResourceError, match="the report cannot be written") as caught:
         write_atomically(tmp_path / "file" / "r.xml", b"1", "report")
     assert caught.value.file == str(tmp_path / "file" / "r.xml")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a device that is a path")
+def test_a_device_is_written_to_not_replaced() -> None:
+    write_atomically(Path(os.devnull), b"report", "report")
+    assert Path(os.devnull).is_char_device()
