@@ -18,7 +18,7 @@ sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent / "tests" / "unit" /
 
 from flawed_scenes import CASES  # noqa: E402
 
-from baker.checks.context import Subject  # noqa: E402
+from baker.checks.context import CheckContext  # noqa: E402
 from baker.core.settings import BakeSettings  # noqa: E402
 from baker.io.importers.gltf import import_gltf  # noqa: E402
 from baker.io.load import SceneFile  # noqa: E402
@@ -32,16 +32,18 @@ GEOMETRY_CODES = ("open-edges", "flipped-neighbours", "inside-out", "non-manifol
 FRONT, BACK, LINE, PAPER = (205, 208, 214), (222, 96, 86), (60, 64, 72), (255, 255, 255)
 
 
-def subject_of(data: bytes) -> Subject:
+def subject_of(data: bytes) -> CheckContext:
     """Return a scene in memory, ready for checks."""
-    return Subject(import_gltf(SceneFile(Path("case.glb"), data, lenient=True)), BakeSettings(resolution=256))
+    return CheckContext(
+        import_gltf(SceneFile(Path("case.glb"), data, lenient=True)), BakeSettings(resolution=256)
+    )
 
 
-def uv_panel(subject: Subject) -> Image.Image:
+def uv_panel(context: CheckContext) -> Image.Image:
     """Draw the layout of the first mesh; what is covered twice is red."""
     side = SIZE * SHARP
     image = Image.new("RGB", (side, side), PAPER)
-    uv = subject.uv(0)
+    uv = context.uv(0)
     scale = (side - 2 * BORDER * SHARP) / 1.05
     corner = uv.uv * scale + BORDER * SHARP
     count = np.zeros((side, side), np.uint8)
@@ -65,12 +67,12 @@ def uv_panel(subject: Subject) -> Image.Image:
     return image.resize((SIZE, SIZE), Image.Resampling.LANCZOS)
 
 
-def geometry_panel(subject: Subject, low: np.ndarray, high: np.ndarray) -> Image.Image:
+def geometry_panel(context: CheckContext, low: np.ndarray, high: np.ndarray) -> Image.Image:
     """Draw all triangles from the corner above, farthest first."""
     side = SIZE * SHARP
     image = Image.new("RGB", (side, side), PAPER)
     draw = ImageDraw.Draw(image)
-    world = subject.world
+    world = context.world
     corner = world.position[world.triangle].astype(np.float64)
     view, right, up = view_axes()
     order = np.argsort(corner.mean(axis=1) @ view)

@@ -96,7 +96,7 @@ def faults(part):
                 f"{where}:{text.count(chr(10), 0, hit.start()) + 1} {word}: {hit[0]!r}"
                 for hit in pattern.finditer(text)
             ]
-        if path.suffix == ".py":
+        if path.suffix == ".py" and part not in ("tests", "benchmarks", "assets", "docs"):
             lines += [
                 f"{where}:{line} name {name}" for line, name in names_in(ast.parse(text)) if name in names
             ]

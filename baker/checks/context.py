@@ -19,20 +19,20 @@ from baker.core.light_kind import check_light_kinds
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
 DEFAULT_MIP = 2
 
 
-class Subject:
+class CheckContext:
     """A scene with the settings that it is to be baked with.
 
     Attributes
     ----------
     scene : Scene
         Loaded leniently, or as a bake has it.
-    raw : RawScene
+    raw : SourceScene
     settings : BakeSettings
     mip : int
         Mip level of the lightmap down to which charts must not bleed into each other.
@@ -157,11 +157,11 @@ class Subject:
         return x, y, z
 
 
-def raw_of(scene: Scene) -> RawScene:
+def raw_of(scene: Scene) -> SourceScene:
     """Return the good triangles of a scene in the form of raw ones, without copies."""
     meshes = tuple(RawMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
     stand = tuple(RawInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
-    return RawScene(meshes, stand)
+    return SourceScene(meshes, stand)
 
 
 def _primitives(mesh: Mesh) -> tuple[PrimitiveArrays, ...]:

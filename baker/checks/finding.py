@@ -28,7 +28,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Found:
+class RawFinding:
     """What a check function yields; the check's own severity and advice are added by `run_check`.
 
     Attributes
@@ -74,7 +74,7 @@ class Finding:
     severity: str
     message: str
     fix: str
-    found: Found
+    found: RawFinding
 
     @property
     def object(self) -> str:

@@ -1,7 +1,7 @@
 """The register of checks: one function a code, with severity, advice and the text of its docs.
 
-A check function takes a `Subject` and yields `Found`. Its docstring is its page in the docs: the first
-line says what it finds, the rest why that matters and what it looks at.
+A check function takes a `CheckContext` and yields `RawFinding`. Its docstring is its page of the docs: the
+first line says what it finds, the rest why that matters and what it looks at.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from baker.checks.context import Subject
-from baker.checks.finding import Finding, Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import Finding, RawFinding
 from baker.core.registry import Registry
 
-CheckFunction = Callable[[Subject], Iterable[Found]]
+CheckFunction = Callable[[CheckContext], Iterable[RawFinding]]
 GROUPS = ("geometry", "uv", "light", "file", "cost")
 
 
@@ -68,9 +68,9 @@ def all_checks() -> list[Check]:
     return sorted(found, key=lambda entry: (GROUPS.index(entry.group), entry.code))
 
 
-def run_check(entry: Check, subject: Subject) -> list[Finding]:
+def run_check(entry: Check, context: CheckContext) -> list[Finding]:
     """Run one check."""
     return [
         Finding(entry.code, found.severity or entry.severity, found.message, entry.fix, found)
-        for found in entry.function(subject)
+        for found in entry.function(context)
     ]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from baker.checks.bake_rates import rates_beside, rates_of
-from baker.checks.context import Subject
-from baker.checks.finding import SEVERITIES, Finding, Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import SEVERITIES, Finding, Place, RawFinding
 from baker.checks.ignore import Ignore, parse_ignore
 from baker.checks.rule import CHECKS, all_checks, run_check
 from baker.checks.settings import CheckSettings, with_extras
@@ -100,13 +100,13 @@ def _run(
     timings: dict[str, float],
 ) -> list[Finding]:
     rates = rates_beside(path) if settings.rates is None else rates_of(Path(settings.rates))
-    subject = Subject(scene, bake_settings, mip=settings.mip, rates=rates, probe=settings.cost)
+    context = CheckContext(scene, bake_settings, mip=settings.mip, rates=rates, probe=settings.cost)
     found: list[Finding] = []
     entries = all_checks()
     for k, entry in enumerate(entries):
         tell_progress(progress, "checks", k / len(entries))
         begin = time.perf_counter()
-        found += run_check(entry, subject)
+        found += run_check(entry, context)
         timings[entry.code] = time.perf_counter() - begin
     return found
 
@@ -114,7 +114,7 @@ def _run(
 def _index_range(error: IndexRangeError) -> Finding:
     # Some formats cannot be taken apart any further once an index is wrong.
     entry = CHECKS.require("index-range", "check")
-    found = Found(error.message, Place(error.object or ""))
+    found = RawFinding(error.message, Place(error.object or ""))
     return Finding(entry.code, entry.severity, error.message, entry.fix, found)
 
 

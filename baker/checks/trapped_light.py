@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.checks.direct_light import cosine_ways, spread_points
 
 # Points on surfaces (a multiple of 16), paths from each, and their reflections.
@@ -19,7 +19,7 @@ MAX_ALBEDO = 0.999
 MOST_GAIN = 20.0
 
 
-def trapped_gain(subject: Subject, albedo: NDArray[np.float64]) -> float:
+def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
     """Return by how much all bounces multiply light where it is trapped most.
 
     Parameters
@@ -27,10 +27,10 @@ def trapped_gain(subject: Subject, albedo: NDArray[np.float64]) -> float:
     subject : Subject
     albedo : (M,) float64, of each material
     """
-    world = subject.world
+    world = context.world
     if not world.area.sum() > 0:
         return 1.0
-    random = np.random.default_rng(subject.settings.seed)
+    random = np.random.default_rng(context.settings.seed)
     position, normal, triangle = spread_points(world, POINTS, random)
     position, normal = np.repeat(position, PATHS, axis=0), np.repeat(normal, PATHS, axis=0)
     triangle = np.repeat(triangle, PATHS)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.origin import scene_origin
-from baker.core.source_mesh import RawScene
+from baker.core.source_mesh import SourceScene
 
 # Metres; the square of a shorter range would leave float32.
 _SHORTEST_RANGE = 1e-12
@@ -229,7 +229,7 @@ class Scene:
         None for formats other than glTF: the writer builds a new document.
     sha256 : str
         Hash over the scene file and every file it names, in order of mention.
-    raw : RawScene or None
+    raw : SourceScene or None
         The triangles as the file has them, if the scene was loaded leniently.
     """
 
@@ -243,7 +243,7 @@ class Scene:
     source: SourceDocument | None = None
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
-    raw: RawScene | None = None
+    raw: SourceScene | None = None
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:

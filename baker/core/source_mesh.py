@@ -58,7 +58,7 @@ class RawInstance:
     node : int
         As in `Instance`.
     mesh : int
-        Index into `RawScene.meshes`.
+        Index into `SourceScene.meshes`.
     world_from_object : (4, 4) float64
     """
 
@@ -69,7 +69,7 @@ class RawInstance:
 
 
 @dataclass(frozen=True)
-class RawScene:
+class SourceScene:
     """All meshes that stand in the scene, in the order of their first instance."""
 
     meshes: tuple[RawMesh, ...]

@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 
 from baker.core.errors import InputError
 from baker.core.scene import Scene, SceneWarning
-from baker.core.source_mesh import RawScene
+from baker.core.source_mesh import SourceScene
 
 
 def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str]) -> Scene:
@@ -59,7 +59,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
         shown = [i for i in raw.instances if kept(i.node, i.name)]
         filled = sorted({i.mesh for i in shown})
         at = {old: new for new, old in enumerate(filled)}
-        raw = RawScene(
+        raw = SourceScene(
             tuple(raw.meshes[k] for k in filled), tuple(replace(i, mesh=at[i.mesh]) for i in shown)
         )
     idle = [p for p in (*include, *exclude) if p not in names.matched]

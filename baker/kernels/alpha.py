@@ -36,7 +36,7 @@ def no_alpha() -> AlphaTable:
 
 
 @inner
-def presence(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-def]
+def opacity(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-def]
     """Return how much of the surface of row k is there at barycentrics, 0 to 1; arrays: `TexturePack`."""
     alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA + 1] + b2 * row[k, ALPHA + 2]
     if row[k, TEXTURE] >= np.float32(0.0):
@@ -50,12 +50,12 @@ def presence(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-de
 
 
 @inner
-def presence_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
+def opacity_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
     """Return the same for triangle t of the scene, 1 if it blocks everywhere."""
     if len(shading.alpha.slot) == 0 or shading.alpha.slot[t] < 0:
         return 1.0
     pack = shading.pack
-    return presence(
+    return opacity(
         shading.alpha.row, np.int64(shading.alpha.slot[t]), pack.pixels, pack.level, pack.wrap,
         np.float64(b1), np.float64(b2),
     )  # fmt: skip

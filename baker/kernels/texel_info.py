@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from baker.kernels.alpha import presence_at
+from baker.kernels.alpha import opacity_at
 from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygon_area
 from baker.kernels.surface import N_POINTS, inverse_uv, place, place_points
 from baker.kernels.textures import sample_texture
@@ -144,7 +144,7 @@ def texel_albedo(surface, shading, free, begin, end, albedo, area):
         if any_alpha:
             total = 0.0
             for k in range(N_POINTS):
-                share[k] = presence_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
+                share[k] = opacity_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
                 total += share[k]
             area[i] *= total / N_POINTS
             # A texel of nothing but holes has the colour of its texture, for what it is worth.

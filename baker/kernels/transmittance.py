@@ -45,7 +45,7 @@ COLOUR = 12
 ROW_LENGTH = 21
 
 
-class TintTable(NamedTuple):
+class TransmittanceTable(NamedTuple):
     """The K triangles that let a share of light through.
 
     slot (T,) int32, row of each triangle of the scene or -1; row (K, 21) float32, see the column names;
@@ -57,9 +57,9 @@ class TintTable(NamedTuple):
     coloured: bool = False
 
 
-def no_tint() -> TintTable:
+def no_tint() -> TransmittanceTable:
     """Return the table of a scene in which nothing is BLEND."""
-    return TintTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
+    return TransmittanceTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
 @inner

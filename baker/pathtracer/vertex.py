@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from baker.kernels.alpha import presence_at
+from baker.kernels.alpha import opacity_at
 from baker.kernels.sampling import tangent_frame
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
@@ -260,7 +260,7 @@ def glow(shading, prim, u, v, value, rgba, aimed):
     aimed : also by its alpha: rays that hit it know that already
     """
     m = shading.material[prim]
-    there = presence_at(shading, prim, u, v) if aimed else 1.0
+    there = opacity_at(shading, prim, u, v) if aimed else 1.0
     for c in range(3):
         value[c] *= there
     if shading.emission_texture[m] >= 0:

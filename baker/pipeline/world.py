@@ -20,7 +20,7 @@ from baker.kernels.triangle_lookup import HitTable
 from baker.lights.emissive import build_emitters
 from baker.pipeline.record import Record
 from baker.radiosity.inside_geometry import find_buried
-from baker.radiosity.point_cache import KeptPoints, keep_points
+from baker.radiosity.point_cache import PointCache, keep_points
 from baker.radiosity.sides import Sides, split_texels
 from baker.radiosity.texels import build_texels
 from baker.radiosity.triangle_lookup import build_hit_table
@@ -47,7 +47,7 @@ class World:
     tells: NDArray[np.uint8]
     inside: NDArray[np.uint16]
     sides: Sides
-    kept: KeptPoints | None
+    kept: PointCache | None
 
     @property
     def mask(self) -> NDArray[np.uint16]:

@@ -25,7 +25,7 @@ from baker.radiosity.kernels.area_light import light_samples
 from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.radiosity.kernels.shadow import add_visible
 from baker.radiosity.kernels.side_table import nothing_seen
-from baker.radiosity.point_cache import KeptPoints, tile_points
+from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import Caster, new_caster
 
@@ -73,7 +73,7 @@ def direct_light(
     threads: int,
     progress: Progress,
     chart: NDArray[np.int32] | None = None,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
     run: TileRunner = run_tiles,
 ) -> DirectLight:
     """Light every texel entry directly.
@@ -84,7 +84,7 @@ def direct_light(
         Bit k is set if point k of the texel is not buried.
     n_light, n_gather : int
         Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
-    kept : KeptPoints, optional
+    kept : PointCache, optional
         Where points are left for later stages with the same tiles.
     chart : (n,) int32, optional
         Of each entry: lights are chosen for each chart of a tile.

@@ -18,7 +18,7 @@ from baker.radiosity.direct import TILE, batch_variance
 from baker.radiosity.emitter_choice import LampChooser
 from baker.radiosity.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
 from baker.radiosity.kernels.side_table import SeenLight
-from baker.radiosity.point_cache import KeptPoints, tile_points
+from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -64,7 +64,7 @@ def final_gather(
     threads: int,
     progress: Progress,
     chart: NDArray[np.int32] | None = None,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
     run: TileRunner = run_tiles,
 ) -> Gathered:
     """Cast `n_samples` cosine-weighted rays from every front texel.
@@ -133,7 +133,7 @@ def ambient_occlusion(
     seed: int,
     threads: int,
     progress: Progress,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
     run: TileRunner = run_tiles,
 ) -> NDArray[np.float32]:
     """Return the open share (n_front,) float32 of the hemisphere within `distance` metres."""

@@ -22,13 +22,13 @@ from baker.kernels.triangle_lookup import HitTable
 from baker.radiosity.kernels.form_factor import (
     SKY,
     cast_form_factors,
-    scale_symmetric,
+    merge_reciprocal_estimates,
+    sinkhorn_balance,
     transpose,
-    weigh_reciprocal,
 )
 from baker.radiosity.kernels.side_table import SeenPatch
 from baker.radiosity.patches import PatchSet
-from baker.radiosity.point_cache import KeptPoints, some_points
+from baker.radiosity.point_cache import PointCache, some_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -97,7 +97,7 @@ def build_form_factors(
     seed: int,
     threads: int,
     progress: Progress,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
     run: TileRunner = run_tiles,
 ) -> FormFactorMatrix:
     """Cast `n_rays` from every patch and build the matrix.
@@ -106,7 +106,7 @@ def build_form_factors(
     ----------
     seen : SeenPatch
         Patches that hits lie on, `Sides.seen_patches` of `patches.patch`.
-    kept : KeptPoints, optional
+    kept : PointCache, optional
         Points of an earlier stage.
     run : TileRunner
         Works on tiles of patches.
@@ -162,7 +162,7 @@ def cast_rows(
     seed: int,
     threads: int,
     progress: Progress,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
     run: TileRunner = run_tiles,
 ) -> dict[int, Part]:
     """Cast the rays; see `build_form_factors`.
@@ -243,7 +243,7 @@ def sum_colours(
 
 
 class _Merged(NamedTuple):
-    """Rows in CSR before they are balanced, and what `weigh_reciprocal` returns."""
+    """Rows in CSR before they are balanced, and what `merge_reciprocal_estimates` returns."""
 
     first: NDArray[np.int64]
     column: NDArray[np.int32]
@@ -258,7 +258,7 @@ def _merged(
     value: NDArray[np.float32],
     area: NDArray[np.float64],
 ) -> _Merged:
-    """Merge both estimates of each pair; see `weigh_reciprocal`."""
+    """Merge both estimates of each pair; see `merge_reciprocal_estimates`."""
     n = len(area)
     other_first = np.zeros(n + 1, np.int64)
     np.cumsum(np.bincount(column, minlength=n), out=other_first[1:])
@@ -267,7 +267,7 @@ def _merged(
     merged_first = np.zeros(n + 1, np.int64)
     merged_column = np.zeros(2 * len(column), np.int32)
     merged = np.zeros(2 * len(column), np.float32)
-    exchanged, unlike = weigh_reciprocal(
+    exchanged, unlike = merge_reciprocal_estimates(
         first, column, value, other_first, other_column, other_value, area,
         merged_first, merged_column, merged,
     )  # fmt: skip
@@ -288,5 +288,5 @@ def _balanced(
     goal = 1.0 - sky.astype(np.float64) - lost
     # The goal's own noise: nothing in a closed room, a few rays where most leave the scene.
     slack = _SLACK * (1.0 - goal) * len(area) / max(rays, 1)
-    row_error = scale_symmetric(first, column, value, goal, slack, np.ones(len(area)), _BALANCE_STEPS)
+    row_error = sinkhorn_balance(first, column, value, goal, slack, np.ones(len(area)), _BALANCE_STEPS)
     return FormFactorMatrix(first, column, value, sky, lost, float(row_error), reciprocity, rays)

@@ -16,7 +16,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE
 from baker.radiosity.kernels.gather import open_share
-from baker.radiosity.point_cache import KeptPoints, tile_points
+from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
 from baker.trace.packets import new_caster
 
@@ -37,7 +37,7 @@ def gap_depth(
     seed: int,
     threads: int,
     progress: Progress,
-    kept: KeptPoints | None = None,
+    kept: PointCache | None = None,
 ) -> tuple[NDArray[np.uint8], int]:
     """Find texels in gaps with short rays.
 
@@ -45,7 +45,7 @@ def gap_depth(
     ----------
     mask : (n,) uint16
         Bit k is set if point k of a texel is not buried.
-    kept : KeptPoints, optional
+    kept : PointCache, optional
         Points of an earlier stage with the same tiles.
 
     Returns

@@ -39,7 +39,7 @@ def points_of(
 
 
 @dataclass(frozen=True)
-class KeptPoints:
+class PointCache:
     """The points of all entries, filled tile by tile by whoever needs them first.
 
     Attributes
@@ -53,16 +53,16 @@ class KeptPoints:
     made: set[tuple[int, int]]
 
 
-def keep_points(n: int) -> KeptPoints | None:
+def keep_points(n: int) -> PointCache | None:
     """Return room for the points of n entries, None if that is too much to keep."""
     if n > MOST_KEPT:
         return None
     shape = (n, N_POINTS, 3)
-    return KeptPoints(np.zeros(shape, np.float32), np.zeros(shape, np.float32), set())
+    return PointCache(np.zeros(shape, np.float32), np.zeros(shape, np.float32), set())
 
 
 def tile_points(
-    surface: Surface, mask: NDArray[np.uint16], begin: int, end: int, kept: KeptPoints | None
+    surface: Surface, mask: NDArray[np.uint16], begin: int, end: int, kept: PointCache | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return all points of entries begin to end, see `points_of`; from `kept` if they are there."""
     if kept is None:
@@ -81,7 +81,7 @@ def some_points(
     mask: NDArray[np.uint16],
     chosen: NDArray[np.int64],
     wanted: NDArray[np.uint8],
-    kept: KeptPoints | None,
+    kept: PointCache | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return one point of each chosen entry, (m, 1, 3), see `points_of`; from `kept` if all are there.
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SourceDocument
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
 from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
-from baker.io.gltf.edited_primitive import MendedPrimitive, RemadePrimitive
+from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
 from baker.io.gltf.write_fixed import write_mended
 from baker.io.gltf.write_source import raw_glb
@@ -185,7 +185,7 @@ def _mend(
     """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
     source, raw = _parsed(scene)
     area = _area_shares(raw)
-    mended: dict[tuple[int, int], MendedPrimitive] = {}
+    mended: dict[tuple[int, int], EditedPrimitive] = {}
     fixed: list[Fix] = []
     left: list[LeftAlone] = []
     for number, mesh, shown in _shown_meshes(raw):
@@ -220,7 +220,7 @@ def _mend(
 def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
     """Repair the shapes of a scene that is mended otherwise; what was done so far is told first."""
     source, raw = _parsed(scene)
-    made: dict[tuple[int, int], MendedPrimitive | RemadePrimitive] = {}
+    made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
     for number, mesh, shown in _shown_meshes(raw):
         report(progress, "repair", number / len(raw.meshes), mesh.name)
@@ -236,13 +236,13 @@ def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
     return Mended(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
 
 
-def _parsed(scene: Scene) -> tuple[SourceDocument, RawScene]:
+def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
     assert scene.source is not None
     assert scene.raw is not None
     return scene.source, scene.raw
 
 
-def _shown_meshes(raw: RawScene) -> Iterator[tuple[int, RawMesh, list[RawInstance]]]:
+def _shown_meshes(raw: SourceScene) -> Iterator[tuple[int, RawMesh, list[RawInstance]]]:
     """List the meshes that have triangles, with their number and the nodes that show them."""
     for number, mesh in enumerate(raw.meshes):
         if mesh.primitives:
@@ -264,7 +264,7 @@ def _within(progress: Progress, number: int, count: int) -> Progress:
     return lambda stage, fraction, detail="": progress(STAGE, (number + fraction) / count, detail)
 
 
-def _area_shares(raw: RawScene) -> NDArray[np.float64]:
+def _area_shares(raw: SourceScene) -> NDArray[np.float64]:
     """Return each mesh's part of the scene's area, by its first instance, (M,) float64."""
     area = np.zeros(len(raw.meshes))
     for instance in raw.instances:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.checks.rules.inside_out import inside_out_parts
 from baker.core.scene import Scene
 from baker.core.settings import make_settings
@@ -19,10 +19,10 @@ def faces_to_turn(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
     scene : Scene
         Read leniently. Meshes without such faces are not in the answer.
     """
-    subject = Subject(scene, make_settings({}))
+    context = CheckContext(scene, make_settings({}))
     found: dict[int, list[NDArray[np.bool_]]] = {}
-    for number, facts in enumerate(subject.meshes):
-        parts = inside_out_parts(subject, number)
+    for number, facts in enumerate(context.meshes):
+        parts = inside_out_parts(context, number)
         if not parts:
             continue
         face = facts.good[np.concatenate(parts)]

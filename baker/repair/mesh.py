@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from baker.core.source_mesh import RawInstance
-from baker.io.gltf.edited_primitive import MendedPrimitive, RemadePrimitive
+from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.repair.part import Part
 from baker.repair.plan import Change, finish_part
 from baker.repair.slivers import is_needle_mesh, remesh_part
@@ -27,7 +27,7 @@ class MeshRepair:
     left : tuple of str
     """
 
-    made: dict[int, MendedPrimitive | RemadePrimitive]
+    made: dict[int, EditedPrimitive | ReplacedPrimitive]
     changes: tuple[Change, ...]
     left: tuple[str, ...]
 
@@ -52,7 +52,7 @@ def repair_mesh(parts: list[Part], textured: bool, shown: RawInstance) -> MeshRe
         return MeshRepair({}, (), (why,) if _needs_repair(surface) else ())
     repair = repair_surface(parts)
     left, changes = list(repair.left), list(repair.changes)
-    made: dict[int, MendedPrimitive | RemadePrimitive] = {}
+    made: dict[int, EditedPrimitive | ReplacedPrimitive] = {}
     for plan in repair.parts:
         finished = finish_part(plan)
         if finished is not None:

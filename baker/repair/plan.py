@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.io.gltf.edited_primitive import MendedPrimitive
+from baker.io.gltf.edited_primitive import EditedPrimitive
 from baker.repair.faces import FaceChoice, choose_faces
 from baker.repair.normals import NormalChoice, choose_normals
 from baker.repair.part import Part
@@ -133,7 +133,7 @@ def plan_mesh(
     return MeshPlan(tuple(plans), totals.changes(), tuple(left))
 
 
-def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> MendedPrimitive | None:
+def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> EditedPrimitive | None:
     """Make the new vertices of a primitive: equal ones become one, unused ones go.
 
     Parameters
@@ -144,7 +144,7 @@ def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> Mended
 
     Returns
     -------
-    MendedPrimitive or None
+    EditedPrimitive or None
         None if the primitive stays as it is in the file.
     """
     if not plan.touched and uv is None:
@@ -165,7 +165,7 @@ def finish_part(plan: PartPlan, uv: NDArray[np.float32] | None = None) -> Mended
     rank = np.zeros(len(order), np.int64)
     rank[order] = np.arange(len(order))
     corner = corner[order]
-    return MendedPrimitive(
+    return EditedPrimitive(
         row=row[corner],
         triangle=rank[place].reshape(-1, 3),
         normal=None if normal is None else normal[corner],

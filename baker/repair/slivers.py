@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.io.gltf.edited_primitive import RemadePrimitive
+from baker.io.gltf.edited_primitive import ReplacedPrimitive
 from baker.repair import meshlab
 from baker.repair.plan import PartPlan
 from baker.repair.surface import Surface
@@ -25,14 +25,14 @@ class Remeshing:
 
     Attributes
     ----------
-    made : RemadePrimitive
+    made : ReplacedPrimitive
     n_before, n_after : int
         Needles.
     lost : tuple of str
         Attributes that the new vertices do not have.
     """
 
-    made: RemadePrimitive
+    made: ReplacedPrimitive
     n_before: int
     n_after: int
     lost: tuple[str, ...]
@@ -84,7 +84,7 @@ def remesh_part(surface: Surface, plan: PartPlan) -> Remeshing:
         colour = np.clip(meshlab.transfer(soup, own, value, position), 0.0, 1.0)
     kept = {"POSITION", "NORMAL", "COLOR_0"}
     return Remeshing(
-        RemadePrimitive(position, triangle, normal, colour),
+        ReplacedPrimitive(position, triangle, normal, colour),
         int(needles(surface.position, surface.triangle).sum()),
         int(needles(position, triangle).sum()),
         tuple(sorted(set(plan.part.column) - kept)),

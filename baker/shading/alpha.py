@@ -10,9 +10,9 @@ from baker.core.scene import Scene
 from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, SURFACE, TEXTURE, UV, AlphaTable, no_alpha
 from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
-from baker.kernels.transmittance import TintTable
+from baker.kernels.transmittance import TransmittanceTable
 from baker.topology.unique_rows import compact, first_equal
-from baker.trace.embree import SeeThrough
+from baker.trace.embree import HitFilter
 
 
 def build_alpha(
@@ -64,14 +64,14 @@ def build_alpha(
     return AlphaTable(slot, row)
 
 
-def see_through(shading: Shading, tint: TintTable | None = None) -> SeeThrough | None:
+def hit_filter(shading: Shading, tint: TransmittanceTable | None = None) -> HitFilter | None:
     """Return what the ray tree has to know of triangles that let light through, None without any.
 
     Parameters
     ----------
     shading : Shading
         Materials as kernels see them.
-    tint : TintTable, optional
+    tint : TransmittanceTable, optional
         Those that let a share of it through; None if none do.
     """
     if not len(shading.alpha.row):

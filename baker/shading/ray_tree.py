@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from baker.core.geometry import Geometry
 from baker.kernels.shading import Shading
-from baker.shading.alpha import see_through
+from baker.shading.alpha import hit_filter
 from baker.shading.transmittance import build_tint, tint
 from baker.trace.embree import RayScene
 
@@ -21,7 +21,5 @@ def build_ray_tree(geometry: Geometry, shading: Shading, *, threads: int) -> Ray
         Threads of the build; 0 means all.
     """
     table = build_tint(shading)
-    passing, colouring = see_through(shading, table), tint(shading, table)
-    return RayScene(
-        geometry.position, geometry.triangle, threads=threads, see_through=passing, tint=colouring
-    )
+    passing, colouring = hit_filter(shading, table), tint(shading, table)
+    return RayScene(geometry.position, geometry.triangle, threads=threads, hit_filter=passing, tint=colouring)

@@ -9,11 +9,11 @@ import numpy as np
 from baker.kernels.alpha import ALPHA, CUTOFF
 from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
-from baker.kernels.transmittance import COLOUR, ROW_LENGTH, TintTable
-from baker.trace.embree import SeeThrough
+from baker.kernels.transmittance import COLOUR, ROW_LENGTH, TransmittanceTable
+from baker.trace.embree import HitFilter
 
 
-def build_tint(shading: Shading) -> TintTable | None:
+def build_tint(shading: Shading) -> TransmittanceTable | None:
     """Find the BLEND triangles, but for those without alpha anywhere; None if there are none.
 
     Parameters
@@ -47,17 +47,17 @@ def build_tint(shading: Shading) -> TintTable | None:
     row[:, COLOUR : COLOUR + 3] = corner[:, 0]
     row[:, COLOUR + 3 : COLOUR + 6] = corner[:, 1] - corner[:, 0]
     row[:, COLOUR + 6 : COLOUR + 9] = corner[:, 2] - corner[:, 0]
-    return TintTable(slot, row, bool((there & ~white).any()))
+    return TransmittanceTable(slot, row, bool((there & ~white).any()))
 
 
-def tint(shading: Shading, table: TintTable | None) -> SeeThrough | None:
+def tint(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None:
     """Return what the ray tree has to know of triangles that let a share of light through, None without any.
 
     Parameters
     ----------
     shading : Shading
         Materials as kernels see them.
-    table : TintTable or None
+    table : TransmittanceTable or None
         `build_tint` of the same.
     """
     if table is None:

@@ -124,7 +124,7 @@ class Tracer(NamedTuple):
         return self._replace(tint=None)
 
 
-class SeeThrough(NamedTuple):
+class HitFilter(NamedTuple):
     """Triangles of whose hits a function is told, and decides whether they count.
 
     Attributes
@@ -159,9 +159,9 @@ class RayScene:
         0.7 % do (17 % without the flag): Embree's own limit.
     threads : int
         Threads of the tree's build; 0 means all.
-    see_through : SeeThrough, optional
+    see_through : HitFilter, optional
         A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
-    tint : SeeThrough, optional
+    tint : HitFilter, optional
         Some of these triangles, whose hits have geometry 2. They also form a tree of their own: `tint`.
 
     Raises
@@ -177,22 +177,22 @@ class RayScene:
         *,
         robust: bool = True,
         threads: int = 0,
-        see_through: SeeThrough | None = None,
-        tint: SeeThrough | None = None,
+        hit_filter: HitFilter | None = None,
+        tint: HitFilter | None = None,
     ) -> None:
         library = _library()
         self._library = library
-        self._owners = see_through, tint
+        self._owners = hit_filter, tint
         n = len(position)
         # Row n belongs to triangles that a geometry leaves out: Embree skips those with a vertex that is no
         # number. It reads 16 bytes from each vertex: one spare row keeps the last read inside.
-        self._position = np.zeros((n + (1 if see_through is None else 2), 3), np.float32)
+        self._position = np.zeros((n + (1 if hit_filter is None else 2), 3), np.float32)
         self._position[:n] = position
         whole = np.ascontiguousarray(triangle, np.uint32)
         self._triangles = [whole]
-        if see_through is not None:
+        if hit_filter is not None:
             self._position[n] = np.nan
-            chosen = see_through.chosen
+            chosen = hit_filter.chosen
             share = np.zeros_like(chosen) if tint is None else tint.chosen
             kept = [~chosen, chosen & ~share, *([] if tint is None else [share])]
             self._triangles = [np.where(own[:, None], whole, np.uint32(n)) for own in kept]
@@ -205,7 +205,7 @@ class RayScene:
         self._scenes: list[int] = []
         if int(library.rtcGetDeviceProperty(self._device, _PROPERTY_VERSION)) // 10000 != 4:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
-        filters = (None, see_through, see_through)
+        filters = (None, hit_filter, hit_filter)
         parts = zip(range(3), self._triangles, filters, strict=False) if len(triangle) else ()
         # A geometry in which no triangle is left needs no place in the tree; the others keep their numbers.
         scene = self._add_scene([part for part in parts if part[0] != 1 or kept[1].any()], robust)
@@ -215,7 +215,7 @@ class RayScene:
         self._check("building the ray tree")
         self.tracer = self._tracer(scene, tinted, tint is not None and tint.coloured)
 
-    def _add_scene(self, parts: list[tuple[int, NDArray[np.uint32], SeeThrough | None]], robust: bool) -> int:
+    def _add_scene(self, parts: list[tuple[int, NDArray[np.uint32], HitFilter | None]], robust: bool) -> int:
         library = self._library
         scene = int(library.rtcNewScene(self._device))
         self._scenes.append(scene)
@@ -227,7 +227,7 @@ class RayScene:
         return scene
 
     def _add_triangles(
-        self, scene: int, number: int, triangle: NDArray[np.uint32], see_through: SeeThrough | None
+        self, scene: int, number: int, triangle: NDArray[np.uint32], hit_filter: HitFilter | None
     ) -> None:
         library = self._library
         geometry = library.rtcNewGeometry(self._device, _GEOMETRY_TRIANGLE)
@@ -244,10 +244,10 @@ class RayScene:
         library.rtcSetSharedGeometryBuffer(
             geometry, _BUFFER_INDEX, 0, _FORMAT_UINT3, triangle.ctypes.data, 0, 12, len(triangle)
         )
-        if see_through is not None:
-            library.rtcSetGeometryUserData(geometry, see_through.data)
-            library.rtcSetGeometryIntersectFilterFunction(geometry, see_through.function)
-            library.rtcSetGeometryOccludedFilterFunction(geometry, see_through.function)
+        if hit_filter is not None:
+            library.rtcSetGeometryUserData(geometry, hit_filter.data)
+            library.rtcSetGeometryIntersectFilterFunction(geometry, hit_filter.function)
+            library.rtcSetGeometryOccludedFilterFunction(geometry, hit_filter.function)
         library.rtcCommitGeometry(geometry)
         library.rtcAttachGeometryByID(scene, geometry, number)
         library.rtcReleaseGeometry(geometry)

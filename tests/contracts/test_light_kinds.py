@@ -12,7 +12,7 @@ import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_scene, world_of
 
 import baker.lights.families
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.checks.in_bake import bake_warnings
 from baker.checks.run import check_scene
 from baker.checks.settings import CheckSettings
@@ -130,7 +130,7 @@ REFUSERS = {
     "render": lambda scene: render(scene, RenderSettings(camera="0,1,2,0,0,0,50", width=8, height=8, spp=2)),
     "direct light": direct,
     "path tracer": reference,
-    "checks": lambda scene: Subject(scene, SETTINGS),
+    "checks": lambda scene: CheckContext(scene, SETTINGS),
     "checks of a bake": lambda scene: bake_warnings(scene, SETTINGS),
     "solids": lamps_and_cameras,
     "glTF": lambda scene: new_document(scene, unwrap_scene(scene, SETTINGS)),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SceneBuilder
 
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.comparison.compare import compare
 from baker.core.settings import make_settings
 from baker.pathtracer.camera import look_at
@@ -81,7 +81,7 @@ def test_the_judge_finds_the_far_bake_right_and_says_where(folders):
 
 
 def test_check_sees_the_light_where_it_is():
-    near, far = (Subject(scene, SETTINGS).levels for scene in (room(), room(FAR)))
+    near, far = (CheckContext(scene, SETTINGS).levels for scene in (room(), room(FAR)))
     np.testing.assert_allclose(far.irradiance.mean(), near.irradiance.mean(), rtol=1e-3)
 
 

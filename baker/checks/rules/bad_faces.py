@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.topology.triangle_check import usable_vertices
@@ -18,8 +18,8 @@ NEEDLE = 1e-3
 
 
 def faces_found(
-    subject: Subject, mesh: int, faces: NDArray[np.integer], what: str, *, whole: int | None = None
-) -> Found:
+    context: CheckContext, mesh: int, faces: NDArray[np.integer], what: str, *, whole: int | None = None
+) -> RawFinding:
     """Return a finding about faces of a mesh, by their numbers over all its primitives.
 
     Parameters
@@ -29,19 +29,19 @@ def faces_found(
     whole : int or None
         What the percentage is of; all faces by default.
     """
-    facts = subject.meshes[mesh]
+    facts = context.meshes[mesh]
     n = len(faces)
     position = None
     first = faces[:1]
     if n and facts.usable[first].all():
-        position = subject.to_world(mesh, facts.position[facts.triangle[first[0]]].mean(axis=0))
+        position = context.to_world(mesh, facts.position[facts.triangle[first[0]]].mean(axis=0))
     elif n and facts.within[first].all():
         corner = facts.position[facts.triangle[first[0]]]
         finite = usable_vertices(corner)
-        position = subject.to_world(mesh, corner[finite][0]) if finite.any() else None
-    return Found(
+        position = context.to_world(mesh, corner[finite][0]) if finite.any() else None
+    return RawFinding(
         what.format(n=n, some="1 face" if n == 1 else f"{n} faces"),
-        subject.place(mesh),
+        context.place(mesh),
         n,
         percent=100.0 * n / max(len(facts.triangle) if whole is None else whole, 1),
         primitive=facts.primitive_of(faces),
@@ -50,8 +50,8 @@ def faces_found(
     )
 
 
-def _each(subject: Subject) -> Iterator[tuple[int, MeshFacts]]:
-    yield from enumerate(subject.meshes)
+def _each(context: CheckContext) -> Iterator[tuple[int, MeshFacts]]:
+    yield from enumerate(context.meshes)
 
 
 @check(
@@ -60,15 +60,15 @@ def _each(subject: Subject) -> Iterator[tuple[int, MeshFacts]]:
     severity="error",
     fix="export the mesh again: its index buffer belongs to other vertices",
 )
-def index_range(subject: Subject) -> Iterator[Found]:
+def index_range(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that name a vertex which does not exist.
 
     The index buffer and the vertices do not belong together. A bake refuses such a file.
     """
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         bad = np.flatnonzero(~facts.within)
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} with an index beyond the last vertex")
+            yield faces_found(context, m, bad, "{some} with an index beyond the last vertex")
 
 
 @check(
@@ -77,15 +77,15 @@ def index_range(subject: Subject) -> Iterator[Found]:
     severity="error",
     fix="delete or repair these vertices where the mesh was made; a bake leaves their faces out",
 )
-def bad_vertices(subject: Subject) -> Iterator[Found]:
+def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Faces with a corner that is NaN, infinite or further away than 1e18.
 
     A bake leaves them out, which opens holes that let light through.
     """
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         bad = np.flatnonzero(facts.within & ~facts.usable)
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} with NaN, infinite or huge coordinates")
+            yield faces_found(context, m, bad, "{some} with NaN, infinite or huge coordinates")
 
 
 @check(
@@ -94,17 +94,17 @@ def bad_vertices(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="dissolve degenerate faces (`--fix` drops them); a bake leaves them out",
 )
-def zero_area_faces(subject: Subject) -> Iterator[Found]:
+def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area: a line or a point.
 
     Nothing can be seen of them and a bake leaves them out, but a collapsed face often stands where a real
     one was meant to be. The limit is a height of 1e-7 of the longest side, below which the plane of the
     face is only rounding.
     """
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         bad = np.flatnonzero(facts.flat)
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} without area")
+            yield faces_found(context, m, bad, "{some} without area")
 
 
 @check(
@@ -113,12 +113,12 @@ def zero_area_faces(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="remesh or retriangulate where these faces are (`--repair` can, for scans)",
 )
-def needle_faces(subject: Subject) -> Iterator[Found]:
+def needle_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces less than a thousandth as high as long.
 
     Their normals are mostly rounding and unwrapping makes slivers of them, which own hardly a texel.
     """
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         if not len(facts.good):
             continue
         corner = facts.corner
@@ -127,7 +127,7 @@ def needle_faces(subject: Subject) -> Iterator[Found]:
         )
         bad = facts.good[2.0 * facts.area < NEEDLE * longest**2]
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} thinner than a thousandth of their length")
+            yield faces_found(context, m, bad, "{some} thinner than a thousandth of their length")
 
 
 @check(
@@ -136,17 +136,17 @@ def needle_faces(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="remove doubles (`--fix` drops them); a bake keeps the first of each",
 )
-def duplicate_faces(subject: Subject) -> Iterator[Found]:
+def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that repeat another one of the same mesh, corner by corner.
 
     Two surfaces in the same place shadow each other at random. A bake keeps the first of each; engines
     keep both. A face with the opposite winding is the other's back and no double, unless their material is
     double-sided anyway.
     """
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         bad = np.flatnonzero(facts.repeated)
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} that repeat another face")
+            yield faces_found(context, m, bad, "{some} that repeat another face")
 
 
 @check(
@@ -155,15 +155,15 @@ def duplicate_faces(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="delete the object, or export its faces as triangles",
 )
-def no_triangles(subject: Subject) -> Iterator[Found]:
+def no_triangles(context: CheckContext) -> Iterator[RawFinding]:
     """Meshes of which nothing can be baked.
 
     An error if the whole scene holds no usable triangle: a bake then refuses it.
     """
-    if not any(len(facts.good) for facts in subject.meshes):
-        yield Found("the scene holds no usable triangle: there is nothing to bake", severity="error")
+    if not any(len(facts.good) for facts in context.meshes):
+        yield RawFinding("the scene holds no usable triangle: there is nothing to bake", severity="error")
         return
-    for m, facts in _each(subject):
+    for m, facts in _each(context):
         if not len(facts.good):
-            place: Place = subject.place(m)
-            yield Found("the mesh has no usable triangle", place, len(facts.triangle))
+            place: Place = context.place(m)
+            yield RawFinding("the mesh has no usable triangle", place, len(facts.triangle))

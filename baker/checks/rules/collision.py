@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 
 # Unreal: UCX_, UBX_, USP_, UCP_, MCDCX_; Godot: -colonly, -convcolonly, -navmesh, -occonly; plain words.
@@ -24,17 +24,19 @@ _NAME = re.compile(
     fix="leave it out with --exclude, or rename it if it is to be seen",
     in_bake=True,
 )
-def collision_hull(subject: Subject) -> Iterator[Found]:
+def collision_hull(context: CheckContext) -> Iterator[RawFinding]:
     """An object with the name of a collision hull.
 
     Engines never show such meshes, but in a bake they block light like all others, and what they enclose is
     black. Known are Unreal's UCX_, UBX_, USP_, UCP_ and MCDCX_, Godot's -colonly, -convcolonly, -navmesh and
     -occonly, and names that end in collision, collider or hitbox.
     """
-    for instance in subject.raw.instances:
+    for instance in context.raw.instances:
         name = next(
-            (n for n in (instance.name, subject.raw.meshes[instance.mesh].name) if _NAME.search(n)), None
+            (n for n in (instance.name, context.raw.meshes[instance.mesh].name) if _NAME.search(n)), None
         )
-        if name is not None and len(subject.meshes[instance.mesh].good):
+        if name is not None and len(context.meshes[instance.mesh].good):
             place = Place(instance.name, instance.node)
-            yield Found(f"'{name}' is named like a collision hull, but blocks light as any object", place)
+            yield RawFinding(
+                f"'{name}' is named like a collision hull, but blocks light as any object", place
+            )

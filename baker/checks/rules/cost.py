@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from baker.checks.bake_rates import RAY_STAGES, Rates
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 
 # Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024.
@@ -41,10 +41,10 @@ class Cost:
     shares: list[dict[str, Any]]
 
 
-def estimate_cost(subject: Subject) -> Cost:
+def estimate_cost(context: CheckContext) -> Cost:
     """Estimate what a bake with the subject's settings takes."""
-    settings, world = subject.settings, subject.world
-    area = np.bincount(world.instance, world.area, len(subject.raw.instances))
+    settings, world = context.settings, context.world
+    area = np.bincount(world.instance, world.area, len(context.raw.instances))
     page = settings.resolution**2
     texels, pages = FILLED * page, 1
     if settings.density is not None:
@@ -53,48 +53,48 @@ def estimate_cost(subject: Subject) -> Cost:
         if pages > settings.max_pages:
             pages = settings.max_pages
             texels = FILLED * page * pages
-    elif all(subject.uv(m).valid for m, f in enumerate(subject.meshes) if len(f.good)):
-        laid = sum(float(np.abs(subject.uv(i.mesh).signed_area).sum()) for i in subject.raw.instances)
+    elif all(context.uv(m).valid for m, f in enumerate(context.meshes) if len(f.good)):
+        laid = sum(float(np.abs(context.uv(i.mesh).signed_area).sum()) for i in context.raw.instances)
         texels = min(laid, FILLED) * page
     n = round(texels)
     order = np.argsort(-area, kind="stable")[:MOST_SHARES]
     total = max(float(area.sum()), 1e-300)
     shares = [
         {
-            "object": subject.raw.instances[k].name,
-            "node": subject.raw.instances[k].node,
+            "object": context.raw.instances[k].name,
+            "node": context.raw.instances[k].node,
             "percent": round(100.0 * float(area[k]) / total, 2),
             "texels": round(n * float(area[k]) / total),
         }
         for k in order
     ]
     need = round(_BYTES + _PER_TEXEL * n + _PER_TRIANGLE * len(world.triangle))
-    return Cost(n, pages, _rays(subject, n), need, len(world.triangle), shares)
+    return Cost(n, pages, _rays(context, n), need, len(world.triangle), shares)
 
 
-def _rays(subject: Subject, texels: int) -> dict[str, int]:
-    settings = subject.settings
+def _rays(context: CheckContext, texels: int) -> dict[str, int]:
+    settings = context.settings
     hemisphere = settings.hemisphere_samples
     light = settings.light_samples or hemisphere
     occlusion = settings.ao_samples or hemisphere
     rays = {"buried texels": _BURIED * texels}
-    if subject.wants_light:
-        lamps = sum(max(x.intensity) > 0 for x in subject.scene.lights)
-        glows = subject.glows
+    if context.wants_light:
+        lamps = sum(max(x.intensity) > 0 for x in context.scene.lights)
+        glows = context.glows
         rays["direct light"] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
         if settings.bounces != 0:
             each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)
             rays["form factors"] = min(texels, _PATCHES) * each
         rays["final gather"] = texels * hemisphere
-    if "ao" in settings.channels and not (subject.wants_light and occlusion == hemisphere):
+    if "ao" in settings.channels and not (context.wants_light and occlusion == hemisphere):
         rays["ambient occlusion"] = texels * occlusion
     return rays
 
 
-def probe(subject: Subject) -> Rates:
+def probe(context: CheckContext) -> Rates:
     """Cast rays between surfaces of the scene for up to a second and return how fast that goes."""
-    world = subject.world
-    random = np.random.default_rng(subject.settings.seed)
+    world = context.world
+    random = np.random.default_rng(context.settings.seed)
     share = np.cumsum(world.area)
     pick = np.sort(random.random(1 << 16)) * share[-1]
     chosen = np.minimum(np.searchsorted(share, pick), len(share) - 1)
@@ -125,7 +125,7 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
 @check(
     "cost", group="cost", severity="info", fix="lower --resolution, --density or --quality if it is too much"
 )
-def cost_of_bake(subject: Subject) -> Iterator[Found]:
+def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
     """What a bake with these settings will take: texels, pages, rays, memory, and time if it is known.
 
     Time comes from an earlier bake: the one that `--rates OUT` names, else the latest of this scene in a
@@ -133,12 +133,12 @@ def cost_of_bake(subject: Subject) -> Iterator[Found]:
     does not hold the unwrap, whose time hangs on the shapes. `objects` lists the 20 largest with their
     share of surface, which is their share of texels and nearly of the time.
     """
-    if not subject.world.area.sum() > 0:
+    if not context.world.area.sum() > 0:
         return
-    cost = estimate_cost(subject)
-    rates = subject.rates
-    if rates is None and subject.probe:
-        rates = probe(subject)
+    cost = estimate_cost(context)
+    rates = context.rates
+    if rates is None and context.probe:
+        rates = probe(context)
     rays = sum(cost.rays.values())
     pages = "1 page" if cost.pages == 1 else f"{cost.pages} pages"
     text = (
@@ -156,4 +156,4 @@ def cost_of_bake(subject: Subject) -> Iterator[Found]:
         shown = f"{seconds / 60:.2g} minutes" if seconds >= 90 else f"{seconds:.2g} s"
         text += f", {shown} by {rates.basis}"
         more.update(seconds=round(seconds, 2), basis=rates.basis)
-    yield Found(text, count=1, more=more)
+    yield RawFinding(text, count=1, more=more)

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 from baker.checks.scene_rays import World
 from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
@@ -36,7 +36,7 @@ _WAYS = np.array(
     severity="info",
     fix="delete the hidden faces to save their texels; a bake fills them from their neighbours",
 )
-def enclosed_faces(subject: Subject) -> Iterator[Found]:
+def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that lie as a whole inside of a closed solid.
 
     The foot of a crate that is sunk into a floor, the end of a wall inside another wall, faces between two
@@ -46,10 +46,10 @@ def enclosed_faces(subject: Subject) -> Iterator[Found]:
     part are not counted. Double-sided faces that bound a solid and look into it are counted: turn them over,
     or their map holds the dark inside.
     """
-    world = subject.world
+    world = context.world
     if not len(world.triangle):
         return
-    solids = _solids(subject, world)
+    solids = _solids(context, world)
     if not solids.inside.any():
         return
     inverted = (solids.inside == BEFORE) & world.double_sided
@@ -62,24 +62,24 @@ def enclosed_faces(subject: Subject) -> Iterator[Found]:
         if len(hidden):
             name, count = np.unique(holder[hidden], return_counts=True)
             most = int(name[count.argmax()])
-            around = f"'{subject.raw.instances[most].name}'" if most != number else "another part of it"
+            around = f"'{context.raw.instances[most].name}'" if most != number else "another part of it"
             others = "" if len(name) == 1 else f" and {len(name) - 1} more"
-            yield _found(subject, hidden, f"{{some}} inside of {around}{others}: nobody sees them")
+            yield _found(context, hidden, f"{{some}} inside of {around}{others}: nobody sees them")
         if len(turned):
-            yield _found(subject, turned, "{some} the wrong way round: their front is inside of a solid")
+            yield _found(context, turned, "{some} the wrong way round: their front is inside of a solid")
 
 
-def _found(subject: Subject, rows: NDArray[np.int64], text: str) -> Found:
-    world = subject.world
-    instance = subject.raw.instances[int(world.instance[rows[0]])]
-    facts = subject.meshes[instance.mesh]
+def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFinding:
+    world = context.world
+    instance = context.raw.instances[int(world.instance[rows[0]])]
+    facts = context.meshes[instance.mesh]
     faces = world.face[rows]
     area = float(world.area[rows].sum())
     whole = float(world.area[world.instance == world.instance[rows[0]]].sum())
     x, y, z = world.place_of(rows[0])
-    return Found(
+    return RawFinding(
         text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
-        Place(instance.name or subject.raw.meshes[instance.mesh].name, instance.node),
+        Place(instance.name or context.raw.meshes[instance.mesh].name, instance.node),
         len(rows),
         percent=100.0 * area / max(whole, 1e-300),
         primitive=facts.primitive_of(faces),
@@ -89,8 +89,8 @@ def _found(subject: Subject, rows: NDArray[np.int64], text: str) -> Found:
     )
 
 
-def _solids(subject: Subject, world: World) -> Solids:
-    materials = subject.scene.materials
+def _solids(context: CheckContext, world: World) -> Solids:
+    materials = context.scene.materials
     surfaces = Surfaces(
         position=world.position,
         triangle=world.triangle,
@@ -99,7 +99,7 @@ def _solids(subject: Subject, world: World) -> Solids:
         double_sided=world.double_sided,
         glows=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
     )
-    return find_solids(surfaces, lamps_and_cameras(subject.scene))
+    return find_solids(surfaces, lamps_and_cameras(context.scene))
 
 
 def _holders(world: World, solids: Solids) -> NDArray[np.int64]:

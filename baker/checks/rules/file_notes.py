@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 
 # Importer's code: severity, what to do. Codes of the same name as a check are left to that check.
@@ -32,7 +32,7 @@ NOTES = {
 
 
 @check("file-note", group="file", severity="info", fix="see the message")
-def file_note(subject: Subject) -> Iterator[Found]:
+def file_note(context: CheckContext) -> Iterator[RawFinding]:
     """Parts of the file that a bake passes by or reads in its own way.
 
     The importer's own code is in `note`: unknown extensions, skins (posed by their joints), morph targets
@@ -40,9 +40,11 @@ def file_note(subject: Subject) -> Iterator[Found]:
     coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
     needed: normal maps, unused files, tangents, cameras.
     """
-    for warning in subject.scene.warnings:
+    for warning in context.scene.warnings:
         if warning.code in NOTES:
             severity, advice = NOTES[warning.code]
-            node = next((i.node for i in subject.raw.instances if i.name == warning.object), None)
+            node = next((i.node for i in context.raw.instances if i.name == warning.object), None)
             text = f"{warning.message}; {advice}"
-            yield Found(text, Place(warning.object, node), severity=severity, more={"note": warning.code})
+            yield RawFinding(
+                text, Place(warning.object, node), severity=severity, more={"note": warning.code}
+            )

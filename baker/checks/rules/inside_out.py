@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
@@ -31,29 +31,29 @@ _WITNESSES = 8
     fix="flip the normals of this part (`--fix` does), or make the material double-sided",
     in_bake=True,
 )
-def inside_out(subject: Subject) -> Iterator[Found]:
+def inside_out(context: CheckContext) -> Iterator[RawFinding]:
     """A closed part whose faces all look inwards, with nothing in it.
 
     Seen from outside it is black and swallows all light. A room is the same thing on purpose: a part with a
     light, a camera or other geometry in it, one that glows itself, the hollow of a shell, and double-sided
     surfaces are left alone. Less than 5 % of an object's surface is a warning only.
     """
-    for m, facts in enumerate(subject.meshes):
-        wrong = inside_out_parts(subject, m)
+    for m, facts in enumerate(context.meshes):
+        wrong = inside_out_parts(context, m)
         if wrong:
             rows = np.concatenate(wrong)
             share = float(facts.area[rows].sum() / facts.area.sum())
             parts = "a closed part" if len(wrong) == 1 else f"{len(wrong)} closed parts"
             looks = "looks" if len(wrong) == 1 else "look"
             text = f"{parts} of {{some}} {looks} inwards, and nothing is inside"
-            found = faces_found(subject, m, facts.good[rows], text)
+            found = faces_found(context, m, facts.good[rows], text)
             severity = "warning" if share < MOST_WRONG else None
             yield replace(found, percent=100.0 * share, severity=severity)
 
 
-def inside_out_parts(subject: Subject, mesh: int) -> list[NDArray[np.int64]]:
+def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]]:
     """Return the parts of a mesh that are inside out, each as rows of the mesh's `good` faces."""
-    facts = subject.meshes[mesh]
+    facts = context.meshes[mesh]
     if not len(facts.good) or not _may_be(facts):
         return []
     wrong = []
@@ -63,7 +63,7 @@ def inside_out_parts(subject: Subject, mesh: int) -> list[NDArray[np.int64]]:
         rows = facts.sheet[facts.piece == piece]
         if facts.double_sided[rows].all() or glowing[facts.material[facts.good[rows]]].any():
             continue
-        if not _inhabited(subject, mesh, rows, int(piece)):
+        if not _inhabited(context, mesh, rows, int(piece)):
             wrong.append(rows)
     return wrong
 
@@ -81,9 +81,9 @@ def _may_be(facts: MeshFacts) -> bool:
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 
 
-def _inhabited(subject: Subject, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
+def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
     """Tell whether anything is inside a closed part, or the part is the hollow of another one."""
-    facts = subject.meshes[mesh]
+    facts = context.meshes[mesh]
     corner = facts.corner[rows]
     others = [np.zeros((0, 3))]
     # Other parts of the same mesh.
@@ -97,23 +97,23 @@ def _inhabited(subject: Subject, mesh: int, rows: NDArray[np.int64], piece: int)
                     return True
     if first_inside(corner, np.concatenate(others)) is not None:
         return True
-    for instance in subject.raw.instances:
+    for instance in context.raw.instances:
         if instance.mesh == mesh:
             inverse = np.linalg.pinv(instance.world_from_object)
-            points = _things(subject, instance.node)
+            points = _things(context, instance.node)
             local = points @ inverse[:3, :3].T + inverse[:3, 3]
             if first_inside(corner, local) is not None:
                 return True
     return False
 
 
-def _things(subject: Subject, node: int) -> NDArray[np.float64]:
+def _things(context: CheckContext, node: int) -> NDArray[np.float64]:
     """Return points of lights, cameras and all objects but that of `node`, (n, 3) float64, world."""
-    scene = subject.scene
+    scene = context.scene
     points = list(light_positions(scene))
     points += [np.array(camera.position) for camera in scene.cameras]
-    for instance in subject.raw.instances:
-        facts = subject.meshes[instance.mesh]
+    for instance in context.raw.instances:
+        facts = context.meshes[instance.mesh]
         if instance.node == node or not len(facts.good):
             continue
         step = max(1, len(facts.good) // _WITNESSES)

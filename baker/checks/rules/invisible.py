@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.core.scene import Material, Texture
@@ -32,7 +32,7 @@ _LOOKS = np.array(
     "else leave the object out",
     in_bake=True,
 )
-def invisible(subject: Subject) -> Iterator[Found]:
+def invisible(context: CheckContext) -> Iterator[RawFinding]:
     """An object that its materials make invisible as a whole.
 
     Alpha is 0 everywhere (BLEND) or below the cutoff everywhere (MASK): factor, texture and vertex colours
@@ -40,19 +40,19 @@ def invisible(subject: Subject) -> Iterator[Found]:
     MTL files for opacity write such materials, and so does an alpha channel that was never painted. An
     object of which a part can be seen is left alone.
     """
-    fades = np.array([material.alpha_mode != "OPAQUE" for material in subject.scene.materials], bool)
+    fades = np.array([material.alpha_mode != "OPAQUE" for material in context.scene.materials], bool)
     if not fades.any():
         return
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         material = facts.material[facts.good]
         if not len(material) or not fades[material].all():
             continue
         used = [int(k) for k in np.unique(material)]
-        if any(_seen(facts, k, subject.scene.materials[k]) for k in used):
+        if any(_seen(facts, k, context.scene.materials[k]) for k in used):
             continue
-        places = sum(instance.mesh == m for instance in subject.raw.instances)
+        places = sum(instance.mesh == m for instance in context.raw.instances)
         if places:
-            yield Found(_sentence([subject.scene.materials[k] for k in used]), subject.place(m), places)
+            yield RawFinding(_sentence([context.scene.materials[k] for k in used]), context.place(m), places)
 
 
 def _sentence(materials: list[Material]) -> str:

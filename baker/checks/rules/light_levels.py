@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.checks.direct_light import cosine_ways, points_inside
-from baker.checks.finding import Found, Place
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 
 # Rays from emissive surfaces that look for anything to light.
@@ -25,11 +25,11 @@ HALF_MAX = 65504.0
     severity="warning",
     fix="look where the lights are and what is between them and the surfaces",
 )
-def all_black(subject: Subject) -> Iterator[Found]:
+def all_black(context: CheckContext) -> Iterator[RawFinding]:
     """A scene with light of which nothing arrives at any of 512 points on its surfaces."""
-    levels = subject.levels
+    levels = context.levels
     if levels is not None and not levels.irradiance.any():
-        yield Found(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
+        yield RawFinding(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
 
 
 @check(
@@ -38,23 +38,23 @@ def all_black(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="lower the lights, move them away from surfaces, or bake with --dtype float",
 )
-def clips_half(subject: Subject) -> Iterator[Found]:
+def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     """Direct light over 65504 lx, the largest half float, at some of 512 points on the surfaces.
 
     The map stores that number instead. With `--dtype float` nothing is clipped.
     """
-    levels = subject.levels
-    if levels is None or subject.settings.dtype == "float":
+    levels = context.levels
+    if levels is None or context.settings.dtype == "float":
         return
     over = np.flatnonzero(levels.irradiance > HALF_MAX)
     if len(over):
         worst = over[levels.irradiance[over].argmax()]
         share = 100.0 * len(over) / len(levels.irradiance)
-        x, y, z = (float(v) for v in levels.position[worst] + subject.scene.origin)
+        x, y, z = (float(v) for v in levels.position[worst] + context.scene.origin)
         most = levels.irradiance[worst]
         text = f"about {share:.3g}% of the surface gets more than 65504 lx, up to {most:.3g}"
-        at = subject.raw.instances[subject.world.instance[levels.triangle[worst]]]
-        yield Found(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
+        at = context.raw.instances[context.world.instance[levels.triangle[worst]]]
+        yield RawFinding(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
 
 
 @check(
@@ -63,15 +63,15 @@ def clips_half(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="nothing to do: this is what direct light will look like",
 )
-def light_levels(subject: Subject) -> Iterator[Found]:
+def light_levels(context: CheckContext) -> Iterator[RawFinding]:
     """Brightest and darkest direct irradiance at 512 points on the surfaces, before any bounce."""
-    levels = subject.levels
+    levels = context.levels
     if levels is not None and levels.irradiance.any():
         low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
         dark = 100.0 * float((levels.irradiance == 0).mean())
         text = f"direct light is {low:.3g} to {high:.3g} lx, median {middle:.3g}; {dark:.2g}% gets none"
         more = {"darkest": float(low), "median": float(middle), "brightest": float(high)}
-        yield Found(text, count=len(levels.position), percent=dark, more=more)
+        yield RawFinding(text, count=len(levels.position), percent=dark, more=more)
 
 
 @check(
@@ -80,17 +80,17 @@ def light_levels(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="turn the emitting faces towards the scene, or make their material double-sided",
 )
-def emitter_unseen(subject: Subject) -> Iterator[Found]:
+def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
     """An emissive object that faces away from everything.
 
     Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
     their front only.
     """
-    if not subject.glows or len(subject.raw.instances) < 2:
+    if not context.glows or len(context.raw.instances) < 2:
         return
-    world = subject.world
-    random = np.random.default_rng(subject.settings.seed)
-    glows = np.unique(subject.emission.triangle)
+    world = context.world
+    random = np.random.default_rng(context.settings.seed)
+    glows = np.unique(context.emission.triangle)
     for k in np.unique(world.instance[glows]):
         own = glows[world.instance[glows] == k]
         share = np.cumsum(world.area[own])
@@ -105,7 +105,9 @@ def emitter_unseen(subject: Subject) -> Iterator[Found]:
             hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
             met = met or bool((hit >= 0).any())
         if not met:
-            instance = subject.raw.instances[k]
+            instance = context.raw.instances[k]
             x, y, z = world.place_of(own[0])
             place = Place(instance.name, instance.node)
-            yield Found("its emitting faces face away from everything", place, len(own), position=(x, y, z))
+            yield RawFinding(
+                "its emitting faces face away from everything", place, len(own), position=(x, y, z)
+            )

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 from baker.core.colour import linear_from_srgb
 from baker.core.light_kind import kind_of, light_positions
@@ -31,12 +31,12 @@ FLOOR = 0.5
     severity="warning",
     fix="add a light or an emissive material, or bake with --sky; for AO alone use --channels ao",
 )
-def no_light(subject: Subject) -> Iterator[Found]:
+def no_light(context: CheckContext) -> Iterator[RawFinding]:
     """A scene without any light, emissive surface or sky: its irradiance is black."""
-    lit = any(max(light.intensity) > 0 for light in subject.scene.lights)
-    dark = not lit and not any(subject.settings.sky_radiance) and subject.wants_light
-    if dark and not subject.glows:
-        yield Found("nothing emits light: the irradiance will be black")
+    lit = any(max(light.intensity) > 0 for light in context.scene.lights)
+    dark = not lit and not any(context.settings.sky_radiance) and context.wants_light
+    if dark and not context.glows:
+        yield RawFinding("nothing emits light: the irradiance will be black")
 
 
 @check(
@@ -45,15 +45,15 @@ def no_light(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="give the light's node and its parents a scale other than zero; a bake leaves the light out",
 )
-def flat_light(subject: Subject) -> Iterator[Found]:
+def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     """Spot and directional lights whose node leaves them no direction.
 
     A scale of zero along the axis that the light shines along, of the node or of a parent, maps the direction
     to nothing, or to rounding errors. Point lights need no direction and are kept.
     """
-    for warning in subject.scene.warnings:
+    for warning in context.scene.warnings:
         if warning.code == "flat-light":
-            yield Found(warning.message, Place(warning.object))
+            yield RawFinding(warning.message, Place(warning.object))
 
 
 @check(
@@ -62,18 +62,18 @@ def flat_light(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="raise or remove the range, if surfaces farther away are to be lit",
 )
-def light_range(subject: Subject) -> Iterator[Found]:
+def light_range(context: CheckContext) -> Iterator[RawFinding]:
     """Point and spot lights whose `range` ends inside the scene.
 
     Light fades out as KHR_lights_punctual says, to nothing at the range. Engines fade lights out in other
     ways, and some ignore the range.
     """
     lights = [
-        light for light in subject.scene.lights if math.isfinite(light.range) and max(light.intensity) > 0
+        light for light in context.scene.lights if math.isfinite(light.range) and max(light.intensity) > 0
     ]
     if not lights:
         return
-    low, high = subject.box
+    low, high = context.box
     place = np.array([light.position for light in lights])
     farthest = np.linalg.norm(np.maximum(np.abs(place - low), np.abs(place - high)), axis=1)
     ends = [k for k, light in enumerate(lights) if light.range < farthest[k]]
@@ -85,7 +85,7 @@ def light_range(subject: Subject) -> Iterator[Found]:
             f"{farthest[k]:.3g} m from it, and what lies beyond the range gets none of its light"
         )
         text += f" (so do {len(ends) - 1} further lights with ranges of their own)" if len(ends) > 1 else ""
-        yield Found(text, Place(light.name, light.node), count=len(ends), position=light.position)
+        yield RawFinding(text, Place(light.name, light.node), count=len(ends), position=light.position)
 
 
 @check(
@@ -94,32 +94,32 @@ def light_range(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="move the light out of the geometry, or make the shade emissive or see-through",
 )
-def light_inside(subject: Subject) -> Iterator[Found]:
+def light_inside(context: CheckContext) -> Iterator[RawFinding]:
     """A point or spot light inside a closed solid, like a lamp inside its own bulb.
 
     Every surface blocks light from both sides, so none of it gets out. Rooms, whose surfaces look inwards,
     and parts with a material that light can pass (MASK, BLEND) are left alone.
     """
     solids = None
-    for light in subject.scene.lights:
+    for light in context.scene.lights:
         if not kind_of(light).has_position:
             continue
-        solids = list(_solids(subject)) if solids is None else solids
+        solids = list(_solids(context)) if solids is None else solids
         for name, corner in solids:
             if first_inside(corner, np.array([light.position])) is not None:
                 place = Place(light.name, light.node)
                 text = f"the {light.kind} light is inside the closed surface of '{name}'"
-                yield Found(text, place, position=light.position)
+                yield RawFinding(text, place, position=light.position)
                 break
 
 
-def _solids(subject: Subject) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Yield name and world corners of every closed part that looks outwards and lets no light through."""
-    materials = subject.scene.materials
+    materials = context.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
-    position = light_positions(subject.scene)
-    for instance in subject.raw.instances:
-        facts = subject.meshes[instance.mesh]
+    position = light_positions(context.scene)
+    for instance in context.raw.instances:
+        facts = context.meshes[instance.mesh]
         if not len(facts.good):
             continue
         matrix = instance.world_from_object
@@ -140,7 +140,7 @@ def _solids(subject: Subject) -> Iterator[tuple[str, NDArray[np.float64]]]:
     severity="warning",
     fix="set the intensity in cd (point, spot), lx (directional) or cd/m2 (emission)",
 )
-def light_intensity(subject: Subject) -> Iterator[Found]:
+def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
     """Lights that are negative, zero or absurdly strong.
 
     Negative light is an error: a bake refuses it. Absurd is more than 1e6 cd for a point, 1e7 cd for a
@@ -148,23 +148,23 @@ def light_intensity(subject: Subject) -> Iterator[Found]:
     candela. Exporters that convert watts multiply by 683 lm/W: Blender does so with the lighting mode
     Standard, and writes the numbers as they are with Unitless.
     """
-    for light in subject.scene.lights:
+    for light in context.scene.lights:
         place = Place(light.name, light.node)
         kind = kind_of(light)
         at, unit = light.position if kind.has_position else None, kind.unit
         if min(light.intensity) < 0:
-            yield Found(f"the {light.kind} light is negative", place, position=at, severity="error")
+            yield RawFinding(f"the {light.kind} light is negative", place, position=at, severity="error")
         elif max(light.intensity) == 0:
-            yield Found(f"the {light.kind} light has no intensity", place, position=at)
+            yield RawFinding(f"the {light.kind} light has no intensity", place, position=at)
         elif max(light.intensity) > kind.plausible_max:
             most = max(light.intensity)
             text = f"the {light.kind} light has {most:.3g} {unit}; if watts were multiplied by 683 lm/W "
             text += f"(Blender's lighting mode Standard), export it as Unitless: {most / 683:.3g} {unit}"
-            yield Found(text, place, position=at)
-    for k in subject.used_materials:
-        material = subject.scene.materials[k]
+            yield RawFinding(text, place, position=at)
+    for k in context.used_materials:
+        material = context.scene.materials[k]
         if max(material.emission) > ABSURD_EMISSION:
-            yield Found(f"the material emits {max(material.emission):.3g} cd/m2", Place(material.name))
+            yield RawFinding(f"the material emits {max(material.emission):.3g} cd/m2", Place(material.name))
 
 
 @check(
@@ -173,7 +173,7 @@ def light_intensity(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="lower the base colour to 0.9 or less: fresh snow has 0.9, white paint 0.8",
 )
-def albedo(subject: Subject) -> Iterator[Found]:
+def albedo(context: CheckContext) -> Iterator[RawFinding]:
     """Materials that reflect over 95 % of the light.
 
     Nothing in nature does. Light hardly dies away between such surfaces: closed rooms of them get brighter
@@ -182,38 +182,38 @@ def albedo(subject: Subject) -> Iterator[Found]:
     if it is above 20.
     """
     gain = None
-    reflected = albedos(subject)
-    for k in subject.used_materials:
-        material, value = subject.scene.materials[k], float(reflected[k])
+    reflected = albedos(context)
+    for k in context.used_materials:
+        material, value = context.scene.materials[k], float(reflected[k])
         if value > MOST_REFLECTED:
-            mesh = next(m for m, f in enumerate(subject.meshes) if (f.material[f.good] == k).any())
+            mesh = next(m for m, f in enumerate(context.meshes) if (f.material[f.good] == k).any())
             what = f"material '{material.name}'" if material.name else "the default material"
             text = f"{what} has an albedo of {value:.3g}"
             if value > NEARLY_WHITE:
                 from baker.checks.trapped_light import MOST_GAIN, trapped_gain
 
-                gain = trapped_gain(subject, reflected) if gain is None else gain
+                gain = trapped_gain(context, reflected) if gain is None else gain
                 if gain > MOST_GAIN:
                     text += f": all bounces together multiply light by about {gain:.3g}"
-            yield Found(text, subject.place(mesh), more={"material": k})
+            yield RawFinding(text, context.place(mesh), more={"material": k})
 
 
-def albedos(subject: Subject) -> NDArray[np.float64]:
+def albedos(context: CheckContext) -> NDArray[np.float64]:
     """Return the mean albedo of each material that is used, the largest of its colours, (M,) float64."""
-    out = np.zeros(len(subject.scene.materials))
-    for k in subject.used_materials:
-        material = subject.scene.materials[k]
-        out[k] = max(material.base_colour[:3]) * _painted(subject, k)
+    out = np.zeros(len(context.scene.materials))
+    for k in context.used_materials:
+        material = context.scene.materials[k]
+        out[k] = max(material.base_colour[:3]) * _painted(context, k)
         if material.base_colour_texture is not None and out[k] > MOST_REFLECTED:
             mean = image_mean(material.base_colour_texture.image)
             out[k] = max(a * b for a, b in zip(material.base_colour[:3], mean, strict=True))
     return out
 
 
-def _painted(subject: Subject, material: int) -> float:
+def _painted(context: CheckContext, material: int) -> float:
     """Return the brightest vertex colour on a material's surfaces, 1 where there are none."""
     brightest = []
-    for facts in subject.meshes:
+    for facts in context.meshes:
         for k, p in enumerate(facts.raw.primitives):
             if p.material == material and (facts.primitive[facts.good] == k).any():
                 if p.colour is None:
@@ -237,22 +237,22 @@ def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
     severity="warning",
     fix="paint the emissive texture, or give the material an emissiveFactor",
 )
-def emissive_black(subject: Subject) -> Iterator[Found]:
+def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
     """Emissive materials whose texture is black wherever they are used, or whose factor is zero."""
-    for k in subject.used_materials:
-        material = subject.scene.materials[k]
+    for k in context.used_materials:
+        material = context.scene.materials[k]
         if material.emission_texture is None:
             continue
         image = material.emission_texture.image
         if max(material.emission) > 0 and not image[..., :3].any():
             text = f"the emissive texture of material '{material.name}' is all black"
-            yield Found(text, Place(material.name))
+            yield RawFinding(text, Place(material.name))
         elif not max(material.emission) > 0 and image[..., :3].any():
             text = f"material '{material.name}' has an emissive texture, but its emissiveFactor is zero"
-            yield Found(text, Place(material.name), severity="info")
-        elif max(material.emission) > 0 and k not in subject.world.material[subject.emission.triangle]:
+            yield RawFinding(text, Place(material.name), severity="info")
+        elif max(material.emission) > 0 and k not in context.world.material[context.emission.triangle]:
             text = f"all surfaces of material '{material.name}' lie where its emissive texture is black"
-            yield Found(text, Place(material.name))
+            yield RawFinding(text, Place(material.name))
 
 
 @check(
@@ -261,13 +261,13 @@ def emissive_black(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="turn the light: it shines along its node's -Z",
 )
-def sun_below(subject: Subject) -> Iterator[Found]:
+def sun_below(context: CheckContext) -> Iterator[RawFinding]:
     """A sun that comes from below every floor of the scene."""
-    for light in subject.scene.lights:
+    for light in context.scene.lights:
         if kind_of(light).has_position or not max(light.intensity) > 0:
             continue
-        world = subject.world
+        world = context.world
         floor = world.normal[:, 1] > FLOOR
         lit = world.normal @ -np.array(light.direction) > 1e-6
         if floor.any() and not (floor & lit).any():
-            yield Found("the sun shines from below every floor", Place(light.name, light.node))
+            yield RawFinding("the sun shines from below every floor", Place(light.name, light.node))

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
@@ -29,19 +29,19 @@ def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
     severity="warning",
     fix="split the mesh there, or delete the inner faces (`--repair` can)",
 )
-def non_manifold_edges(subject: Subject) -> Iterator[Found]:
+def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Edges at which more than two faces meet.
 
     Inside and outside are not defined there: often a wall inside a wall, or faces left over from a
     boolean. Faces lying back to back in the same place are not counted: they are two sheets.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         edges = facts.edges
         crowded = np.flatnonzero(edges.count > 2)
         if len(crowded):
             text = f"{len(crowded)} edges with more than two faces"
             faces = _files(facts, edges.face[edges.first[crowded]])
-            found = faces_found(subject, m, faces, text)
+            found = faces_found(context, m, faces, text)
             yield _counted(found, len(crowded), len(edges.count))
 
 
@@ -51,12 +51,12 @@ def non_manifold_edges(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="move the touching parts apart, or into objects of their own",
 )
-def non_manifold_vertices(subject: Subject) -> Iterator[Found]:
+def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Vertices at which parts of a mesh touch only in a point.
 
     Harmless for light, but subdivision, simplification and some unwrappers stumble over it.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         edges, welded = facts.edges, facts.welded[facts.sheet]
         if not len(welded):
             continue
@@ -72,7 +72,7 @@ def non_manifold_vertices(subject: Subject) -> Iterator[Found]:
         if len(touching):
             first = np.flatnonzero((welded == touching[0]).any(axis=1))
             found = faces_found(
-                subject, m, _files(facts, first), f"{len(touching)} vertices where parts touch in a point"
+                context, m, _files(facts, first), f"{len(touching)} vertices where parts touch in a point"
             )
             yield _counted(found, len(touching), int((fans > 0).sum()))
 
@@ -98,13 +98,13 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
     severity="warning",
     fix="merge vertices by distance and fill the holes (`--repair` fills small ones)",
 )
-def open_edges(subject: Subject) -> Iterator[Found]:
+def open_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Open edges in a mesh that is closed but for small holes.
 
     Light leaks through cracks. A part counts if the holes in it have less than 5 % of its surface; a box
     without a lid or a sheet of terrain is open on purpose.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         edges = facts.edges
         border = np.flatnonzero(edges.count == 1)
         if not len(border):
@@ -123,7 +123,7 @@ def open_edges(subject: Subject) -> Iterator[Found]:
             n, holes = int(chosen.sum()), len(np.unique(hole[chosen]))
             some = "1 hole" if holes == 1 else f"{holes} holes"
             found = faces_found(
-                subject, m, _files(facts, face[chosen]), f"{n} open edges around {some} of a closed mesh"
+                context, m, _files(facts, face[chosen]), f"{n} open edges around {some} of a closed mesh"
             )
             yield _counted(found, n, len(edges.count))
 
@@ -163,24 +163,24 @@ def _hole_area(
     severity="warning",
     fix="recalculate normals outside (`--fix` does, in closed meshes)",
 )
-def flipped_neighbours(subject: Subject) -> Iterator[Found]:
+def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
     """Neighbouring faces wound in opposite directions.
 
     One of them shows its back where the other shows its front. The back of a one-sided surface is black: it
     neither receives nor reflects light, and points near it count as buried.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         edges = facts.edges
         odd = np.flatnonzero((edges.count == 2) & (edges.balance != 0))
         if len(odd):
             faces = _files(facts, edges.face[edges.first[odd]])
             some = "1 edge" if len(odd) == 1 else f"{len(odd)} edges"
             text = f"faces on both sides of {some} are wound in opposite directions"
-            found = faces_found(subject, m, faces, text)
+            found = faces_found(context, m, faces, text)
             yield _counted(found, len(odd), len(edges.count))
 
 
-def _counted(found: Found, count: int, whole: int) -> Found:
+def _counted(found: RawFinding, count: int, whole: int) -> RawFinding:
     """Return a finding with a count of edges or vertices instead of faces."""
     from dataclasses import replace
 

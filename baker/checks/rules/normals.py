@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
@@ -44,16 +44,16 @@ def _length(normal: NDArray[np.float32]) -> NDArray[np.float64]:
     severity="info",
     fix="export normals if the surface is meant to look smooth; it is baked with flat faces",
 )
-def missing_normals(subject: Subject) -> Iterator[Found]:
+def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
     """Meshes without vertex normals.
 
     glTF asks for flat normals then: every face gets an edge of its own in the light.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         lacking = [k for k, p in _parts(facts) if p.normal is None and len(p.triangle)]
         if lacking:
             faces = np.flatnonzero(np.isin(facts.primitive, lacking))
-            yield faces_found(subject, m, faces, "{some} without vertex normals")
+            yield faces_found(context, m, faces, "{some} without vertex normals")
 
 
 @check(
@@ -62,16 +62,16 @@ def missing_normals(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="recalculate normals where the mesh was made; a bake makes these anew from the faces",
 )
-def bad_normals(subject: Subject) -> Iterator[Found]:
+def bad_normals(context: CheckContext) -> Iterator[RawFinding]:
     """Vertex normals that are NaN, infinite or of no length."""
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
             if p.normal is None:
                 continue
             length = _length(p.normal)
             faces = _faces_at(facts, k, ~(np.isfinite(length) & (length > 1e-12)))
             if len(faces):
-                yield faces_found(subject, m, faces, "{some} with a normal of no length or not finite")
+                yield faces_found(context, m, faces, "{some} with a normal of no length or not finite")
 
 
 @check(
@@ -80,12 +80,12 @@ def bad_normals(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="normalise the normals on export; a bake does so by itself, engines may not",
 )
-def normal_length(subject: Subject) -> Iterator[Found]:
+def normal_length(context: CheckContext) -> Iterator[RawFinding]:
     """Vertex normals that are not one unit long, by more than 2 %.
 
     A shader that trusts them shades the surface too bright or too dark.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
             if p.normal is None:
                 continue
@@ -94,7 +94,7 @@ def normal_length(subject: Subject) -> Iterator[Found]:
             faces = _faces_at(facts, k, odd)
             if len(faces):
                 worst = length[odd][np.argmax(np.abs(length[odd] - 1.0))]
-                yield faces_found(subject, m, faces, f"{{some}} with a normal of length {worst:.3g}, not 1")
+                yield faces_found(context, m, faces, f"{{some}} with a normal of length {worst:.3g}, not 1")
 
 
 @check(
@@ -103,13 +103,13 @@ def normal_length(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="recalculate normals, or flip the faces: winding and normals disagree about the front",
 )
-def normals_against_faces(subject: Subject) -> Iterator[Found]:
+def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces whose vertex normals all point to their back.
 
     The winding says which side is the front and gets light, the normals say from where it is counted: between
     them nothing is left and the face comes out black.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
             rows = np.flatnonzero(facts.primitive[facts.good] == k)
             if p.normal is None or not len(rows):
@@ -119,7 +119,7 @@ def normals_against_faces(subject: Subject) -> Iterator[Found]:
             side = np.einsum("fcx,fx->fc", normal, facts.area_vector[rows])
             against = facts.good[rows[(side < 0).all(axis=1)]]
             if len(against):
-                yield faces_found(subject, m, against, "{some} whose normals all point to their back")
+                yield faces_found(context, m, against, "{some} whose normals all point to their back")
 
 
 @check(
@@ -128,9 +128,9 @@ def normals_against_faces(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="merge equal vertices on export (`--fix` welds them): smaller files, the same picture",
 )
-def duplicate_vertices(subject: Subject) -> Iterator[Found]:
+def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Vertices that repeat another one of the same primitive in every attribute."""
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         double, total = 0, 0
         first: int | None = None
         at: tuple[float, float, float] | None = None
@@ -146,12 +146,12 @@ def duplicate_vertices(subject: Subject) -> Iterator[Found]:
                 first = p.index
                 which = np.flatnonzero(np.bincount(number)[number] > 1)[0]
                 if np.isfinite(p.position[which]).all():
-                    at = subject.to_world(m, p.position[which])
+                    at = context.to_world(m, p.position[which])
         if double:
             some = "1 vertex repeats" if double == 1 else f"{double} of {total} vertices repeat"
-            yield Found(
+            yield RawFinding(
                 f"{some} another one in every attribute",
-                subject.place(m),
+                context.place(m),
                 double,
                 percent=100.0 * double / total,
                 primitive=first,

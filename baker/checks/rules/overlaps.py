@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import MOST_FACES, Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import MOST_FACES, Place, RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
@@ -34,19 +34,19 @@ _TURN = 256.0
     severity="info",
     fix="join the parts with a boolean union, if light bleeds where they meet",
 )
-def self_intersection(subject: Subject) -> Iterator[Found]:
+def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one mesh that pierce each other.
 
     Common and mostly harmless where parts are stuck together; the texels inside the other part are black
     and are filled from their neighbours. Found by rays along all edges; parts that only touch are not
     counted.
     """
-    for m, facts in enumerate(subject.meshes):
-        pierced, n = _crossings(facts, thread_count(subject.settings.threads))
+    for m, facts in enumerate(context.meshes):
+        pierced, n = _crossings(facts, thread_count(context.settings.threads))
         if n:
             both = facts.good[pierced]
             some = "1 edge pierces" if n == 1 else f"{n} edges pierce"
-            found = faces_found(subject, m, np.unique(both), f"{some} another face of the mesh")
+            found = faces_found(context, m, np.unique(both), f"{some} another face of the mesh")
             pairs = tuple((int(a), int(b)) for a, b in facts.local[both[:MOST_FACES]])
             yield replace(found, count=n, pairs=pairs)
 
@@ -111,33 +111,33 @@ def _pierces(
     severity="warning",
     fix="move one surface by a millimetre, or cut the hidden part away",
 )
-def coplanar_overlap(subject: Subject) -> Iterator[Found]:
+def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Surfaces of different objects in the same place that look the same way (z-fighting).
 
     Engines show now one, now the other, and each shadows the other at random. Planes count as the same
     within a millionth of the scene's diagonal. A box that stands on a floor is not meant: the two look at
     each other.
     """
-    partner = _partners(subject)
-    world = subject.world
+    partner = _partners(context)
+    world = context.world
     mine = np.flatnonzero(partner >= 0)
     if not len(mine):
         return
-    n = len(subject.raw.instances)
+    n = len(context.raw.instances)
     one, two = world.instance[mine], world.instance[partner[mine]]
     key = np.minimum(one, two) * n + np.maximum(one, two)
     for k in np.unique(key):
-        a, b = (subject.raw.instances[int(v)] for v in divmod(int(k), n))
+        a, b = (context.raw.instances[int(v)] for v in divmod(int(k), n))
         own = mine[(key == k) & (one == int(k) // n)]
         rest = mine[(key == k) & (one != int(k) // n)]
         chosen = own if len(own) else rest
         faces = world.face[chosen]
         shown = a if len(own) else b
-        facts = subject.meshes[shown.mesh]
+        facts = context.meshes[shown.mesh]
         x, y, z = world.place_of(chosen[0])
         some = "1 face lies" if len(chosen) == 1 else f"{len(chosen)} faces lie"
         hidden = b if len(own) else a
-        yield Found(
+        yield RawFinding(
             f"{some} in the same plane as '{hidden.name}' and overlap it",
             Place(shown.name, shown.node),
             len(chosen),
@@ -149,13 +149,13 @@ def coplanar_overlap(subject: Subject) -> Iterator[Found]:
         )
 
 
-def _partners(subject: Subject) -> NDArray[np.int64]:
+def _partners(context: CheckContext) -> NDArray[np.int64]:
     """Return for each world triangle one of another instance that it overlaps in its plane, or -1."""
-    world = subject.world
+    world = context.world
     partner = np.full(len(world.triangle), -1, np.int64)
-    if len(subject.raw.instances) < 2 or not len(world.triangle):
+    if len(context.raw.instances) < 2 or not len(world.triangle):
         return partner
-    tolerance = min(max(COPLANAR * subject.diagonal, LEAST), MOST)
+    tolerance = min(max(COPLANAR * context.diagonal, LEAST), MOST)
     corner = world.position[world.triangle[:, 0]].astype(np.float64)
     away = np.einsum("tx,tx->t", world.normal, corner)
     turn = np.round(world.normal * _TURN).astype(np.int64) + int(_TURN)
@@ -163,12 +163,12 @@ def _partners(subject: Subject) -> NDArray[np.int64]:
     # Two grids half a step apart, at numbers that no modeller chooses: equal planes share a cell in one.
     for shift in (0.3137, 0.8137):
         step = np.floor(away / (2.0 * tolerance) + shift).astype(np.int64)
-        _match(subject, direction, step, tolerance, partner)
+        _match(context, direction, step, tolerance, partner)
     return partner
 
 
 def _match(
-    subject: Subject,
+    context: CheckContext,
     direction: NDArray[np.int64],
     step: NDArray[np.int64],
     tolerance: float,
@@ -177,7 +177,7 @@ def _match(
     """Find overlaps among triangles of equal direction and step; fills `partner`."""
     from baker.checks.kernels.coplanar import coplanar_partners
 
-    world = subject.world
+    world = context.world
     step = step - step.min()
     key = direction * (int(step.max()) + 1) + step
     order = np.argsort(key, kind="stable")

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found, Place
+from baker.checks.context import CheckContext
+from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.cost import estimate_cost
 from baker.core.precision import coarse_objects
@@ -18,12 +18,14 @@ FLATTEST = 1e-7
 SMALLEST, LARGEST = 0.05, 5000.0
 
 
-def _stretches(subject: Subject) -> Iterator[tuple[Place, np.ndarray, float, tuple[float, float, float]]]:
-    for instance in subject.raw.instances:
+def _stretches(
+    context: CheckContext,
+) -> Iterator[tuple[Place, np.ndarray, float, tuple[float, float, float]]]:
+    for instance in context.raw.instances:
         matrix = instance.world_from_object[:3, :3]
         stretch = np.linalg.svd(matrix, compute_uv=False)
         x, y, z = (float(v) for v in instance.world_from_object[:3, 3])
-        place = Place(instance.name or subject.raw.meshes[instance.mesh].name, instance.node)
+        place = Place(instance.name or context.raw.meshes[instance.mesh].name, instance.node)
         yield place, stretch, float(np.linalg.det(matrix)), (x, y, z)
 
 
@@ -33,14 +35,14 @@ def _stretches(subject: Subject) -> Iterator[tuple[Place, np.ndarray, float, tup
     severity="warning",
     fix="give the node a scale other than zero, or delete it; a bake leaves it out",
 )
-def flat_instance(subject: Subject) -> Iterator[Found]:
+def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes whose scale is zero along an axis.
 
     Nothing of the object is left to light.
     """
-    for place, stretch, _, at in _stretches(subject):
+    for place, stretch, _, at in _stretches(context):
         if not stretch[2] > FLATTEST * stretch[0]:
-            yield Found("the node's scale is zero along an axis", place, position=at)
+            yield RawFinding("the node's scale is zero along an axis", place, position=at)
 
 
 @check(
@@ -49,14 +51,14 @@ def flat_instance(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="apply the scale to the mesh and recalculate its normals, if an engine shows it inside out",
 )
-def negative_scale(subject: Subject) -> Iterator[Found]:
+def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes that mirror their mesh.
 
     glTF turns the winding over then and so does a bake; some engines and exporters do not.
     """
-    for place, stretch, turn, at in _stretches(subject):
+    for place, stretch, turn, at in _stretches(context):
         if turn < 0 and stretch[2] > FLATTEST * stretch[0]:
-            yield Found("the node mirrors its mesh (negative scale)", place, position=at)
+            yield RawFinding("the node mirrors its mesh (negative scale)", place, position=at)
 
 
 @check(
@@ -65,15 +67,15 @@ def negative_scale(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="apply the scale to the mesh, so that texels stay square in engines that share its lightmap UVs",
 )
-def non_uniform_scale(subject: Subject) -> Iterator[Found]:
+def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes that stretch their mesh by more than 1 % more along one axis than along another.
 
     Lightmap UVs made for the mesh are stretched in the world. A bake measures density in the world.
     """
-    for place, stretch, _, at in _stretches(subject):
+    for place, stretch, _, at in _stretches(context):
         if stretch[2] > FLATTEST * stretch[0] and stretch[0] > 1.01 * stretch[2]:
             ratio = float(stretch[0] / stretch[2])
-            yield Found(
+            yield RawFinding(
                 f"the node stretches its mesh {ratio:.3g} times more along one axis than along another",
                 place,
                 position=at,
@@ -86,23 +88,23 @@ def non_uniform_scale(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="keep vertices near their own origin and far-apart places in scenes of their own",
 )
-def coarse_positions(subject: Subject) -> Iterator[Found]:
+def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose positions have steps of more than a tenth of a texel in single precision.
 
     Files store vertices in single precision: 100 km from the mesh's own origin its steps are 8 mm. A node's
     translation is exact, so a level far from the world's origin is no problem if its nodes take it there.
     """
-    scene, world = subject.scene, subject.world
+    scene, world = context.scene, context.world
     area = float(world.area.sum())
     if not area > 0:
         return
-    texels = estimate_cost(subject).texels
+    texels = estimate_cost(context).texels
     found = coarse_objects(scene, np.full(len(scene.instances), np.sqrt(area / max(texels, 1))))
     if found is not None:
         worst = scene.instances[found.worst]
         x, y, z = (float(v) for v in worst.world_from_object[:3, 3])
         text = f"{found.text}; {found.fix}"
-        yield Found(text, Place(worst.name, worst.node), count=found.count, position=(x, y, z))
+        yield RawFinding(text, Place(worst.name, worst.node), count=found.count, position=(x, y, z))
 
 
 @check(
@@ -111,12 +113,14 @@ def coarse_positions(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="export in metres (--scale for OBJ, PLY, STL and OFF)",
 )
-def scene_size(subject: Subject) -> Iterator[Found]:
+def scene_size(context: CheckContext) -> Iterator[RawFinding]:
     """A scene whose size suggests a wrong unit: a diagonal under 5 cm or over 5 km.
 
     Intensities in candela fall off with metres, AO reaches metres, --density counts texels per metre.
     """
-    diagonal = subject.diagonal
+    diagonal = context.diagonal
     if diagonal > 0 and not SMALLEST <= diagonal <= LARGEST:
         how = "small" if diagonal < SMALLEST else "large"
-        yield Found(f"the scene is {diagonal:.3g} m from corner to corner: very {how}, likely a wrong unit")
+        yield RawFinding(
+            f"the scene is {diagonal:.3g} m from corner to corner: very {how}, likely a wrong unit"
+        )

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import MOST_FACES, Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import MOST_FACES, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.checks.uv_facts import UvFacts
@@ -23,10 +23,10 @@ MOST_LOST = 0.01
 _UNWRAP = "unwrap the object anew (`--fix` does, a bake with --uv auto does so, too)"
 
 
-def laid_out(subject: Subject, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
+def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
     """Yield the meshes that have a lightmap uv; with `valid` only finite ones inside the page."""
-    for m in range(len(subject.meshes)):
-        uv = subject.uv(m)
+    for m in range(len(context.meshes)):
+        uv = context.uv(m)
         if len(uv.rows) and (uv.valid or not valid):
             yield m, uv
 
@@ -42,46 +42,46 @@ def worst_first(faces: NDArray[np.int64], badness: NDArray[np.float64]) -> NDArr
     severity="info",
     fix="nothing to do for a bake, which unwraps it; unwrap it yourself to keep control",
 )
-def missing(subject: Subject) -> Iterator[Found]:
+def missing(context: CheckContext) -> Iterator[RawFinding]:
     """Objects without a lightmap uv (TEXCOORD_1).
 
     A bake unwraps them. With `--uv keep` that is an error.
     """
-    severity = "error" if subject.settings.uv == "keep" else None
-    for m, facts in enumerate(subject.meshes):
-        lacking = len(facts.good) - len(subject.uv(m).rows)
+    severity = "error" if context.settings.uv == "keep" else None
+    for m, facts in enumerate(context.meshes):
+        lacking = len(facts.good) - len(context.uv(m).rows)
         if lacking:
             some = "it has" if lacking == len(facts.good) else f"{lacking} faces have"
             percent = 100.0 * lacking / len(facts.good)
-            place = subject.place(m)
-            yield Found(f"{some} no TEXCOORD_1", place, lacking, percent=percent, severity=severity)
+            place = context.place(m)
+            yield RawFinding(f"{some} no TEXCOORD_1", place, lacking, percent=percent, severity=severity)
 
 
 @check("uv.not_finite", group="uv", severity="error", fix=_UNWRAP)
-def not_finite(subject: Subject) -> Iterator[Found]:
+def not_finite(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv that is NaN or infinite somewhere."""
-    for m, uv in laid_out(subject, valid=False):
+    for m, uv in laid_out(context, valid=False):
         bad = uv.faces[~uv.finite]
         if len(bad):
-            yield faces_found(subject, m, bad, "{some} with a TEXCOORD_1 that is not finite")
+            yield faces_found(context, m, bad, "{some} with a TEXCOORD_1 that is not finite")
 
 
 @check("uv.out_of_range", group="uv", severity="error", fix=_UNWRAP)
-def out_of_range(subject: Subject) -> Iterator[Found]:
+def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv that reaches out of 0..1.
 
     A lightmap does not repeat: what lies outside has no texels.
     """
-    for m, uv in laid_out(subject, valid=False):
+    for m, uv in laid_out(context, valid=False):
         bad = uv.finite & uv.outside
         if bad.any():
             low, high = float(uv.uv[uv.finite].min()), float(uv.uv[uv.finite].max())
             text = f"{{some}} with a TEXCOORD_1 outside 0 to 1 (it reaches from {low:.4g} to {high:.4g})"
-            yield faces_found(subject, m, uv.faces[bad], text)
+            yield faces_found(context, m, uv.faces[bad], text)
 
 
 @check("uv.overlap", group="uv", severity="error", fix=_UNWRAP)
-def overlap(subject: Subject) -> Iterator[Found]:
+def overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one object that share texels.
 
     Both would show the light of one of them. Given in percent of the texels at the asked resolution, with
@@ -89,9 +89,9 @@ def overlap(subject: Subject) -> Iterator[Found]:
     """
     from baker.checks.kernels.uv_pairs import cover_pairs
 
-    resolution = subject.settings.resolution
+    resolution = context.settings.resolution
     side = min(2 * resolution, 8192)
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         owner = np.zeros((side, side), np.int32)
         pairs, counts = np.zeros((MOST_FACES, 2), np.int64), np.zeros(4, np.int64)
         cover_pairs(np.ascontiguousarray(uv.uv) * side, EDGE_SLACK, owner, pairs, counts)
@@ -100,41 +100,41 @@ def overlap(subject: Subject) -> Iterator[Found]:
             percent = 100.0 * doubled / (covered + doubled)
             noted = uv.faces[pairs[: counts[3]]]
             text = f"{percent:.3g}% of its texels at {resolution} belong to more than one face"
-            found = faces_found(subject, m, noted[:, 1], text)
+            found = faces_found(context, m, noted[:, 1], text)
             both = tuple((int(a), int(b)) for a, b in uv.facts.local[noted])
             yield replace(found, count=int(counts[2]), percent=percent, pairs=both)
 
 
 @check("uv.degenerate", group="uv", severity="warning", fix=_UNWRAP)
-def degenerate(subject: Subject) -> Iterator[Found]:
+def degenerate(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area in the lightmap uv.
 
     They own no texel. An error if they make up over 1 % of the object's surface, or if the whole layout is
     smaller than one texel.
     """
-    resolution = subject.settings.resolution
-    for m, uv in laid_out(subject):
+    resolution = context.settings.resolution
+    for m, uv in laid_out(context):
         flat = np.abs(uv.signed_area) == 0
         lost = float(uv.area[flat].sum()) / max(float(uv.area.sum()), 1e-300)
         if not float(np.abs(uv.signed_area).sum()) * resolution**2 > 1.0:
             text = f"the whole TEXCOORD_1 covers less than one texel of a page of {resolution}"
-            yield replace(faces_found(subject, m, uv.faces, text), severity="error")
+            yield replace(faces_found(context, m, uv.faces, text), severity="error")
         elif flat.any():
             text = f"{{some}} without area in TEXCOORD_1, {100 * lost:.3g}% of the surface"
-            found = faces_found(subject, m, worst_first(uv.faces[flat], uv.area[flat]), text)
+            found = faces_found(context, m, worst_first(uv.faces[flat], uv.area[flat]), text)
             yield replace(found, percent=100.0 * lost, severity="error" if lost > MOST_LOST else None)
 
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
-def flipped(subject: Subject) -> Iterator[Found]:
+def flipped(context: CheckContext) -> Iterator[RawFinding]:
     """Faces turned over against the rest of their chart: the layout is folded there."""
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))
         bad = uv.faces[sign * major[uv.chart] < 0]
         if len(bad):
             text = "{some} turned over against the rest of their chart in TEXCOORD_1"
-            yield faces_found(subject, m, bad, text)
+            yield faces_found(context, m, bad, text)
 
 
 @check(
@@ -143,12 +143,12 @@ def flipped(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="mirror these charts if an engine uses tangents of the lightmap uv",
 )
-def mirrored(subject: Subject) -> Iterator[Found]:
+def mirrored(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that are laid out as in a mirror while others are not.
 
     Irradiance does not mind; directional lightmaps in tangent space do.
     """
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         area = uv.per_chart(uv.signed_area)
         # v runs downwards: a chart that is not mirrored turns clockwise in uv, or all exporters' way round.
         usual = np.sign(area.sum()) or 1.0
@@ -156,4 +156,4 @@ def mirrored(subject: Subject) -> Iterator[Found]:
         if len(odd):
             faces = uv.faces[np.isin(uv.chart, odd)]
             some = "1 chart" if len(odd) == 1 else f"{len(odd)} charts"
-            yield replace(faces_found(subject, m, faces, f"{some} of TEXCOORD_1 mirrored"), count=len(odd))
+            yield replace(faces_found(context, m, faces, f"{some} of TEXCOORD_1 mirrored"), count=len(odd))

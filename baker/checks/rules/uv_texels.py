@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.checks.rules.uv_layout import laid_out
@@ -33,19 +33,19 @@ PALETTE_SHARE = 0.9
     severity="warning",
     fix="give these charts more room, join them with neighbours, or raise --resolution",
 )
-def tiny_chart(subject: Subject) -> Iterator[Found]:
+def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that cover less than four texels.
 
     Their light is one value, mixed with the neighbours' by every filter.
     """
-    resolution = subject.settings.resolution
-    for m, uv in laid_out(subject):
+    resolution = context.settings.resolution
+    for m, uv in laid_out(context):
         texels = uv.per_chart(np.abs(uv.signed_area)) * resolution**2
         small = np.flatnonzero((texels < SMALLEST_CHART) & (texels > 0))
         if len(small):
             faces = uv.faces[np.isin(uv.chart, small)]
             some = "1 chart covers" if len(small) == 1 else f"{len(small)} of {uv.n_charts} charts cover"
-            found = faces_found(subject, m, faces, f"{some} less than four texels at {resolution}")
+            found = faces_found(context, m, faces, f"{some} less than four texels at {resolution}")
             yield replace(found, count=len(small), percent=100.0 * len(small) / uv.n_charts)
 
 
@@ -55,19 +55,19 @@ def tiny_chart(subject: Subject) -> Iterator[Found]:
     severity="warning",
     fix="leave at least two texels between charts at the resolution used, or unwrap anew",
 )
-def padding(subject: Subject) -> Iterator[Found]:
+def padding(context: CheckContext) -> Iterator[RawFinding]:
     """Charts so close that bilinear lookup mixes them.
 
     A lookup at a chart's border reads the next texel, too. If that belongs to another chart, its light
     bleeds in as a bright or dark line.
     """
-    for m, uv in laid_out(subject):
-        close, covered = _close(uv, subject.settings.resolution)
+    for m, uv in laid_out(context):
+        close, covered = _close(uv, context.settings.resolution)
         if close:
             percent = 100.0 * close / covered
-            yield Found(
+            yield RawFinding(
                 f"{percent:.3g}% of its texels touch another chart's: bilinear lookup mixes them",
-                subject.place(m),
+                context.place(m),
                 close,
                 percent=percent,
             )
@@ -79,21 +79,21 @@ def padding(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="use 2^level texels and more between charts, or sample the lightmap without mipmaps",
 )
-def padding_mip(subject: Subject) -> Iterator[Found]:
+def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that mix at the asked mip level (`--mip`, default 2).
 
     At level n a texel stands for 2^n of the page. Only lightmaps that are sampled with mipmaps mind.
     """
-    coarse = subject.settings.resolution >> subject.mip
-    for m, uv in laid_out(subject):
-        if coarse < 1 or uv.n_charts < 2 or _close(uv, subject.settings.resolution)[0]:
+    coarse = context.settings.resolution >> context.mip
+    for m, uv in laid_out(context):
+        if coarse < 1 or uv.n_charts < 2 or _close(uv, context.settings.resolution)[0]:
             continue
         close, covered = _close(uv, coarse)
         if close:
             percent = 100.0 * close / covered
-            yield Found(
-                f"{percent:.3g}% of its texels at mip level {subject.mip} touch another chart's",
-                subject.place(m),
+            yield RawFinding(
+                f"{percent:.3g}% of its texels at mip level {context.mip} touch another chart's",
+                context.place(m),
                 close,
                 percent=percent,
             )
@@ -114,12 +114,12 @@ def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
     severity="warning",
     fix="scale these charts to the size of the others",
 )
-def density(subject: Subject) -> Iterator[Found]:
+def density(context: CheckContext) -> Iterator[RawFinding]:
     """Charts with over four times more or fewer texels per metre than the middle of the object's surface.
 
     Where they meet others a shadow changes from sharp to blurred.
     """
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         flat, real = uv.per_chart(np.abs(uv.signed_area)), uv.per_chart(uv.area)
         usable = (flat > 0) & (real > 0)
         if usable.sum() < 2:
@@ -134,7 +134,7 @@ def density(subject: Subject) -> Iterator[Found]:
             faces = uv.faces[np.isin(uv.chart, odd)]
             some = "1 chart has" if len(odd) == 1 else f"{len(odd)} of {uv.n_charts} charts have"
             found = faces_found(
-                subject, m, faces, f"{some} up to {worst:.3g} times the usual texels per metre"
+                context, m, faces, f"{some} up to {worst:.3g} times the usual texels per metre"
             )
             yield replace(found, count=len(odd), percent=100.0 * float(real[odd].sum() / real.sum()))
 
@@ -151,20 +151,20 @@ def _weighted_median(value: NDArray[np.float64], weight: NDArray[np.float64]) ->
     severity="warning",
     fix="cut these charts more often, or unwrap anew",
 )
-def stretch(subject: Subject) -> Iterator[Found]:
+def stretch(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv that stretches over 5 % of the surface more than four times more along one axis.
 
     Texels are strips there: shadows look sharp across and blurred along them. The figure is the ratio of the
     singular values of the map from surface to uv.
     """
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         ratio = _anisotropy(uv)
         bad = ratio > STRETCH
         share = float(uv.area[bad].sum()) / max(float(uv.area.sum()), 1e-300)
         if share > MOST_STRETCHED:
             order = np.argsort(-uv.area[bad], kind="stable")
             text = f"{{some}}, {100 * share:.3g}% of the surface, stretched over {STRETCH:g} times one way"
-            yield replace(faces_found(subject, m, uv.faces[bad][order], text), percent=100.0 * share)
+            yield replace(faces_found(context, m, uv.faces[bad][order], text), percent=100.0 * share)
 
 
 def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
@@ -192,19 +192,19 @@ def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
     severity="info",
     fix="pack the charts closer, or unwrap anew",
 )
-def utilisation(subject: Subject) -> Iterator[Found]:
+def utilisation(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv that fills less than 40 % of its own rectangle.
 
     The rest of the rectangle is memory without light in it.
     """
-    for m, uv in laid_out(subject):
+    for m, uv in laid_out(context):
         low, high = uv.uv.min(axis=(0, 1)), uv.uv.max(axis=(0, 1))
         rectangle = float(np.prod(high - low))
         filled = float(np.abs(uv.signed_area).sum())
         if rectangle > 0 and filled < LEAST_FILLED * rectangle:
             percent = 100.0 * filled / rectangle
-            yield Found(
-                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", subject.place(m), percent=percent
+            yield RawFinding(
+                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", context.place(m), percent=percent
             )
 
 
@@ -214,13 +214,13 @@ def utilisation(subject: Subject) -> Iterator[Found]:
     severity="info",
     fix="nothing to do for a bake; never use TEXCOORD_0 as lightmap uv here",
 )
-def palette(subject: Subject) -> Iterator[Found]:
+def palette(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose TEXCOORD_0 only looks colours up in a palette.
 
     Nearly all faces lie in single points of the texture, so the set cannot serve as a lightmap uv, as some
     engines try where TEXCOORD_1 is missing.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         uv = UvFacts(facts, 0)
         if not len(uv.rows) or not uv.finite.all():
             continue
@@ -234,4 +234,4 @@ def palette(subject: Subject) -> Iterator[Found]:
         colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
         if len(uv.rows) >= 2 * colours:
             text = f"its TEXCOORD_0 looks up {colours} colours for {100 * share:.3g}% of the surface"
-            yield Found(text, subject.place(m), int(point.sum()), percent=100.0 * share)
+            yield RawFinding(text, context.place(m), int(point.sum()), percent=100.0 * share)

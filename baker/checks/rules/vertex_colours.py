@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from baker.checks.context import Subject
-from baker.checks.finding import Found
+from baker.checks.context import CheckContext
+from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 
 # Vertex colour below which a surface reflects nothing, and base colour from which that is likely a mistake.
@@ -20,18 +20,18 @@ BLACK, COLOURED = 0.01, 0.05
     severity="warning",
     fix="take COLOR_0 off the mesh, or paint it white where the material is to be seen as it is",
 )
-def black_colours(subject: Subject) -> Iterator[Found]:
+def black_colours(context: CheckContext) -> Iterator[RawFinding]:
     """A mesh whose vertex colours are black all over although its material is not.
 
     glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Exporters write black
     layers that an engine's shader uses for something else (wind, wetness) or that were never painted.
     """
-    for m, facts in enumerate(subject.meshes):
+    for m, facts in enumerate(context.meshes):
         for k, primitive in enumerate(facts.raw.primitives):
             if primitive.colour is None:
                 continue
             faces = facts.good[facts.primitive[facts.good] == k]
-            material = subject.scene.materials[primitive.material]
+            material = context.scene.materials[primitive.material]
             if not len(faces) or max(material.base_colour[:3]) < COLOURED:
                 continue
             used = np.unique(facts.triangle[faces]) - facts.vertex_start[k]
@@ -40,4 +40,4 @@ def black_colours(subject: Subject) -> Iterator[Found]:
                     "the vertex colours (COLOR_0) are black all over and take away the base colour of "
                     f"material '{material.name}'"
                 )
-                yield Found(text, subject.place(m), len(faces), primitive=primitive.index)
+                yield RawFinding(text, context.place(m), len(faces), primitive=primitive.index)

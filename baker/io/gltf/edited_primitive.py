@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
-class MendedPrimitive:
+class EditedPrimitive:
     """New vertices and triangles of one primitive. What is not named here is copied from the old rows.
 
     Attributes
@@ -33,7 +33,7 @@ class MendedPrimitive:
 
 
 @dataclass(frozen=True)
-class RemadePrimitive:
+class ReplacedPrimitive:
     """A primitive whose vertices are all new. It has no other attributes than these.
 
     Attributes

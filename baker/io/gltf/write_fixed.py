@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from baker.core.scene import SourceDocument
 from baker.io.gltf.accessor_bytes import gather_rows
-from baker.io.gltf.edited_primitive import MendedPrimitive, RemadePrimitive
+from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.packer import COMPONENT, Json, Packer, primitive_accessors
 from baker.io.gltf.write_baked import embed_images
 
 
 def write_mended(
-    source: SourceDocument, mended: Mapping[tuple[int, int], MendedPrimitive | RemadePrimitive]
+    source: SourceDocument, mended: Mapping[tuple[int, int], EditedPrimitive | ReplacedPrimitive]
 ) -> bytes:
     """Return the document as GLB.
 
@@ -24,7 +24,7 @@ def write_mended(
     ----------
     source : SourceDocument
         Not changed.
-    mended : mapping of (mesh, primitive) to MendedPrimitive or RemadePrimitive
+    mended : mapping of (mesh, primitive) to EditedPrimitive or ReplacedPrimitive
         The primitives that are made anew, by their places in the file.
 
     Raises
@@ -45,7 +45,7 @@ def write_mended(
     packer.chunks = source.chunks
     for (mesh, number), new in mended.items():
         primitive = document["meshes"][mesh]["primitives"][number]
-        if isinstance(new, RemadePrimitive):
+        if isinstance(new, ReplacedPrimitive):
             _remake(packer, primitive, new)
         else:
             _rewrite(packer, source, source.json["meshes"][mesh]["primitives"][number], primitive, new)
@@ -58,7 +58,7 @@ def write_mended(
 
 
 def _rewrite(
-    packer: Packer, source: SourceDocument, old: Json, primitive: Json, new: MendedPrimitive
+    packer: Packer, source: SourceDocument, old: Json, primitive: Json, new: EditedPrimitive
 ) -> None:
     """Write the vertices of one primitive."""
     own: dict[str, NDArray[np.float32]] = {}
@@ -83,7 +83,7 @@ def _rewrite(
     primitive["attributes"] = attributes
 
 
-def _remake(packer: Packer, primitive: Json, new: RemadePrimitive) -> None:
+def _remake(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
     """Write the vertices of one primitive, none of which is an old one."""
     attributes = {"POSITION": packer.add_floats(new.position, bounds=True)}
     if new.normal is not None:

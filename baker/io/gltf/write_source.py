@@ -10,19 +10,19 @@ import numpy as np
 
 from baker.core.errors import InputError
 from baker.core.scene import Scene
-from baker.core.source_mesh import PrimitiveArrays, RawScene
+from baker.core.source_mesh import PrimitiveArrays, SourceScene
 from baker.io.gltf.build_document import material_json
 from baker.io.gltf.packer import Json, Packer
 
 
-def raw_glb(scene: Scene, raw: RawScene) -> bytes:
+def raw_glb(scene: Scene, raw: SourceScene) -> bytes:
     """Return a GLB of every mesh with triangles, without lightmap uv.
 
     Parameters
     ----------
     scene : Scene
         Its materials are used.
-    raw : RawScene
+    raw : SourceScene
 
     Raises
     ------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
-from baker.core.source_mesh import RawInstance, RawMesh, RawScene
+from baker.core.source_mesh import RawInstance, RawMesh, SourceScene
 from baker.io.gltf.camera import read_cameras
 from baker.io.gltf.document import GltfDocument, open_document
 from baker.io.gltf.instancing import refuse_broken, spread_instances
@@ -142,7 +142,7 @@ def _instances(
     warnings: list[SceneWarning],
     *,
     lenient: bool,
-) -> tuple[list[Mesh], list[Instance], RawScene | None]:
+) -> tuple[list[Mesh], list[Instance], SourceScene | None]:
     """Return the meshes that are used, each once, and where they stand."""
     sources = document.root.children("meshes")
     poser = Poser(document)
@@ -182,7 +182,7 @@ def _instances(
         shown.append(RawInstance(node.index, label, made.number, node.matrix))
         if made.mesh is not None and _stands(node, made.extent, label, warnings):
             instances.append(Instance(node.index, label, made.mesh, node.matrix))
-    kept = RawScene(tuple(made.raw for made in built.values()), tuple(shown)) if lenient else None
+    kept = SourceScene(tuple(made.raw for made in built.values()), tuple(shown)) if lenient else None
     return *_drop_unused(meshes, instances), kept
 
 

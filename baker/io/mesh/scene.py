@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, RawScene
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
 from baker.io.load import SceneFile
 from baker.io.mesh.build import build_mesh
 
@@ -76,7 +76,7 @@ def scene_of_meshes(
     )
 
 
-def _raw(groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]]) -> RawScene:
+def _raw(groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]]) -> SourceScene:
     meshes = tuple(RawMesh(name, tuple(primitives)) for name, primitives in groups)
     stand = tuple(RawInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
-    return RawScene(meshes, stand)
+    return SourceScene(meshes, stand)

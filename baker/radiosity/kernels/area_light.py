@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from baker.kernels.alpha import presence_at
+from baker.kernels.alpha import opacity_at
 from baker.kernels.emitters import (
     NORMAL,
     RADIANCE,
@@ -30,7 +30,7 @@ from baker.kernels.sampling import texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
 from baker.kernels.transmittance import count_coloured, light_kept, trace_shadow_lanes
 from baker.kernels.triangle_lookup import front_facing
-from baker.radiosity.kernels.polygon_light import clear_light
+from baker.radiosity.kernels.polygon_light import unoccluded_irradiance
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, TFAR
 
@@ -193,7 +193,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                 part[k, j] = _f(0.0)
         looked = blocked = 0
         if plain:
-            clear_light(origin, normal, group, lanes, row, found)
+            unoccluded_irradiance(origin, normal, group, lanes, row, found)
             lit = False
             for j in range(3 * LANES):
                 lit = lit or found[j] != _f(0.0)
@@ -228,7 +228,7 @@ def light_samples(origin, normal, lamps, shading, caster, begin, net, shared, he
                         for lane in range(lanes if any_alpha else 0):
                             m = chosen[lane]
                             b1, b2 = on_triangle(row, m, uv[lane], uv[LANES + lane])
-                            there = _f(presence_at(shading, triangle[m], b1, b2))
+                            there = _f(opacity_at(shading, triangle[m], b1, b2))
                             weight[lane] *= there
                             weight[LANES + lane] *= there
                     if asked == 0:

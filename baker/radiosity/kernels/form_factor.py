@@ -162,7 +162,7 @@ def transpose(first, column, value, at, out_column, out_value):
 
 
 @kernel
-def weigh_reciprocal(
+def merge_reciprocal_estimates(
     first, column, value, other_first, other_column, other_value, area, out_first, out_column, out_value
 ):
     """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
@@ -201,7 +201,7 @@ def weigh_reciprocal(
 
 
 @kernel
-def scale_symmetric(first, column, value, goal, slack, factor, steps):
+def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
     """Turn F_ij into d_i F_ij d_j, with factors d (P,) that make row sums `goal`; A_i F_ij stays symmetric.
 
     `slack` (P,) is how uncertain a goal is: d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without it a

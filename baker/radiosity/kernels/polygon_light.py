@@ -58,7 +58,7 @@ def angle_over_sine(x, sine):
 
 
 @inner
-def clear_light(origin, normal, group, lanes, row, found):
+def unoccluded_irradiance(origin, normal, group, lanes, row, found):
     """Write the irradiance of sixteen texels from all emitters, as if nothing stood in between.
 
     origin, normal : (m, 16, 3) float32, texels group to group + lanes are lit

@@ -20,12 +20,12 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
-from baker.kernels.alpha import SURFACE, AlphaTable, presence
+from baker.kernels.alpha import SURFACE, AlphaTable, opacity
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TintTable, no_tint, tint_at
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, no_tint, tint_at
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
-from baker.trace.embree import SeeThrough
+from baker.trace.embree import HitFilter
 from baker.trace.jit import inner, larger, scratch
 from baker.trace.packets import (
     CONTEXT_WORDS,
@@ -50,7 +50,7 @@ _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
-def filter_of(alpha: AlphaTable, tint: TintTable | None, pack: TexturePack) -> SeeThrough:
+def filter_of(alpha: AlphaTable, tint: TransmittanceTable | None, pack: TexturePack) -> HitFilter:
     """Return what the ray tree has to know of the triangles that let light through."""
     tint = no_tint() if tint is None else tint
     arrays = (
@@ -58,7 +58,7 @@ def filter_of(alpha: AlphaTable, tint: TintTable | None, pack: TexturePack) -> S
         *(tint.slot, tint.row),
     )
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
-    return SeeThrough(alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data))
+    return HitFilter(alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data))
 
 
 @inner
@@ -114,7 +114,7 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
         prim = hit_words[_PRIM * n + lane]
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
-        share = presence(row, k, pack.pixels, pack.level, pack.wrap, b1, b2)
+        share = opacity(row, k, pack.pixels, pack.level, pack.wrap, b1, b2)
         if share >= 1.0:
             continue
         if share <= 0.0:

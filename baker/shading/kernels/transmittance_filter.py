@@ -13,9 +13,9 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
 from baker.kernels.alpha import SURFACE
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TintTable, tint_at
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, tint_at
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
-from baker.trace.embree import SeeThrough
+from baker.trace.embree import HitFilter
 from baker.trace.jit import scratch
 from baker.trace.packets import (
     CONTEXT_WORDS,
@@ -36,12 +36,12 @@ _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
-def filter_of(tint: TintTable, pack: TexturePack) -> SeeThrough:
+def filter_of(tint: TransmittanceTable, pack: TexturePack) -> HitFilter:
     """Return what the ray tree has to know of the triangles that let a share of light through."""
     arrays = (tint.slot, tint.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
     address = _multiply_colour.address or 0
-    return SeeThrough(tint.slot >= 0, address, data.ctypes.data, (arrays, data), tint.coloured)
+    return HitFilter(tint.slot >= 0, address, data.ctypes.data, (arrays, data), tint.coloured)
 
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ import pytest
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 from PIL import Image
 
-from baker.checks.context import Subject
+from baker.checks.context import CheckContext
 from baker.checks.rules.light_sources import emissive_black, no_light
 from baker.core.settings import BakeSettings
 from baker.io.load import load_scene
@@ -17,7 +17,7 @@ from baker.io.load import load_scene
 UV = QUAD[:, :2].copy()
 
 
-def subject(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
+def context(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
     """A lit texel of 64 x 64 on a unit square, and a floor one metre in front of it."""
     image = np.zeros((64, 64, 3), np.uint8)
     image[texel] = 255
@@ -35,19 +35,19 @@ def subject(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
             position, triangle, NORMAL=np.float32(normal), TEXCOORD_0=np.float32(uv), material=material
         )
         builder.node(mesh=builder.mesh(made), scale=list(scale))
-    return Subject(load_scene(write(tmp_path / "a.glb", builder)), BakeSettings())
+    return CheckContext(load_scene(write(tmp_path / "a.glb", builder)), BakeSettings())
 
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("repeats", [1, 7])
 def test_the_mean_is_that_of_the_texture(tmp_path, repeats, scale):
-    found = subject(tmp_path, UV * repeats, scale=scale).emission
+    found = context(tmp_path, UV * repeats, scale=scale).emission
     power = (found.area[:, None] * found.radiance).sum(axis=0)
     np.testing.assert_allclose(power, np.array([1, 1, 0.5]) / 4096, rtol=1e-6)
 
 
 def test_light_levels_are_those_of_the_lit_texel(tmp_path):
-    one = subject(tmp_path, UV)
+    one = context(tmp_path, UV)
     levels = one.levels
     low = QUAD.min(axis=0)
     spot = low[:2] + np.array([40.5, 10.5]) / 64 * np.ptp(QUAD, axis=0)[:2]
@@ -57,12 +57,12 @@ def test_light_levels_are_those_of_the_lit_texel(tmp_path):
 
 
 def test_surfaces_in_the_black_part_of_a_texture_emit_nothing(tmp_path):
-    dark = subject(tmp_path, UV * 0.1 + 0.8)
+    dark = context(tmp_path, UV * 0.1 + 0.8)
     assert not dark.glows
     assert len(list(no_light(dark))) == 1
     (told,) = emissive_black(dark)
     assert "where its emissive texture is black" in told.message
-    lit = subject(tmp_path, UV)
+    lit = context(tmp_path, UV)
     assert lit.glows
     assert not list(no_light(lit))
     assert not list(emissive_black(lit))

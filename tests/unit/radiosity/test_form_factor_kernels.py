@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from baker.radiosity.form_factors import count_targets
-from baker.radiosity.kernels.form_factor import multiply, scale_symmetric, weigh_reciprocal
+from baker.radiosity.kernels.form_factor import merge_reciprocal_estimates, multiply, sinkhorn_balance
 
 
 def random_rows(n, rng, density=0.2):
@@ -59,7 +59,7 @@ def test_the_better_estimate_counts_more(n):
     area = rng.uniform(0.1, 10, n)
     first = np.full(n + 1, -1, np.int64)
     column, value = np.zeros(2 * rows.nnz, np.int32), np.zeros(2 * rows.nnz, np.float32)
-    weigh_reciprocal(*parts(rows), *parts(other), area, first, column, value)
+    merge_reciprocal_estimates(*parts(rows), *parts(other), area, first, column, value)
     # A_i F_ij weighed A_j : A_i against A_j F_ji.
     a, b = area[:, None], area[None, :]
     truth = (b * a * dense + a * b * dense.T) / ((a + b) * a) if n else dense
@@ -83,7 +83,7 @@ def test_rows_are_balanced_and_stay_reciprocal():
     rows = csr_matrix(dense)
     factor = np.ones(n)
     first, column, value = parts(rows)
-    error = scale_symmetric(first, column, value, goal, np.zeros(n), factor, 100)
+    error = sinkhorn_balance(first, column, value, goal, np.zeros(n), factor, 100)
     assert error == pytest.approx(np.abs(dense.sum(axis=1, dtype=float) - goal).max(), rel=1e-6)
     balanced = factor[:, None] * dense * factor
     scaled = csr_matrix((value, column, first), shape=(n, n))
@@ -95,10 +95,10 @@ def test_rows_are_balanced_and_stay_reciprocal():
     np.testing.assert_allclose(flux, flux.T, rtol=1e-5)
     # Rows that are right already stay as they are.
     again = np.ones(n)
-    scale_symmetric(*parts(rows), dense.sum(axis=1, dtype=float), np.zeros(n), again, 5)
+    sinkhorn_balance(*parts(rows), dense.sum(axis=1, dtype=float), np.zeros(n), again, 5)
     # Slack is taken from what is missing, row by row.
     slack, factor = rng.uniform(0, 0.2, n), np.ones(n)
-    scale_symmetric(*parts(rows), goal, slack, factor, 200)
+    sinkhorn_balance(*parts(rows), goal, slack, factor, 200)
     reached = (factor[:, None] * dense * factor).sum(axis=1)
     np.testing.assert_allclose(reached[keep], (goal + slack * (1 - factor))[keep], rtol=1e-6)
     np.testing.assert_allclose(again, 1, atol=1e-6)

@@ -7,10 +7,10 @@ import pytest
 from inner import compiled
 
 from baker.kernels.emitters import AREA, NORMAL, RADIANCE, ROW_LENGTH, TWO_SIDED
-from baker.radiosity.kernels.polygon_light import angle_over_sine, clear_light
+from baker.radiosity.kernels.polygon_light import angle_over_sine, unoccluded_irradiance
 from baker.trace.packets import LANES
 
-angle_over_sine, clear_light = compiled(angle_over_sine, clear_light)
+angle_over_sine, unoccluded_irradiance = compiled(angle_over_sine, unoccluded_irradiance)
 
 
 def emitter(corners, radiance=(1.0, 1.0, 1.0), two_sided=False):
@@ -27,7 +27,7 @@ def emitter(corners, radiance=(1.0, 1.0, 1.0), two_sided=False):
 
 def clear(origin, normal, rows, lanes=LANES):
     found = np.full(3 * LANES, np.nan, np.float32)
-    clear_light(np.float32(origin), np.float32(normal), 0, lanes, np.stack(rows), found)
+    unoccluded_irradiance(np.float32(origin), np.float32(normal), 0, lanes, np.stack(rows), found)
     return found.reshape(3, LANES).T[:lanes]
 
 

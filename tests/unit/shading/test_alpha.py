@@ -13,13 +13,13 @@ from tiny_scenes import Quad, grey, quad_scene
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.scene import Texture
-from baker.kernels.alpha import CUTOFF, presence_at
+from baker.kernels.alpha import CUTOFF, opacity_at
 from baker.kernels.textures import pack_textures, sample_alpha, sample_texture
-from baker.shading.alpha import see_through
+from baker.shading.alpha import hit_filter
 from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
 
-presence_at, sample_alpha, sample_texture = compiled(presence_at, sample_alpha, sample_texture)
+opacity_at, sample_alpha, sample_texture = compiled(opacity_at, sample_alpha, sample_texture)
 
 
 def shaded(quads):
@@ -49,8 +49,8 @@ def sheet(mode, alpha, z=0.0, image=None, **changes):
 
 def tree(quads):
     geometry, shading = shaded(quads)
-    see = see_through(shading)
-    return RayScene(geometry.position, geometry.triangle, threads=1, see_through=see), shading
+    see = hit_filter(shading)
+    return RayScene(geometry.position, geometry.triangle, threads=1, hit_filter=see), shading
 
 
 def downward(n, seed=0, height=5.0):
@@ -91,7 +91,7 @@ def test_only_triangles_that_let_light_through_are_chosen():
     assert shading.alpha.row[:, CUTOFF].tolist() == [0.5, 0.5, -1, -1, -1, -1]
     _, nothing = shaded(quads[:5])
     assert len(nothing.alpha.slot) == 0
-    assert see_through(nothing) is None
+    assert hit_filter(nothing) is None
 
 
 def test_presence_is_factor_times_texture_times_vertex_colour():
@@ -102,7 +102,7 @@ def test_presence_is_factor_times_texture_times_vertex_colour():
     _, shading = shaded([quad])
     # Triangle 0 has the corners uv (0, 0), (1, 0), (1, 1): b1 = 0.25, b2 = 0.5 is uv (0.75, 0.5).
     vertex = 0.25 * 1 + 0.25 * 0.5 + 0.5 * 0
-    assert presence_at(shading, 0, 0.25, 0.5) == pytest.approx(0.5 * vertex * (0.4 + 0.8) / 2, abs=1e-6)
+    assert opacity_at(shading, 0, 0.25, 0.5) == pytest.approx(0.5 * vertex * (0.4 + 0.8) / 2, abs=1e-6)
 
 
 def test_a_texture_of_one_value_meets_its_cutoff_everywhere():

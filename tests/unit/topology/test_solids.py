@@ -43,7 +43,7 @@ def covers(*objects, **more):
     return [bool(cover.all()) for _, _, _, cover in judge(*objects, **more)]
 
 
-def judge(*objects, places=NOBODY, double_sided=True, glows=(), see_through=()):
+def judge(*objects, places=NOBODY, double_sided=True, glows=(), hit_filter=()):
     """Return (inside, room, sealed, cover) of each object's triangles."""
     count = [len(one) for one in objects]
     corner = np.concatenate(objects).reshape(-1, 3)
@@ -52,7 +52,7 @@ def judge(*objects, places=NOBODY, double_sided=True, glows=(), see_through=()):
         position=corner.astype(np.float32),
         triangle=np.arange(len(corner)).reshape(-1, 3),
         instance=owner,
-        opaque=~np.isin(owner, see_through),
+        opaque=~np.isin(owner, hit_filter),
         double_sided=np.full(len(owner), double_sided),
         glows=np.isin(owner, glows),
     )
@@ -102,7 +102,7 @@ def test_what_encloses_nothing():
     assert kinds(judge(sheets, CRATE)) == [[NOWHERE], [BEHIND]]
     no_lid = np.delete(CRATE, [6, 7], axis=0)
     assert kinds(judge(FLOOR, no_lid)) == [[NOWHERE], [NOWHERE]]
-    assert kinds(judge(FLOOR, CRATE, see_through=[1])) == [[NOWHERE], [NOWHERE]]
+    assert kinds(judge(FLOOR, CRATE, hit_filter=[1])) == [[NOWHERE], [NOWHERE]]
     thin = box((0, 0, 0), (1, 1, 1e-6))
     assert kinds(judge(FLOOR, thin)) == [[NOWHERE], [NOWHERE]]
     assert kinds(judge(FLOOR, box((0, 0, 0), (4, 3, 0.001)))) == [[NOWHERE], [BEHIND]]

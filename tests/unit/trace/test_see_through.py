@@ -8,7 +8,7 @@ import pytest
 from numba import carray, cfunc, types
 from packet_driver import cast
 
-from baker.trace.embree import RayScene, SeeThrough
+from baker.trace.embree import HitFilter, RayScene
 from baker.trace.packets import HIT_U, NG_X, PRIM_ID
 from baker.trace.pointers import pointer
 
@@ -42,7 +42,7 @@ def case():
     truth = np.array([first_that_counts(position, triangle, refused, o, d) for o, d in
                       zip(origin, direction, strict=True)])  # fmt: skip
     table = refused.astype(np.uint8)
-    see = SeeThrough(chosen, refuse.address, table.ctypes.data, table)
+    see = HitFilter(chosen, refuse.address, table.ctypes.data, table)
     return position, triangle, origin, direction, see, truth
 
 
@@ -62,7 +62,7 @@ def first_that_counts(position, triangle, refused, origin, direction):
 @pytest.mark.parametrize("width", [4, 8, 16])
 def test_refused_hits_do_not_count(case, width):
     position, triangle, origin, direction, see, truth = case
-    rays = RayScene(position, triangle, threads=1, see_through=see)
+    rays = RayScene(position, triangle, threads=1, hit_filter=see)
     geom, prim, _, _, reach = cast(rays, origin, direction, width=width)
     hit = truth[:, 1] >= 0
     # A ray past an edge, or past u = 0.3, within rounding may be counted on either side of it.
@@ -85,8 +85,8 @@ def test_refused_hits_do_not_count(case, width):
 def test_all_triangles_or_none_may_be_chosen(case, chosen):
     position, triangle, origin, direction = case[:4]
     nothing = np.zeros(N, np.uint8)
-    all_or_none = SeeThrough(np.full(N, chosen), refuse.address, nothing.ctypes.data, nothing)
-    rays = RayScene(position, triangle, threads=1, see_through=all_or_none)
+    all_or_none = HitFilter(np.full(N, chosen), refuse.address, nothing.ctypes.data, nothing)
+    rays = RayScene(position, triangle, threads=1, hit_filter=all_or_none)
     plain = RayScene(position, triangle, threads=1)
     found, truth = (cast(scene, origin, direction) for scene in (rays, plain))
     hit = truth[0] >= 0
@@ -101,8 +101,8 @@ def test_shared_edges_do_not_leak_between_the_geometries():
     """A sheet of a chosen and a plain half, hit exactly along the edge that they share."""
     position = np.float32([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]])
     nothing = np.zeros(N, np.uint8)
-    see = SeeThrough(np.array([True, False]), refuse.address, nothing.ctypes.data, nothing)
-    rays = RayScene(position, np.int32([[0, 1, 2], [0, 2, 3]]), threads=1, see_through=see)
+    see = HitFilter(np.array([True, False]), refuse.address, nothing.ctypes.data, nothing)
+    rays = RayScene(position, np.int32([[0, 1, 2], [0, 2, 3]]), threads=1, hit_filter=see)
     rng = np.random.default_rng(0)
     share = rng.uniform(0.01, 0.99, (4000, 1))
     target = share * position[2].astype(float)
