@@ -13,9 +13,9 @@ from baker.cli.commands import COMMANDS
 from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
 
 if TYPE_CHECKING:
-    from baker.batch.executor import Bakery
-    from baker.batch.run import Outcome
     from baker.cli.session import Session
+    from baker.jobs.executor import Bakery
+    from baker.jobs.run import Outcome
 
 
 def command() -> Any:
@@ -72,11 +72,11 @@ def work(
     """Bake what changed, show one progress for all, and tell."""
     session: Session = ctx.obj
     as_json = as_json or session.as_json
-    from baker.batch.executor import LocalBakery
-    from baker.batch.jobs_file import read_jobs
-    from baker.batch.memory import parse_size
-    from baker.batch.run import BatchOptions, batch_json, run_batch, write_junit
     from baker.cli.config import resolve
+    from baker.jobs.executor import LocalBakery
+    from baker.jobs.jobs_file import read_jobs
+    from baker.jobs.memory import parse_size
+    from baker.jobs.run import BatchOptions, batch_json, run_batch, write_junit
 
     overrides = given(settings)
     options = BatchOptions(

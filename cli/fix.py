@@ -15,8 +15,8 @@ from baker.core.errors import SettingsError
 if TYPE_CHECKING:
     from baker.core.progress import Progress
     from baker.core.settings import BakeSettings
-    from baker.repair.file import Mended
-    from baker.repair.plan import Change
+    from baker.repairs.file import Mended
+    from baker.repairs.plan import Change
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def asked(
         raise SettingsError(f"{name} writes a new file; name it with -o FIXED.glb", object="out")
     if len(scenes) != 1:
         raise SettingsError(f"{name} takes one scene at a time; {len(scenes)} are named", object="scene")
-    from baker.repair.write import check_fixed
+    from baker.repairs.write import check_fixed
 
     check_fixed(out, scenes[0], force=force)
     return MendRequest(scenes[0], out, repair, force)
@@ -91,8 +91,8 @@ def asked(
 
 def mend(request: MendRequest, settings: BakeSettings, progress: Progress) -> Mended:
     """Mend a scene and write the result."""
-    from baker.repair.file import MendSettings, mend_file
-    from baker.repair.write import write_fixed
+    from baker.repairs.file import MendSettings, mend_file
+    from baker.repairs.write import write_fixed
 
     wanted = MendSettings(
         resolution=settings.resolution,

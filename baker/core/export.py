@@ -1,4 +1,4 @@
-"""What an export is: one file of `baker.export` that makes a finished bake ready for one engine.
+"""What an export is: one file of `baker.exporters` that makes a finished bake ready for one engine.
 
 Callers find an export by its name in `EXPORTS` and never import it, so a new engine is one new file.
 """
@@ -27,7 +27,7 @@ class Export(Protocol):
         """
 
 
-EXPORTS: Registry[Export] = Registry("baker.export")
+EXPORTS: Registry[Export] = Registry("baker.exporters")
 
 
 def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:

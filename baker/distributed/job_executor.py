@@ -6,13 +6,13 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from baker.batch.executor import Event
-from baker.batch.jobs_file import Job
-from baker.batch.worker import describe
 from baker.core.lightmap import BakeResult
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.distributed.connection import Cluster, Waiting, worker_threads
+from baker.jobs.executor import Event
+from baker.jobs.jobs_file import Job
+from baker.jobs.worker import describe
 
 STAGE = "on the cluster"
 

@@ -20,8 +20,8 @@ from baker.core.export import EXPORTS, check_exports
 from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
-from baker.export.common import template, unique_name
-from baker.export.unity import scale_offset
+from baker.exporters.common import template, unique_name
+from baker.exporters.unity import scale_offset
 from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
 

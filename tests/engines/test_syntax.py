@@ -7,7 +7,7 @@ import subprocess
 import pytest
 from browser import need_program
 
-from baker.export.common import template
+from baker.exporters.common import template
 
 pytestmark = pytest.mark.engines
 

@@ -1,0 +1,159 @@
+"""What exports share: the description of a bake, copies of its files, and the README of a folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import struct
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+MANIFEST_NAME = "bake.json"
+SCENE_NAME = "scene.glb"
+DESCRIPTION_NAME = "lightmap.json"
+
+
+def read_manifest(bake: Path) -> dict[str, Any]:
+    """Return the manifest of a bake."""
+    manifest: dict[str, Any] = json.loads((bake / MANIFEST_NAME).read_text("utf-8"))
+    return manifest
+
+
+def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the manifest's entries of the irradiance pages, in order."""
+    pages = [page for page in manifest["pages"] if page["channel"] == "irradiance"]
+    return sorted(pages, key=lambda page: int(page["page"]))
+
+
+def describe(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return what a loader has to know: pages, and where each object lies in them.
+
+    page uv = TEXCOORD_1 * uv_scale + uv_offset, v = 0 is the first image row.
+    """
+    return {
+        "version": 1,
+        "scene": SCENE_NAME,
+        "quantity": "irradiance",
+        "unit": "lx",
+        "pages": [
+            {"file": page["file"], "width": page["width"], "height": page["height"]}
+            for page in irradiance_pages(manifest)
+        ],
+        "objects": [
+            {key: entry[key] for key in ("node", "name", "page", "uv_scale", "uv_offset")}
+            for entry in manifest["instances"]
+        ],
+    }
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text with the same line ends everywhere."""
+    path.write_text(text, "utf-8", newline="\n")
+
+
+def write_json(path: Path, value: dict[str, Any]) -> None:
+    """Write JSON for people and programs."""
+    write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def place(source: Path, target: Path) -> None:
+    """Put a file of the bake at another place too, without a second copy on disk where that is possible."""
+    try:
+        os.link(source, target)
+    except OSError:
+        # Not every file system has hard links.
+        shutil.copy2(source, target)
+
+
+def place_bake(bake: Path, target: Path) -> dict[str, Any]:
+    """Put scene, irradiance pages and their description into `target`; return the description."""
+    description = describe(read_manifest(bake))
+    place(bake / SCENE_NAME, target / SCENE_NAME)
+    for page in description["pages"]:
+        place(bake / page["file"], target / page["file"])
+    write_json(target / DESCRIPTION_NAME, description)
+    return description
+
+
+def template(export: str, name: str) -> str:
+    """Return a file that an export ships."""
+    return resources.files("baker.exporters").joinpath("templates", export, name).read_text("utf-8")
+
+
+def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, steps: tuple[str, ...]) -> None:
+    """Write a folder's README: what to do, and the three things that go wrong elsewhere.
+
+    Parameters
+    ----------
+    target : Path
+    title : str
+    scale, uv, rows : str
+        What the numbers are, which uv set reads them, and in which order the rows lie.
+    steps : tuple of str
+        What to do with the folder, a line each.
+    """
+    lines = [f"# {title}", "", *steps, ""]
+    lines += [f"- Scale: {scale}", f"- UV set: {uv}", f"- Row order: {rows}"]
+    write_text(target / "README.md", "\n".join(lines) + "\n")
+
+
+def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
+    """Write scene.glb with a name of its own for every node, for engines that know nodes by name only.
+
+    The name of node i is the old one, with what engines take out or read as a hint replaced, and `_n<i>` at
+    its end. Its mesh has the same name, and `extras.baker_node` says i.
+
+    Returns
+    -------
+    dict
+        The description of the bake with the new names.
+    """
+    description = describe(read_manifest(bake))
+    document, binary = _read_glb(bake / SCENE_NAME)
+    nodes = document.get("nodes", [])
+    for index, node in enumerate(nodes):
+        node["name"] = unique_name(str(node.get("name", "node")), index)
+        extras = node.setdefault("extras", {})
+        if isinstance(extras, dict):
+            extras["baker_node"] = index
+    for entry in description["objects"]:
+        node = nodes[entry["node"]]
+        entry["name"] = node["name"]
+        if "mesh" in node:
+            document["meshes"][node["mesh"]]["name"] = node["name"]
+    (target / SCENE_NAME).write_bytes(_glb(document, binary))
+    return description
+
+
+def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
+    """Put pages, description and the scene with names of its own into `target`; return the description."""
+    description = place_named_scene(bake, target)
+    for page in description["pages"]:
+        place(bake / page["file"], target / page["file"])
+    write_json(target / DESCRIPTION_NAME, description)
+    return description
+
+
+def unique_name(name: str, node: int) -> str:
+    """Return a name that engines leave as it is and that no other node has."""
+    safe = re.sub(r"[^0-9A-Za-z_]+", "_", name).strip("_") or "node"
+    # Blender cuts names at 63 bytes.
+    return f"{safe[:48]}_n{node}"
+
+
+def _read_glb(path: Path) -> tuple[dict[str, Any], bytes]:
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    document: dict[str, Any] = json.loads(data[20 : 20 + length])
+    return document, data[20 + length :]
+
+
+def _glb(document: dict[str, Any], binary: bytes) -> bytes:
+    """Return a GLB of a document and its binary chunk with the chunk's head."""
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text) + len(binary), len(text), 0x4E4F534A)
+    return head + text + binary

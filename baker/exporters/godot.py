@@ -1,0 +1,68 @@
+"""Godot 4 and 3: pages, scene, a shader, and a script that puts the shader on the objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from baker.core.export import EXPORTS
+from baker.exporters.common import place_named_bake, template, write_readme, write_text
+
+FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
+FILES_3 = ("lightmap.shader", "lightmaps.gd")
+# For both versions: stored as they are, linear, without mip levels that would mix charts, and not compressed
+# as soon as somebody uses them in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
+_IMPORT = """\
+[remap]
+
+importer="texture"
+
+[params]
+
+compress/mode=3
+compress/hdr_mode=0
+compress/hdr_compression=0
+flags/repeat=0
+flags/filter=true
+flags/mipmaps=false
+flags/srgb=0
+process/hdr_as_srgb=false
+process/hdr_clamp_exposure=false
+mipmaps/generate=false
+detect_3d=false
+detect_3d/compress_to=0
+"""
+
+
+class GodotExport:
+    """Files the export `godot`."""
+
+    needs: tuple[str, ...] = ("irradiance",)
+
+    def write(self, bake: Path, target: Path) -> None:
+        """Write the folder."""
+        description = place_named_bake(bake, target)
+        for page in description["pages"]:
+            write_text(target / f"{page['file']}.import", _IMPORT)
+        for name in FILES:
+            write_text(target / name, template("godot", name))
+        (target / "godot3").mkdir()
+        # Version 4 must not look into the files for version 3.
+        write_text(target / "godot3" / ".gdignore", "")
+        for name in FILES_3:
+            write_text(target / "godot3" / name, template("godot", f"godot3/{name}"))
+        write_readme(
+            target,
+            "Lightmaps for Godot",
+            steps=(
+                "Copy the folder into the project. Godot 4: attach lightmaps.gd to the root of the imported",
+                "scene.glb, or set import_scene.gd as its import script (it attaches it). Godot 3 (GLES3;",
+                "GLES2 ends at 1.0): move godot3/* up, delete import_scene.gd, attach lightmaps.gd.",
+                "Exporting a game: add *.json to the filter of non-resource files.",
+            ),
+            scale="EXR holds irradiance E in lx; the shader shows albedo x E / pi x `exposure`.",
+            uv="TEXCOORD_1, which is UV2.",
+            rows="v = 0 is the first row in Godot, too: nothing is turned over.",
+        )
+
+
+EXPORTS.register("godot")(GodotExport())

@@ -1,0 +1,156 @@
+"""Where jobs are baked: worker processes of this machine."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import subprocess
+import threading
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from baker.core.child_process import start_module
+from baker.io.bake.output_folder import remove_leftovers
+from baker.io.temporary import temporaries
+from baker.jobs.jobs_file import Job
+
+
+@dataclass(frozen=True)
+class Event:
+    """News of a job.
+
+    Attributes
+    ----------
+    ticket : int
+        The job's number.
+    stage : str
+    fraction : float
+        How far the stage is.
+    ended : bool
+    error : dict or None
+        {kind, message, file, object, code} if it failed.
+    """
+
+    ticket: int
+    stage: str = ""
+    fraction: float = 0.0
+    ended: bool = False
+    error: dict[str, Any] | None = None
+
+
+class Bakery(Protocol):
+    """Bakes a few jobs at a time."""
+
+    @property
+    def slots(self) -> int:
+        """Count the jobs that may run at a time."""
+
+    def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
+        """Begin a job; no more than `slots` at a time."""
+
+    def next_event(self, timeout: float) -> Event | None:
+        """Wait for news, at most `timeout` seconds."""
+
+    def close(self) -> None:
+        """Stop at once whatever runs; its output folders are as they were."""
+
+
+class LocalBakery:
+    """Bakes in worker processes that stay alive from job to job.
+
+    Parameters
+    ----------
+    slots : int
+        Most processes at a time; each starts with its first job.
+    """
+
+    def __init__(self, slots: int) -> None:
+        self.slots = slots
+        self._heard: queue.SimpleQueue[tuple[_Worker, dict[str, Any]]] = queue.SimpleQueue()
+        self._idle: list[_Worker] = []
+        self._busy: dict[_Worker, tuple[int, Job]] = {}
+
+    def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
+        """Hand a job to a worker that waits, or to a new one."""
+        worker = self._idle.pop() if self._idle else _Worker(self._heard)
+        self._busy[worker] = (ticket, job)
+        worker.begin(job, threads=threads, force=force)
+
+    def next_event(self, timeout: float) -> Event | None:
+        """Wait for news of any worker."""
+        try:
+            worker, message = self._heard.get(timeout=timeout)
+        except queue.Empty:
+            return None
+        if worker not in self._busy:
+            # It died between two jobs.
+            self._idle = [other for other in self._idle if other is not worker]
+            return None
+        ticket, job = self._busy[worker]
+        if "stage" in message:
+            return Event(ticket, message["stage"], message["fraction"])
+        del self._busy[worker]
+        if message.get("dead"):
+            worker.end(job)
+        else:
+            self._idle.append(worker)
+        return Event(ticket, ended=True, error=message.get("error"))
+
+    def close(self) -> None:
+        """Kill what still works and remove what it left half written."""
+        for worker in self._idle:
+            worker.end(None)
+        for worker, (_, job) in self._busy.items():
+            worker.end(job)
+        self._busy.clear()
+        self._idle.clear()
+
+
+class _Worker:
+    """One process, and the thread that listens to it."""
+
+    def __init__(self, heard: queue.SimpleQueue[tuple[_Worker, dict[str, Any]]]) -> None:
+        self.heard = heard
+        self.process: subprocess.Popen[bytes] = start_module("baker.jobs.worker")
+        self.listener = threading.Thread(target=self._listen, daemon=True)
+        self.listener.start()
+
+    def begin(self, job: Job, *, threads: int, force: bool) -> None:
+        settings = job.settings.model_dump(mode="json", exclude_none=True) | {"threads": threads}
+        task = {"scene": os.fspath(job.scene), "out": str(job.out), "settings": settings, "force": force}
+        assert self.process.stdin is not None
+        # If it has died meanwhile, the listening thread tells.
+        with contextlib.suppress(OSError):
+            self.process.stdin.write(json.dumps(task).encode() + b"\n")
+            self.process.stdin.flush()
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.heard.put((self, json.loads(line)))
+        self.heard.put((self, {"dead": True, "error": _death(self.process.wait())}))
+
+    def end(self, job: Job | None) -> None:
+        """Kill the process, and remove what it wrote of `job` that is not whole."""
+        self.process.kill()
+        self.process.wait()
+        self.listener.join()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        if job is not None and job.out is not None:
+            left = [found for found in temporaries(job.out) if found.process == self.process.pid]
+            remove_leftovers(job.out, left)
+
+
+def _death(status: int) -> dict[str, Any]:
+    # SIGKILL by hand or by the kernel; other signals come from native code that crashed.
+    if status == -9:
+        why = "its process was killed from outside, most likely for want of memory"
+    else:
+        why = f"its process died (status {status})"
+    hint = "try a smaller resolution or fewer jobs at a time"
+    return {"kind": "resource", "message": f"{why}; {hint}", "file": None, "object": None, "code": 4}

@@ -1,0 +1,329 @@
+"""Runs many bakes: finds out which are needed, and has them baked within bounds of processes and memory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from baker.core.error_mapping import explain
+from baker.core.errors import BakerError, ResourceError
+from baker.core.parallel import thread_count
+from baker.core.progress import Progress, report
+from baker.io.bake.lock import OutputLock, dead_writers, sweep
+from baker.io.scene_hash import scene_sha256
+from baker.jobs.executor import Bakery, Event
+from baker.jobs.jobs_file import Job
+from baker.jobs.up_to_date import Freshness, check_output
+
+STAGE = "batch"
+# Seconds between two looks at locks held by other runs, and at the wish to stop.
+_LOOK = 0.1
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """How a batch runs.
+
+    Attributes
+    ----------
+    threads : int or None
+        Threads of all bakes together; None is all cores.
+    memory : int or None
+        Bytes that all bakes together may take; None is no limit.
+    force : bool
+        Bake what is unchanged, too, and into folders that baker did not write.
+    fail_fast : bool
+        Start nothing more after a failure.
+    dry_run : bool
+        Only say what would be done.
+    """
+
+    threads: int | None = None
+    memory: int | None = None
+    force: bool = False
+    fail_fast: bool = False
+    dry_run: bool = False
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job.
+
+    Attributes
+    ----------
+    job : Job
+    state : str
+        "baked", "unchanged" or "failed"; after a dry run, what would become of it.
+    why : str
+    seconds : float
+    code : int
+        The exit code that a failure stands for, else 0.
+    """
+
+    job: Job
+    state: str
+    why: str
+    seconds: float = 0.0
+    code: int = 0
+
+
+@dataclass
+class _Ticket:
+    """A job on its way."""
+
+    number: int
+    job: Job
+    sha256: str
+    seen: Freshness
+    peak: int = 0
+    lock: OutputLock | None = None
+    announced: bool = False
+    started: float = 0.0
+    stage: str = "start"
+    fraction: float = 0.0
+
+
+def run_batch(
+    jobs: Sequence[Job],
+    bakery: Bakery,
+    options: BatchOptions,
+    progress: Progress,
+    starting: Callable[[Path], None] = lambda out: None,
+) -> list[Outcome]:
+    """Bake the jobs that need it, in their order, several at a time.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    bakery : Bakery
+        Does the work; closed at the end.
+    options : BatchOptions
+    progress : Progress
+        Told of all jobs as one stage; a truthy answer stops them all.
+    starting : callable
+        Told each output folder before anything is done there.
+
+    Returns
+    -------
+    list of Outcome
+        One for each job, in the order of `jobs`.
+
+    Raises
+    ------
+    Cancelled
+        If `progress` says so. Finished jobs stay whole, the others are as they were.
+    """
+    try:
+        return _Run(jobs, bakery, options, progress, starting).run()
+    finally:
+        bakery.close()
+
+
+@dataclass
+class _Run:
+    jobs: Sequence[Job]
+    bakery: Bakery
+    options: BatchOptions
+    progress: Progress
+    starting: Callable[[Path], None]
+    outcomes: dict[int, Outcome] = field(default_factory=dict)
+    waiting: list[_Ticket] = field(default_factory=list)
+    running: dict[int, _Ticket] = field(default_factory=dict)
+
+    def run(self) -> list[Outcome]:
+        """Look at every job, then bake."""
+        self.look_at_all()
+        if not self.options.dry_run:
+            try:
+                while self.waiting or self.running:
+                    self.start_some()
+                    blocked = not self.running and bool(self.waiting)
+                    event = self.bakery.next_event(_LOOK)
+                    if event is not None:
+                        self.hear(event)
+                    self.tell(blocked=blocked)
+            finally:
+                # Nobody may bake there before what runs has ended and its leavings are gone.
+                self.bakery.close()
+                for ticket in self.running.values():
+                    _release(ticket)
+        return [self.outcomes[number] for number in range(len(self.jobs))]
+
+    def look_at_all(self) -> None:
+        """Sort the jobs into unchanged, failed already, and to be baked."""
+        pool = ThreadPoolExecutor(thread_count(self.options.threads))
+        try:
+            looks = [pool.submit(self.look, number, job) for number, job in enumerate(self.jobs)]
+            for number, look in enumerate(looks):
+                found = look.result()
+                if isinstance(found, Outcome):
+                    self.outcomes[number] = found
+                elif self.options.dry_run:
+                    self.outcomes[number] = Outcome(found.job, "baked", found.seen.why)
+                else:
+                    self.waiting.append(found)
+                report(self.progress, STAGE, 0.0, f"looked at {number + 1} of {len(self.jobs)}")
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def look(self, number: int, job: Job) -> Outcome | _Ticket:
+        """Decide about one job."""
+        start = time.perf_counter()
+        if job.out is None:
+            return Outcome(job, "failed", job.problem, code=3)
+        try:
+            sha256 = scene_sha256(job.scene)
+            seen = check_output(job.out, sha256, job.settings)
+            if self.options.force:
+                seen = replace(seen, fresh=False, why=f"forced ({seen.why})")
+            elif seen.fresh and not dead_writers(job.out):
+                return Outcome(job, "unchanged", seen.why, time.perf_counter() - start)
+            return _Ticket(number, job, sha256, seen, self.peak(job))
+        except (BakerError, OSError, MemoryError) as error:
+            return _failure(job, error, time.perf_counter() - start)
+
+    def peak(self, job: Job) -> int:
+        """Estimate the memory of a job, bytes; 0 where nobody counts."""
+        limit = self.options.memory
+        if limit is None:
+            return 0
+        from baker.jobs.memory import estimate_peak, size_words
+
+        peak = estimate_peak(job.scene, job.settings)
+        if peak > limit:
+            message = f"it needs about {size_words(peak)}, more than --memory {size_words(limit)}"
+            raise ResourceError(f"{message}; allow more, or lower resolution, density or max_pages")
+        return peak
+
+    def start_some(self) -> None:
+        """Start waiting jobs while there are slots and memory; pass over those locked by other runs."""
+        for ticket in list(self.waiting):
+            if len(self.running) >= self.bakery.slots:
+                return
+            used = sum(other.peak for other in self.running.values())
+            if self.options.memory is not None and used + ticket.peak > self.options.memory:
+                continue
+            self.start(ticket)
+
+    def start(self, ticket: _Ticket) -> None:
+        """Start a job if its output folder is free and still needs it."""
+        job = ticket.job
+        assert job.out is not None
+        try:
+            if not ticket.announced:
+                self.starting(job.out)
+                ticket.announced = True
+            lock = OutputLock(job.out)
+            if not lock.acquire():
+                return
+            ticket.lock = lock
+            self.waiting.remove(ticket)
+            sweep(job.out)
+            if not self.options.force:
+                seen = check_output(job.out, ticket.sha256, job.settings)
+                # Another run may have baked it meanwhile.
+                if seen.fresh:
+                    self.finish(ticket, Outcome(job, "unchanged", seen.why))
+                    return
+            # Threads are shared by those that will run at the same time.
+            beside = min(self.bakery.slots, len(self.running) + 1 + len(self.waiting))
+            threads = max(thread_count(self.options.threads) // beside, 1)
+            ticket.started = time.perf_counter()
+            self.running[ticket.number] = ticket
+            own = job.settings.threads
+            self.bakery.start(
+                ticket.number, job, threads=min(threads, own or threads), force=self.options.force
+            )
+        except OSError as error:
+            if ticket in self.waiting:
+                self.waiting.remove(ticket)
+            self.running.pop(ticket.number, None)
+            self.finish(ticket, _failure(job, error, 0.0))
+
+    def hear(self, event: Event) -> None:
+        """Take news of a job."""
+        ticket = self.running[event.ticket]
+        if not event.ended:
+            ticket.stage, ticket.fraction = event.stage, event.fraction
+            return
+        seconds = time.perf_counter() - ticket.started
+        del self.running[event.ticket]
+        if event.error is None:
+            self.finish(ticket, Outcome(ticket.job, "baked", ticket.seen.why, seconds))
+            return
+        error = event.error
+        told = BakerError(error["message"], file=error["file"], object=error["object"])
+        self.finish(ticket, Outcome(ticket.job, "failed", str(told), seconds, error["code"]))
+        if self.options.fail_fast:
+            for other in self.waiting:
+                why = f"not run, since '{ticket.job.scene}' failed (--fail-fast)"
+                self.outcomes[other.number] = Outcome(other.job, "failed", why, 0.0, error["code"])
+            self.waiting.clear()
+
+    def finish(self, ticket: _Ticket, outcome: Outcome) -> None:
+        """Note what became of a job and give its folder back."""
+        self.outcomes[ticket.number] = outcome
+        _release(ticket)
+
+    def tell(self, *, blocked: bool) -> None:
+        """Report all jobs as one stage."""
+        n = len(self.jobs)
+        names = [f"{t.job.scene.stem}: {t.stage} {t.fraction:.0%}" for t in self.running.values()]
+        if blocked:
+            names = ["waiting for another run that bakes the same"]
+        detail = "  ".join([f"{len(self.outcomes)} of {n}", *names])
+        report(self.progress, STAGE, len(self.outcomes) / max(n, 1), detail)
+
+
+def _release(ticket: _Ticket) -> None:
+    if ticket.lock is not None:
+        ticket.lock.release()
+        ticket.lock = None
+
+
+def _failure(job: Job, error: BaseException, seconds: float) -> Outcome:
+    known = explain(error)
+    assert known is not None
+    return Outcome(job, "failed", str(known), seconds, known.exit_code)
+
+
+def batch_json(outcomes: Sequence[Outcome], *, dry_run: bool) -> dict[str, Any]:
+    """Return what `batch --json` prints."""
+    rows = [
+        {
+            "scene": str(outcome.job.scene),
+            "out": None if outcome.job.out is None else str(outcome.job.out),
+            "state": outcome.state,
+            "seconds": round(outcome.seconds, 3),
+            "why": outcome.why,
+        }
+        for outcome in outcomes
+    ]
+    return {"jobs": rows, "dry_run": dry_run}
+
+
+def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
+    """Write one JUnit case for each job.
+
+    Raises
+    ------
+    ResourceError
+        If the file cannot be written.
+    """
+    from baker.io.junit import Case, junit_text, write_text
+
+    cases = [
+        Case(
+            str(outcome.job.scene),
+            str(outcome.job.out or "batch"),
+            outcome.why if outcome.state == "failed" else "",
+            outcome.seconds,
+            error=outcome.code == ResourceError.exit_code,
+        )
+        for outcome in outcomes
+    ]
+    write_text(path, junit_text("baker batch", cases))

@@ -1,0 +1,314 @@
+"""Reads a scene, mends its meshes one by one, and makes the GLB that holds the result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.progress import Progress, report, silent
+from baker.core.scene import Scene, SourceDocument
+from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
+from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
+from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
+from baker.io.gltf.primitive_columns import read_columns, why_locked
+from baker.io.gltf.write_fixed import write_mended
+from baker.io.gltf.write_source import raw_glb
+from baker.io.load import IMPORTERS, SceneFile, load_scene
+from baker.repairs.inside_out import faces_to_turn
+from baker.repairs.lightmap_uv import new_lightmap_uv
+from baker.repairs.mesh import repair_mesh
+from baker.repairs.meshlab import require_meshlab
+from baker.repairs.part import Part
+from baker.repairs.plan import Change, finish_part, plan_mesh
+from baker.topology.triangle_check import face_normal, in_range
+
+STAGE = "mend"
+
+
+@dataclass(frozen=True)
+class MendSettings:
+    """How a scene is mended.
+
+    Attributes
+    ----------
+    resolution : int
+        Page width in texels at which lightmap uv are judged and made.
+    up, scale : str, float
+        Up axis and metres per unit of formats that do not say.
+    threads : int or None
+    repair : bool
+        Also mend the shape of meshes, with pymeshlab: non-manifold edges, holes, orientation, needles.
+    """
+
+    resolution: int = 1024
+    up: str = "y"
+    scale: float = 1.0
+    threads: int | None = None
+    repair: bool = False
+
+
+@dataclass(frozen=True)
+class Fix:
+    """One change of one object.
+
+    Attributes
+    ----------
+    object, node : str, int
+        The first node that shows the mesh.
+    change : Change
+    """
+
+    object: str
+    node: int
+    change: Change
+
+
+@dataclass(frozen=True)
+class LeftAlone:
+    """Something that was found and not mended, with the reason."""
+
+    object: str
+    node: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A mended scene.
+
+    Attributes
+    ----------
+    data : bytes
+        The GLB; the very bytes of the input if that is a GLB and nothing was mended.
+    fixed : tuple of Fix
+    left_alone : tuple of LeftAlone
+    """
+
+    data: bytes
+    fixed: tuple[Fix, ...]
+    left_alone: tuple[LeftAlone, ...]
+
+    def json(self) -> dict[str, Any]:
+        """Return the keys `fixed` and `left_alone` of `--json`."""
+        return {
+            "fixed": [
+                {"object": fix.object, "node": fix.node, **_change_json(fix.change)} for fix in self.fixed
+            ],
+            "left_alone": [
+                {"object": left.object, "node": left.node, "reason": left.reason} for left in self.left_alone
+            ],
+        }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "change": change.change,
+        "counted": change.counted,
+        "before": change.before,
+        "after": change.after,
+    }
+    if change.distance is not None:
+        told["distance"] = change.distance
+    if change.lost:
+        told["lost"] = list(change.lost)
+    return told
+
+
+def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Progress = silent) -> Mended:
+    """Mend a scene file.
+
+    Parameters
+    ----------
+    path : Path
+        Of any format that is read. It is not changed.
+    settings : MendSettings
+    progress : Progress
+        Told the stage "mend"; a truthy answer stops the work.
+
+    Returns
+    -------
+    Mended
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    ResourceError
+        If a repair is asked for and pymeshlab is not installed.
+    Cancelled
+        If `progress` asks for it.
+    """
+    if settings.repair:
+        require_meshlab()
+    scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True)
+    data: bytes | None = None
+    if scene.source is None:
+        # What other formats hold is written as GLB first, bad triangles and all, and that is mended.
+        assert scene.raw is not None
+        data = raw_glb(scene, scene.raw)
+        scene = _read_glb(path, data)
+    elif not _names_files(scene.source):
+        written = path.read_bytes()
+        data = written if written[:4] == b"glTF" else None
+    mended = _mend(scene, data, settings, progress, make_normals=not settings.repair)
+    if settings.repair:
+        mended = _repair(_read_glb(path, mended.data), mended, progress)
+        # What was repaired may now have double vertices, or need normals or other lightmap uv.
+        mended = _and_then(mended, _mend(_read_glb(path, mended.data), mended.data, settings, progress))
+    tidy = _read_glb(path, mended.data)
+    wrong = faces_to_turn(tidy)
+    if wrong:
+        mended = _and_then(mended, _mend(tidy, mended.data, settings, progress, inside_out=wrong))
+    return mended
+
+
+def _and_then(first: Mended, second: Mended) -> Mended:
+    """Return what two steps did; what the second still finds to leave alone is told once."""
+    left = dict.fromkeys((*first.left_alone, *second.left_alone))
+    return Mended(second.data, (*first.fixed, *second.fixed), tuple(left))
+
+
+def _mend(
+    scene: Scene,
+    data: bytes | None,
+    settings: MendSettings,
+    progress: Progress,
+    *,
+    make_normals: bool = True,
+    inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
+) -> Mended:
+    """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
+    source, raw = _parsed(scene)
+    area = _area_shares(raw)
+    mended: dict[tuple[int, int], EditedPrimitive] = {}
+    fixed: list[Fix] = []
+    left: list[LeftAlone] = []
+    for number, mesh, shown in _shown_meshes(raw):
+        report(progress, STAGE, number / len(raw.meshes), mesh.name)
+        name, node = shown[0].name, shown[0].node
+        index = source.json["nodes"][node]["mesh"]
+        plan = plan_mesh(
+            _parts(source, index, mesh),
+            make_normals=make_normals,
+            inside_out=(inside_out or {}).get(number),
+        )
+        plan, uv = new_lightmap_uv(
+            plan,
+            shown,
+            area[number],
+            resolution=settings.resolution,
+            threads=settings.threads,
+            progress=_within(progress, number, len(raw.meshes)),
+        )
+        for k, part in enumerate(plan.parts):
+            made = finish_part(part, None if uv is None else uv[k])
+            if made is not None:
+                mended[index, part.part.arrays.index] = made
+        fixed += [Fix(name, node, change) for change in plan.changes]
+        left += [LeftAlone(name, node, reason) for reason in plan.left]
+    report(progress, STAGE, 1.0)
+    if mended or data is None:
+        data = write_mended(source, mended)
+    return Mended(data, tuple(fixed), tuple(left))
+
+
+def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
+    """Repair the shapes of a scene that is mended otherwise; what was done so far is told first."""
+    source, raw = _parsed(scene)
+    made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
+    fixed, left = list(first.fixed), []
+    for number, mesh, shown in _shown_meshes(raw):
+        report(progress, "repair", number / len(raw.meshes), mesh.name)
+        name, node = shown[0].name, shown[0].node
+        index = source.json["nodes"][node]["mesh"]
+        primitives = source.json["meshes"][index]["primitives"]
+        textured = any(reads_texture(source.json, primitives[arrays.index]) for arrays in mesh.primitives)
+        repair = repair_mesh(_parts(source, index, mesh), textured, shown[0])
+        made |= {(index, primitive): new for primitive, new in repair.made.items()}
+        fixed += [Fix(name, node, change) for change in repair.changes]
+        left += [LeftAlone(name, node, reason) for reason in repair.left]
+    report(progress, "repair", 1.0)
+    return Mended(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
+
+
+def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
+    assert scene.source is not None
+    assert scene.raw is not None
+    return scene.source, scene.raw
+
+
+def _shown_meshes(raw: SourceScene) -> Iterator[tuple[int, RawMesh, list[RawInstance]]]:
+    """List the meshes that have triangles, with their number and the nodes that show them."""
+    for number, mesh in enumerate(raw.meshes):
+        if mesh.primitives:
+            yield number, mesh, [instance for instance in raw.instances if instance.mesh == number]
+
+
+def _names_files(source: SourceDocument) -> bool:
+    """Say whether a GLB needs files beside it."""
+    things = [*source.json.get("images", []), *source.json.get("buffers", [])]
+    return any("uri" in thing and not thing["uri"].startswith("data:") for thing in things)
+
+
+def _read_glb(path: Path, data: bytes) -> Scene:
+    return IMPORTERS.require(".glb", "importer")(SceneFile(path, data, lenient=True))
+
+
+def _within(progress: Progress, number: int, count: int) -> Progress:
+    """Return the progress of a stage inside the work on one mesh of several."""
+    return lambda stage, fraction, detail="": progress(STAGE, (number + fraction) / count, detail)
+
+
+def _area_shares(raw: SourceScene) -> NDArray[np.float64]:
+    """Return each mesh's part of the scene's area, by its first instance, (M,) float64."""
+    area = np.zeros(len(raw.meshes))
+    for instance in raw.instances:
+        if area[instance.mesh] == 0.0:
+            linear = instance.world_from_object[:3, :3]
+            for arrays in raw.meshes[instance.mesh].primitives:
+                triangle = arrays.triangle[_in_range(arrays)]
+                with np.errstate(over="ignore", invalid="ignore"):
+                    normal = face_normal(arrays.position, triangle) @ np.linalg.pinv(linear)
+                    size = 0.5 * np.linalg.norm(normal, axis=1) * abs(np.linalg.det(linear))
+                area[instance.mesh] += float(size[np.isfinite(size)].sum())
+    return np.asarray(area / max(float(area.sum()), 1e-300))
+
+
+def _in_range(arrays: PrimitiveArrays) -> NDArray[np.bool_]:
+    """Tell which faces name only vertices that exist, (T,) bool."""
+    n = np.full(len(arrays.triangle), len(arrays.position))
+    return in_range(arrays.triangle, np.zeros_like(n), n)
+
+
+def _parts(source: SourceDocument, index: int, mesh: RawMesh) -> list[Part]:
+    document = source.json
+    primitives = document["meshes"][index]["primitives"]
+    parts = []
+    for arrays in mesh.primitives:
+        primitive = primitives[arrays.index]
+        # Variants may show the primitive in several materials: all of them have to allow what is done.
+        materials = [
+            document["materials"][holder["material"]] if "material" in holder else {}
+            for holder in material_holders(primitive)
+        ]
+        locked = why_locked(source, index, primitive)
+        good = _in_range(arrays)
+        if not good.all():
+            arrays = replace(arrays, triangle=arrays.triangle[good])
+            locked = f"{int((~good).sum())} of its faces name vertices that do not exist; export it again"
+        parts.append(
+            Part(
+                arrays=arrays,
+                column=read_columns(source, primitive),
+                double_sided=all(material.get("doubleSided", False) for material in materials),
+                blends=any(material.get("alphaMode") == "BLEND" for material in materials),
+                reads_lightmap_uv=reads_texcoord_1(document, primitive, occlusion=True),
+                locked=locked,
+            )
+        )
+    return parts
