@@ -32,7 +32,7 @@ def bake_once(scene: Path, workers: int) -> dict[str, float]:
     """Return the seconds of each stage; 0 workers is this process, with one thread."""
     from baker.core.settings import make_settings
     from baker.distributed.connection import Cluster
-    from baker.distributed.tile_executor import ClusterFarm
+    from baker.distributed.tile_executor import DistributedTileExecutor
     from baker.pipeline.bake import bake
 
     settings = make_settings(SETTINGS)
@@ -42,8 +42,8 @@ def bake_once(scene: Path, workers: int) -> dict[str, float]:
     try:
         # Workers load libraries and kernels once in their life.
         bake(ROOT / "assets" / "cornell.glb", settings=make_settings({**SETTINGS, "resolution": 64}),
-             farm=ClusterFarm(cluster))  # fmt: skip
-        return bake(scene, settings=settings, farm=ClusterFarm(cluster)).timings
+             executor=DistributedTileExecutor(cluster))  # fmt: skip
+        return bake(scene, settings=settings, executor=DistributedTileExecutor(cluster)).timings
     finally:
         cluster.close()
 

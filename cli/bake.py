@@ -14,7 +14,7 @@ from baker.cli.options import build, cluster_flag, common_flags, flag, given, se
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
-    from baker.distributed.tile_executor import ClusterFarm
+    from baker.distributed.tile_executor import DistributedTileExecutor
 
 
 def command() -> Any:
@@ -78,7 +78,7 @@ def work(
 
         # What is loaded by now stays: looking for cycles in it takes 4 % of a first bake, which compiles.
         gc.freeze()
-        spread = {} if cluster is None else {"farm": _farm(cluster, resolved.threads)}
+        spread = {} if cluster is None else {"executor": _executor(cluster, resolved.threads)}
         with held(out):
             result = bake(scene, out=out, settings=resolved, progress=progress, force=force, **spread)
     if not quiet:
@@ -87,9 +87,9 @@ def work(
         session.write_json(bake_json(result))
 
 
-def _farm(address: str, threads: int | None) -> ClusterFarm:
+def _executor(address: str, threads: int | None) -> DistributedTileExecutor:
     from baker.core.parallel import thread_count
     from baker.distributed.connection import Cluster
-    from baker.distributed.tile_executor import ClusterFarm
+    from baker.distributed.tile_executor import DistributedTileExecutor
 
-    return ClusterFarm(Cluster(address, threads=thread_count(threads)))
+    return DistributedTileExecutor(Cluster(address, threads=thread_count(threads)))

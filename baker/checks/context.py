@@ -19,7 +19,7 @@ from baker.core.light_kind import check_light_kinds
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
+from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 
 # Mip level down to which charts must not bleed into each other, if none is asked for.
 DEFAULT_MIP = 2
@@ -32,11 +32,11 @@ class CheckContext:
     ----------
     scene : Scene
         Loaded leniently, or as a bake has it.
-    raw : SourceScene
+    source : SourceScene
     settings : BakeSettings
     mip : int
         Mip level of the lightmap down to which charts must not bleed into each other.
-    meshes : tuple of MeshFacts, one for each of `raw.meshes`
+    meshes : tuple of MeshFacts, one for each of `source.meshes`
     rates : Rates or None
         Speed of an earlier bake.
     probe : bool
@@ -63,16 +63,16 @@ class CheckContext:
         self.mip = mip
         self.rates = rates
         self.probe = probe
-        self.raw = scene.raw if scene.raw is not None else raw_of(scene)
+        self.source = scene.source_scene if scene.source_scene is not None else source_scene_of(scene)
         self._uv: dict[int, UvFacts] = {}
-        trusted = scene.raw is None
-        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.raw.meshes)
+        trusted = scene.source_scene is None
+        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.source.meshes)
 
     @cached_property
-    def first_instance(self) -> dict[int, RawInstance]:
+    def first_instance(self) -> dict[int, SourceInstance]:
         """Return the first instance of each mesh."""
-        found: dict[int, RawInstance] = {}
-        for instance in self.raw.instances:
+        found: dict[int, SourceInstance] = {}
+        for instance in self.source.instances:
             found.setdefault(instance.mesh, instance)
         return found
 
@@ -80,7 +80,7 @@ class CheckContext:
     def box(self) -> NDArray[np.float64]:
         """Return the lowest and highest corner (2, 3) of all good triangles, metres, world; inf if none."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for instance in self.raw.instances:
+        for instance in self.source.instances:
             facts = self.meshes[instance.mesh]
             if not len(facts.good):
                 continue
@@ -102,7 +102,7 @@ class CheckContext:
         """Return all good triangles in the world."""
         threads = thread_count(self.settings.threads)
         return World(
-            self.raw.instances, self.meshes, self.scene.materials, self.scene.origin, threads=threads
+            self.source.instances, self.meshes, self.scene.materials, self.scene.origin, threads=threads
         )
 
     @cached_property
@@ -146,8 +146,8 @@ class CheckContext:
         """Return where a mesh stands first."""
         instance = self.first_instance.get(mesh)
         if instance is None:
-            return Place(self.raw.meshes[mesh].name)
-        return Place(instance.name or self.raw.meshes[mesh].name, instance.node)
+            return Place(self.source.meshes[mesh].name)
+        return Place(instance.name or self.source.meshes[mesh].name, instance.node)
 
     def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
         """Return a (3,) point of a mesh in the world, where the mesh stands first."""
@@ -157,21 +157,21 @@ class CheckContext:
         return x, y, z
 
 
-def raw_of(scene: Scene) -> SourceScene:
-    """Return the good triangles of a scene in the form of raw ones, without copies."""
-    meshes = tuple(RawMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
-    stand = tuple(RawInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
+def source_scene_of(scene: Scene) -> SourceScene:
+    """Return the good triangles of a scene as a source scene, without copies."""
+    meshes = tuple(SourceMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
+    stand = tuple(SourceInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
     return SourceScene(meshes, stand)
 
 
-def _primitives(mesh: Mesh) -> tuple[PrimitiveArrays, ...]:
+def _primitives(mesh: Mesh) -> tuple[SourcePrimitive, ...]:
     # Vertices and triangles of a primitive stand together, in the order of primitives.
     out = []
     for number in np.unique(mesh.primitive):
         rows = slice(*np.searchsorted(mesh.vertex_primitive, [number, number + 1]))
         faces = slice(*np.searchsorted(mesh.primitive, [number, number + 1]))
         out.append(
-            PrimitiveArrays(
+            SourcePrimitive(
                 index=int(number),
                 material=int(mesh.material[faces][0]),
                 position=mesh.position[rows],

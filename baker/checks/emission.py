@@ -70,10 +70,10 @@ def _image_uv(world: World, triangle: NDArray[np.int64], texture: Texture) -> ND
         own = np.flatnonzero(world.instance[triangle] == k)
         place = world.instances[k]
         facts = world.meshes[place.mesh]
-        sets = [p.texcoord.get(texture.texcoord) for p in facts.raw.primitives]
+        sets = [p.texcoord.get(texture.texcoord) for p in facts.source.primitives]
         known = [
             np.zeros((len(p.position), 2)) if uv is None or len(uv) != len(p.position) else uv
-            for p, uv in zip(facts.raw.primitives, sets, strict=True)
+            for p, uv in zip(facts.source.primitives, sets, strict=True)
         ]
         corner = facts.triangle[world.face[triangle[own]]]
         if np.linalg.det(place.world_from_object[:3, :3]) < 0:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.scene import Material
-from baker.core.source_mesh import RawMesh
+from baker.core.source_mesh import SourceMesh
 from baker.topology.edges import Edges, find_edges
 from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
 from baker.topology.weld import number_by_first, number_rows
@@ -30,16 +30,16 @@ class MeshFacts:
         The importer has left bad faces out already: nothing is looked for twice.
     """
 
-    def __init__(self, raw: RawMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
-        self.raw = raw
+    def __init__(self, source: SourceMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
+        self.source = source
         self.trusted = trusted
         self.materials = materials
-        start = np.cumsum([0] + [len(p.position) for p in raw.primitives])
+        start = np.cumsum([0] + [len(p.position) for p in source.primitives])
         self.vertex_start = start
         empty = [np.zeros((0, 3), np.float32)]
-        self.position: NDArray[np.float32] = np.concatenate([p.position for p in raw.primitives] or empty)
+        self.position: NDArray[np.float32] = np.concatenate([p.position for p in source.primitives] or empty)
         parts, primitive, local, material = [], [], [], []
-        for k, p in enumerate(raw.primitives):
+        for k, p in enumerate(source.primitives):
             number = np.arange(len(p.triangle))
             if p.stitched:
                 # Triangles with a repeated index only join the pieces of a strip.
@@ -192,4 +192,4 @@ class MeshFacts:
 
     def primitive_of(self, faces: NDArray[np.integer]) -> int | None:
         """Return the source number of the primitive that the first face belongs to."""
-        return int(self.raw.primitives[self.primitive[faces[0]]].index) if len(faces) else None
+        return int(self.source.primitives[self.primitive[faces[0]]].index) if len(faces) else None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from baker.checks.mesh_facts import MeshFacts
 from baker.core.scene import Material
-from baker.core.source_mesh import RawInstance
+from baker.core.source_mesh import SourceInstance
 
 if TYPE_CHECKING:
     from baker.trace.embree import RayScene, Tracer
@@ -25,9 +25,9 @@ class World:
 
     Parameters
     ----------
-    instances : sequence of RawInstance
+    instances : sequence of SourceInstance
     meshes : sequence of MeshFacts
-        What `RawInstance.mesh` counts.
+        What `SourceInstance.mesh` counts.
     materials : sequence of Material
     origin : (3,) float64, metres, world
         What positions are relative to: `Scene.origin`.
@@ -38,7 +38,7 @@ class World:
     position : (V, 3) float32, metres, world, relative to `origin`
     triangle : (T, 3) int64
         Wound as the front is seen: nodes that mirror turn the winding over.
-    instance : (T,) int64, index into the raw scene's instances
+    instance : (T,) int64, index into the source scene's instances
     face : (T,) int64, face number in `MeshFacts`
     normal : (T, 3) float64, unit; area : (T,) float64, m2
     material : (T,) int32; double_sided : (T,) bool
@@ -46,7 +46,7 @@ class World:
 
     def __init__(
         self,
-        instances: Sequence[RawInstance],
+        instances: Sequence[SourceInstance],
         meshes: Sequence[MeshFacts],
         materials: Sequence[Material],
         origin: NDArray[np.float64],

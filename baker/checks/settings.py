@@ -101,7 +101,7 @@ def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
     )
     rules += found.ignore
     nodes = document.get("nodes", [])
-    for instance in scene.raw.instances if scene.raw is not None else ():
+    for instance in scene.source_scene.instances if scene.source_scene is not None else ():
         table = _table(nodes[instance.node]) if instance.node < len(nodes) else {}
         codes = table.get("ignore", [])
         codes = ["*"] if codes is True else [codes] if isinstance(codes, str) else codes

@@ -27,10 +27,10 @@ class UvFacts:
 
     def __init__(self, facts: MeshFacts, number: int = LIGHTMAP_SET) -> None:
         self.facts = facts
-        have = np.array([number in p.texcoord for p in facts.raw.primitives], bool)
+        have = np.array([number in p.texcoord for p in facts.source.primitives], bool)
         self.rows: NDArray[np.int64] = np.flatnonzero(have[facts.primitive[facts.good]])
-        blank = [np.zeros((len(p.position), 2), np.float32) for p in facts.raw.primitives]
-        parts = [p.texcoord.get(number, zero) for p, zero in zip(facts.raw.primitives, blank, strict=True)]
+        blank = [np.zeros((len(p.position), 2), np.float32) for p in facts.source.primitives]
+        parts = [p.texcoord.get(number, zero) for p, zero in zip(facts.source.primitives, blank, strict=True)]
         self._vertex = np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
         self.triangle: NDArray[np.int64] = facts.triangle[facts.good[self.rows]]
         self.uv: NDArray[np.float64] = self._vertex[self.triangle].astype(np.float64)

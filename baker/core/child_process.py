@@ -1,4 +1,4 @@
-"""Starts a module of this package in a Python process of its own."""
+"""Runs a module of this package in a child process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ def start_module(module: str) -> subprocess.Popen[bytes]:
     Parameters
     ----------
     module : str
-        Dotted name; the process finds this very package, however the caller found it.
+        Dotted name. The child has the same module search path, so it imports the same package.
+
+    Returns
+    -------
+    subprocess.Popen of bytes
+        The running process; its standard error is discarded.
     """
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Colour encodings: everything inside baker is linear Rec.709.
+"""Colour encodings; inside baker all colours are linear Rec.709.
 
 Based on: IEC 61966-2-1 (the sRGB curve).
 """
@@ -15,7 +15,18 @@ LUMINANCE_WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
 def linear_from_srgb(value: NDArray[Any]) -> NDArray[np.float32]:
-    """Return linear Rec.709 values of sRGB-encoded ones, any shape, both 0 to 1."""
+    """Decode sRGB values.
+
+    Parameters
+    ----------
+    value : array of any shape, 0 to 1
+        sRGB-encoded values.
+
+    Returns
+    -------
+    array of the same shape, float32, 0 to 1
+        Linear Rec.709 values.
+    """
     value = np.asarray(value, np.float64)
     high = ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4
     return np.where(value <= 0.04045, value / 12.92, high).astype(np.float32)

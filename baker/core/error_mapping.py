@@ -1,4 +1,4 @@
-"""Turns what a bake may raise into baker's own errors, or says that it is a bug."""
+"""Maps exceptions of Python and of the operating system to baker's errors."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import errno
 
 from baker.core.errors import BakerError, Cancelled, ResourceError
 
-# What the operating system says when something ran out or is not ours to use.
+# Messages for error numbers of the operating system: a resource ran out, or access is denied.
 _RESOURCE_ERRNO = {
     errno.ENOSPC: "the disk is full; free some space, or write elsewhere with -o",
     errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with -o",
@@ -19,12 +19,17 @@ _RESOURCE_ERRNO = {
 
 
 def explain(error: BaseException) -> BakerError | None:
-    """Return the error as baker's own kind, or None for a bug.
+    """Return the `BakerError` that corresponds to an exception.
 
     Parameters
     ----------
     error : BaseException
         Anything that a stage of a bake raised.
+
+    Returns
+    -------
+    BakerError or None
+        None if the exception means a bug in `baker`.
     """
     if isinstance(error, BakerError):
         return error
@@ -41,11 +46,17 @@ def explain(error: BaseException) -> BakerError | None:
 
 
 def bug(error: BaseException) -> ResourceError:
-    """Return a sentence about an error that should not have happened.
+    """Return the error to report for a bug in `baker`.
 
-    Notes
-    -----
-    Its exit code is 4, not 1: a script that reads 1 as "the check failed" must not take a bug for it.
+    Parameters
+    ----------
+    error : BaseException
+        The unexpected exception.
+
+    Returns
+    -------
+    ResourceError
+        It has exit code 4, not 1: scripts read 1 as "the check failed".
     """
     what = f"{type(error).__name__}: {error}".splitlines()[0]
     return ResourceError(f"internal error ({what}); run with -vv to see where, and please report it")

@@ -1,13 +1,13 @@
-"""Errors that `baker` raises: one base, four children, each a sentence for a person.
+"""Errors that `baker` raises: a base class and one class for each exit code.
 
-A message says what was found, in which file and object, and what to do about it.
+A message is one sentence: what was found, in which file and object, and what to do about it.
 """
 
 from __future__ import annotations
 
 
 class BakerError(Exception):
-    """Is the base of every error that baker raises on purpose.
+    """Base class of every error that baker raises on purpose.
 
     Parameters
     ----------
@@ -35,32 +35,32 @@ class BakerError(Exception):
 
 
 class SettingsError(BakerError):
-    """Says that a flag or a configuration key is wrong (exit code 2)."""
+    """A flag or a configuration key is wrong (exit code 2)."""
 
     kind = "settings"
     exit_code = 2
 
 
 class InputError(BakerError):
-    """Says that an input is unreadable, malformed or holds nothing to bake (exit code 3)."""
+    """An input is unreadable, malformed or holds nothing to bake (exit code 3)."""
 
     kind = "input"
     exit_code = 3
 
 
 class IndexRangeError(InputError):
-    """Says that a face names a vertex that does not exist: readable, but nothing to bake."""
+    """A face refers to a vertex that does not exist: the file can be read, but not baked."""
 
 
 class ResourceError(BakerError):
-    """Says that memory, disk or a needed library ran out or is absent (exit code 4)."""
+    """Memory or disk space ran out, or a needed library is missing (exit code 4)."""
 
     kind = "resource"
     exit_code = 4
 
 
 class Cancelled(BakerError):  # noqa: N818 - the public name of the interface
-    """Says that the caller asked to stop (exit code 130)."""
+    """The caller asked to stop (exit code 130)."""
 
     kind = "cancelled"
     exit_code = 130

@@ -1,4 +1,4 @@
-"""Who works on the tiles of the ray stages of one bake: this process, or others."""
+"""What runs the tiles of the ray stages of one bake: this process, or workers of a cluster."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 
 
-class Farm(Protocol):
-    """Finds a runner for each stage. Whoever works gets the same bytes from the same tiles."""
+class TileExecutor(Protocol):
+    """Provides a tile runner for each stage. All executors compute the same bytes from the same tiles."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Take what all stages of a bake need, once."""
+        """Receive the data that all stages of a bake share; called once before the first stage."""
 
     def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
-        """Return the runner of a stage; `arrays` is what earlier stages found and this one needs."""
+        """Return the runner of a stage; `arrays` holds the results of earlier stages that it needs."""
 
     def close(self) -> None:
-        """Forget the bake."""
+        """Release the data of the bake."""
 
 
-class LocalFarm:
-    """Works in this process."""
+class LocalTileExecutor:
+    """Runs tiles on the threads of this process."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Need nothing: the stages have it all."""
+        """Do nothing: the stages hold the data already."""
 
     def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return `run_tiles`."""
         return run_tiles
 
     def close(self) -> None:
-        """Hold nothing."""
+        """Do nothing."""

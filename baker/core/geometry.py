@@ -1,6 +1,6 @@
 """The whole scene as one world-space triangle list with its lightmap uv.
 
-Every instance is expanded: a triangle here is one that a ray can hit and that owns texels.
+Every instance is expanded: each triangle here can be hit by rays and owns its own texels.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Geometry:
     position : (V, 3) float32, metres, world, relative to `origin`
     normal : (V, 3) float32, unit shading normals, world
     uv : (V, 2) float32, lightmap uv of the page, 0 to 1
-    vertex_source : (V,) int32, the mesh vertex each came from
+    vertex_source : (V,) int32, index of the mesh vertex that each was copied from
     triangle : (T, 3) int32, counter-clockwise seen from the front
     face_normal : (T, 3) float32, unit
     area : (T,) float32, m2
@@ -56,19 +56,21 @@ class Geometry:
 
 
 def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | None = None) -> Geometry:
-    """Place every instance in the world, with the lightmap uv of its layout.
+    """Transform every instance to world space, with the lightmap uv of its layout.
 
     Parameters
     ----------
     scene : Scene
+        The meshes, instances and materials.
     atlas : Atlas
         One layout for each instance, in order.
-    origin : (3,) float64, optional
-        What positions are relative to, `scene.origin` by default.
+    origin : (3,) float64, metres, world, optional
+        Point that positions are relative to; `scene.origin` by default.
 
     Returns
     -------
     Geometry
+        The triangles of all instances, in order.
     """
     origin = scene.origin if origin is None else origin
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}
@@ -77,8 +79,8 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
     for index, (instance, layout) in enumerate(zip(scene.instances, atlas.layouts, strict=True)):
         mesh = scene.meshes[instance.mesh]
         matrix = instance.world_from_object
-        # Each mesh vertex once: vertices split at charts stay bitwise equal and rays find no gap.
-        # Far from 0 float32 has large steps: it begins when the origin has been subtracted.
+        # Transform each mesh vertex once: vertices that are split at charts stay bitwise equal, without gaps.
+        # Subtract the origin in float64: far from 0 the spacing of float32 numbers is large.
         shift = matrix[:3, 3] - origin
         position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + shift).astype(np.float32)
         normal = mesh.normal.astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
@@ -113,7 +115,22 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
 def face_normals(
     position: NDArray[np.float32], triangle: NDArray[np.int32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return unit face normals (T, 3) and areas (T,) of triangles; zero-area faces get normal 0."""
+    """Return the unit normals and the areas of triangles.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, metres
+        Vertices.
+    triangle : (T, 3) int32
+        Indices into the vertices, counter-clockwise seen from the front.
+
+    Returns
+    -------
+    face_normal : (T, 3) float32
+        Unit normals; 0 for triangles without area.
+    area : (T,) float32, m2
+        Areas.
+    """
     corner = position[triangle].astype(np.float64)
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     length = np.linalg.norm(cross, axis=1)

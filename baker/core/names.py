@@ -1,4 +1,4 @@
-"""The error for a name that nothing has: settings, channels, exports, limits, rules of a check."""
+"""The error for an unknown name: of a setting, a channel, an export, a limit, a rule of a check."""
 
 from __future__ import annotations
 
@@ -17,20 +17,28 @@ def unknown_name(
     object: str | None = None,
     listed: str | None = None,
 ) -> SettingsError:
-    """Return the error that tells the nearest known name, if one is near, and all of them.
+    """Return the error for an unknown name, which suggests the nearest known name and lists all names.
 
     Parameters
     ----------
     what : str
-        What the name was to be, in the singular: "channel".
+        Kind of thing that the name should have named, in the singular: "channel".
     name : str
-        As it was given. Case and dashes for underscores do not count in the search for the nearest.
+        The name as it was given. The search for the nearest name ignores case and takes dashes for
+        underscores.
     known : iterable of str
-        In the order in which they are told.
-    file, object : str or None
-        As `SettingsError` takes them.
+        The known names, in the order of the message.
+    file : str or None
+        Passed to `SettingsError`.
+    object : str or None
+        Passed to `SettingsError`.
     listed : str or None
-        Said instead of the known names, where they are too many for a sentence.
+        Text in place of the list of known names, where the list is too long for a sentence.
+
+    Returns
+    -------
+    SettingsError
+        The error, not raised.
     """
     known = list(known)
     folded = {_fold(other): other for other in known}

@@ -1,12 +1,12 @@
-"""Where the coordinates of a bake begin: float32 is finest around 0, so 0 lies among the scene's detail.
+"""Choice of the origin of a bake's coordinates: float32 is finest near 0, so the origin lies amid the detail.
 
-World positions are float64 in the scene; everything that is traced or rasterised is float32 and relative to
-this origin. It is 0 for scenes that stand around 0 already.
+World positions are float64 in the scene; all that is traced or rasterised is float32 and relative to this
+origin. It is 0 for scenes that lie around 0 already.
 
-A step of float32 is 2^-23 of the coordinate. An object of size s at distance d from the origin loses
-log2(d / s) of its 23 bits; the first `_FREE` of them are not missed. The origin is where the sum of lost bits
-over all objects is least: a backdrop, a terrain or a sky around everything loses none wherever the origin is,
-and a stray object far away cannot outweigh the rest.
+The spacing of float32 numbers is about 2^-23 of their size. An object of size s at distance d from the origin
+loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` of them do no harm. The origin minimises the
+weighted sum of lost bits over all objects. A backdrop, a terrain or a sky around everything loses no bits
+wherever the origin is, and a stray object far away cannot outweigh the rest.
 """
 
 from __future__ import annotations
@@ -16,10 +16,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-# Bits lost that do not count; bits of the mean object that moving the origin away from 0 must win.
-_FREE, _WORTH = 3.0, 2.0
-# Places tried, half of them at the objects of most triangles; vertices looked at of a mesh.
-_PLACES, _VERTICES = 64, 1 << 15
+# Lost bits of an object that do not count.
+_UNCOUNTED_BITS = 3.0
+# Bits of the mean object that a move of the origin away from 0 must save.
+_MIN_GAIN = 2.0
+# Candidate origins, half of them at the objects with most triangles.
+_CANDIDATES = 64
+# Vertices read of each mesh.
+_VERTICES = 1 << 15
 
 
 def scene_origin(
@@ -27,18 +31,22 @@ def scene_origin(
     triangles: Sequence[int],
     placed: Sequence[tuple[int, NDArray[np.float64]]],
 ) -> NDArray[np.float64]:
-    """Return (3,) float64, metres, world: what world positions of a bake are relative to.
+    """Return the point that the positions of a bake are relative to.
 
     Parameters
     ----------
-    position : sequence of (V, 3) float32, metres
+    position : sequence of (V, 3) float32, metres, object space
         Vertices of each mesh.
     triangles : sequence of int
-        Triangles of each mesh.
+        Number of triangles of each mesh.
     placed : sequence of (int, (4, 4) float64)
-        Mesh and world matrix of each object.
+        Mesh and world_from_object of each object.
+
+    Returns
+    -------
+    origin : (3,) float64, metres, world
     """
-    shapes = [_middle_and_size(vertices) for vertices in position]
+    shapes = [_median_and_spread(vertices) for vertices in position]
     centre, size, weight = np.zeros((len(placed), 3)), np.zeros(len(placed)), np.zeros(len(placed))
     for k, (mesh, world_from_object) in enumerate(placed):
         middle, half = shapes[mesh]
@@ -48,36 +56,36 @@ def scene_origin(
         weight[k] = np.sqrt(triangles[mesh])
     usable = (size > 0) & np.isfinite(centre).all(axis=1)
     centre, size, weight = centre[usable], size[usable], weight[usable]
-    nowhere = np.zeros(3)
-    # The usual scene, without further search: it cannot win as many bits as the origin has to.
-    lost = _lost_bits(nowhere, centre, size)
-    if not weight.sum() > 0 or weight @ lost <= _WORTH * weight.sum():
-        return nowhere
-    heaviest = np.argsort(-weight, kind="stable")[: _PLACES // 2]
-    spread = np.linspace(0, len(weight) - 1, _PLACES // 2).astype(np.int64)
-    places = np.unique(np.concatenate([heaviest, spread]))
-    total = np.array([weight @ _lost_bits(centre[k], centre, size) for k in places])
-    best = places[int(total.argmin())]
-    if weight @ lost - total.min() <= _WORTH * weight.sum():
-        return nowhere
-    # On a grid of powers of two: coordinates that were whole or simple numbers stay so.
+    zero = np.zeros(3)
+    # Most scenes end here: no origin can save more bits than are lost at 0.
+    lost = _lost_bits(zero, centre, size)
+    if not weight.sum() > 0 or weight @ lost <= _MIN_GAIN * weight.sum():
+        return zero
+    heaviest = np.argsort(-weight, kind="stable")[: _CANDIDATES // 2]
+    spread = np.linspace(0, len(weight) - 1, _CANDIDATES // 2).astype(np.int64)
+    candidates = np.unique(np.concatenate([heaviest, spread]))
+    total = np.array([weight @ _lost_bits(centre[k], centre, size) for k in candidates])
+    best = candidates[int(total.argmin())]
+    if weight @ lost - total.min() <= _MIN_GAIN * weight.sum():
+        return zero
+    # Round to a power of two: coordinates that are whole or simple numbers stay so.
     grid = 2.0 ** np.floor(np.log2(size[best]))
     return np.asarray(np.round(centre[best] / grid) * grid, np.float64)
 
 
 def _lost_bits(
-    place: NDArray[np.float64], centre: NDArray[np.float64], size: NDArray[np.float64]
+    point: NDArray[np.float64], centre: NDArray[np.float64], size: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return (n,): bits of float32 that objects lose to their distance from a place, beyond `_FREE`."""
-    distance = np.abs(centre - place).max(axis=1)
-    return np.asarray(np.maximum(np.log2(np.maximum(distance / size, 1e-9)) - _FREE, 0.0))
+    """Return the bits of float32 (n,) beyond `_UNCOUNTED_BITS` that objects lose if (3,) is the origin."""
+    distance = np.abs(centre - point).max(axis=1)
+    return np.asarray(np.maximum(np.log2(np.maximum(distance / size, 1e-9)) - _UNCOUNTED_BITS, 0.0))
 
 
-def _middle_and_size(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _median_and_spread(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the median (3,) of a mesh's vertices and their median distance (3,) from it along each axis.
 
-    Medians: a few triangles left far away are not where the mesh is. Where most vertices are in one place,
-    half the box.
+    Medians ignore a few triangles far from the rest. Where they are 0 because most vertices coincide, the
+    spread is half the bounding box.
     """
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):

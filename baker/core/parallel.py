@@ -1,4 +1,4 @@
-"""Work in tiles on a pool of threads, with progress and cancel between tiles.
+"""Tiles of work on a pool of threads, with progress reports and cancellation between tiles.
 
 Kernels release the GIL, so Python threads run them at the same time. Each tile writes its own part
 of the output: results do not depend on the number of threads or on the order of tiles.
@@ -15,12 +15,23 @@ from typing import Any, Protocol
 
 from baker.core.progress import Progress, report
 
-# Seconds between two looks at the caller's wish to stop.
-_LOOK = 0.1
+# Seconds between two progress reports, at which the caller may cancel.
+_REPORT_SECONDS = 0.1
 
 
 def thread_count(threads: int | None) -> int:
-    """Return `threads`, or the number of cores this process may use."""
+    """Return the number of threads to use.
+
+    Parameters
+    ----------
+    threads : int or None
+        Number asked for; None or 0 for all cores.
+
+    Returns
+    -------
+    int
+        `threads`, or else the number of cores that this process may use.
+    """
     if threads:
         return threads
     if hasattr(os, "sched_getaffinity"):
@@ -28,12 +39,12 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-# What a tile gives: arrays, and numbers that are summed up.
+# The result of a tile: arrays, and numbers to be summed.
 Part = tuple[Any, ...]
 
 
 class TileRunner(Protocol):
-    """Works on all tiles of a stage: in this process (`run_tiles`), or elsewhere."""
+    """Runs all tiles of a stage: in this process (`run_tiles`), or elsewhere."""
 
     def __call__(
         self,
@@ -61,21 +72,31 @@ def run_tiles(
     progress: Progress,
     rays_per_item: float = 0.0,
 ) -> None:
-    """Call `work(begin, end)` for each tile of `tile` items out of n.
+    """Call `work(begin, end)` for each tile of `tile` items out of `n`.
 
     Parameters
     ----------
+    n : int
+        Number of items.
+    tile : int
+        Items in a tile; the last tile may have fewer.
+    work : callable
+        `work(begin, end)` returns the result of a tile.
     keep : callable or None
-        Takes what a tile gave to where it belongs: `keep(begin, end, part)`. None if `work` does that itself.
+        `keep(begin, end, part)` stores the result of a tile; None if `work` stores it itself.
+    threads : int
+        Number of threads.
     stage : str
         Name shown by `progress`.
+    progress : Progress
+        Receives reports, and may cancel.
     rays_per_item : float
-        If positive, the rate shown is Mrays/s, else items per second.
+        If positive, progress shows the rate in Mrays/s.
 
     Raises
     ------
     Cancelled
-        If `progress` answers so; running tiles end first, waiting ones never start.
+        If `progress` cancels; running tiles end first, waiting ones never start.
     """
     report(progress, stage, 0.0)
     if n == 0:
@@ -96,7 +117,7 @@ def run_tiles(
         for begin, end in islice(waiting, 2 * threads):
             running[pool.submit(do, begin, end)] = end - begin
         while running:
-            finished, _ = wait(running, timeout=_LOOK, return_when=FIRST_COMPLETED)
+            finished, _ = wait(running, timeout=_REPORT_SECONDS, return_when=FIRST_COMPLETED)
             for future in finished:
                 done += running.pop(future)
                 future.result()

@@ -1,4 +1,4 @@
-"""How long work reports and is stopped: a callable that is told and may answer "stop"."""
+"""Progress reports of long work: a callable that receives them and may cancel the work."""
 
 from __future__ import annotations
 
@@ -8,18 +8,50 @@ from baker.core.errors import Cancelled
 
 
 class Progress(Protocol):
-    """Is told how far a stage has come; a truthy answer cancels the work."""
+    """Receives how far a stage has come; a truthy return value cancels the work."""
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> object:
         """Report `fraction` (0 to 1) of `stage` done; `detail` is a rate or a count to show."""
 
 
 def silent(stage: str, fraction: float, detail: str = "", /) -> object:
-    """Report nothing and never cancel."""
+    """Ignore a report of progress and never cancel.
+
+    Parameters
+    ----------
+    stage : str
+        Ignored.
+    fraction : float
+        Ignored.
+    detail : str
+        Ignored.
+
+    Returns
+    -------
+    object
+        None.
+    """
     return None
 
 
 def report(progress: Progress, stage: str, fraction: float, detail: str = "") -> None:
-    """Tell `progress`, and raise `Cancelled` if it answers that the work must stop."""
+    """Report to `progress`, and stop the work if it asks for that.
+
+    Parameters
+    ----------
+    progress : Progress
+        Receives the report.
+    stage : str
+        Name of the stage.
+    fraction : float
+        Share of the stage that is done, 0 to 1.
+    detail : str
+        A rate or a count to show.
+
+    Raises
+    ------
+    Cancelled
+        If `progress` returns a truthy value.
+    """
     if progress(stage, fraction, detail):
         raise Cancelled("the work was cancelled")

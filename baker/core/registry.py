@@ -1,4 +1,4 @@
-"""Named plugins: a file registers itself by name, callers look the name up.
+"""Plugins by name: each file of a package registers its plugin, callers look it up.
 
 Based on: Mitsuba 3's plugin-per-file layout.
 """
@@ -16,12 +16,12 @@ T = TypeVar("T")
 
 
 class Registry(Generic[T]):
-    """Maps names to plugins found in one package.
+    """Maps names to the plugins of one package.
 
     Parameters
     ----------
     package : str
-        Dotted name of the package whose modules register themselves; it is searched on first use.
+        Dotted name of the package whose modules register the plugins; they are imported on first use.
     """
 
     def __init__(self, package: str) -> None:
@@ -30,7 +30,7 @@ class Registry(Generic[T]):
         self._searched = False
 
     def register(self, name: str) -> Callable[[T], T]:
-        """Return a decorator that files its argument under `name`."""
+        """Return a decorator that registers its argument under `name`."""
 
         def add(plugin: T) -> T:
             if name in self._plugins:
@@ -64,16 +64,16 @@ class Registry(Generic[T]):
         ----------
         name : str
         what : str
-            What the plugins of this registry are, in the singular, for the message: "channel".
+            Kind of plugin in the singular, for the message: "channel".
         setting : str or None
             The setting that gave the name, for the message.
         hidden : collection of str
-            Names that the message does not offer, because the setting does not take them.
+            Names that the message leaves out, because the setting does not accept them.
 
         Raises
         ------
         SettingsError
-            If there is none; it tells the nearest name and all names.
+            If there is none; the message suggests the nearest name and lists all names.
         """
         plugin = self.get(name)
         if plugin is None:

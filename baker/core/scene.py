@@ -1,7 +1,7 @@
-"""A scene as the rest of baker sees it: frozen arrays in metres, +Y up, linear Rec.709.
+"""The scene that is baked: frozen arrays in metres, +Y up, linear Rec.709.
 
-Importers build it, nothing changes it. Meshes are shared by instances; world space comes in
-`core.geometry`.
+Importers build it, nothing changes it. Meshes are in object space and shared by instances; `core.geometry`
+transforms them to world space.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from numpy.typing import NDArray
 from baker.core.origin import scene_origin
 from baker.core.source_mesh import SourceScene
 
-# Metres; the square of a shorter range would leave float32.
+# Metres; the inverse square of a shorter range would overflow float32.
 _SHORTEST_RANGE = 1e-12
 
 
 @dataclass(frozen=True)
 class Texture:
-    """An image with how a material reads it.
+    """An image and the sampler with which a material reads it.
 
     Attributes
     ----------
     image : (H, W, 4) uint8 or float32
         uint8: as stored, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is v = 0.
     texcoord : int
-        Which TEXCOORD set of the mesh it reads.
+        Number of the TEXCOORD set of the mesh.
     transform : (2, 3) float64
         uv_image = transform @ (u, v, 1): KHR_texture_transform.
     wrap : (str, str)
         "repeat", "mirror" or "clamp" along u and v.
     nearest : bool
-        Magnified texels are squares and not interpolated.
+        Magnification takes the nearest texel instead of interpolating.
     """
 
     image: NDArray[Any]
@@ -50,7 +50,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """What a surface reflects and emits.
+    """Reflection, emission and opacity of a surface.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Material:
     double_sided : bool
         Reflects and emits on both sides; otherwise the back is black.
     metallic_roughness_texture : Texture or None
-        Linear: green times `roughness`, blue times `metallic`. Bakes do not look at it.
+        Linear: green times `roughness`, blue times `metallic`. Bakes do not read it.
     alpha_mode : str
         "OPAQUE", "MASK" or "BLEND".
     """
@@ -81,23 +81,22 @@ class Material:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles in object space; all primitives of one mesh, one after the other.
+    """Triangles in object space: the primitives of a mesh, concatenated.
 
     Attributes
     ----------
     position : (V, 3) float32, object space
-    normal : (V, 3) float32, unit, object space; made by the importer where the file has none
-    triangle : (T, 3) int32, indices into the vertices; only good triangles are here
+    normal : (V, 3) float32, unit, object space; computed by the importer where the file has none
+    triangle : (T, 3) int32, indices into the vertices; only valid triangles
     material : (T,) int32, index into `Scene.materials`
     primitive : (T,) int32, index of the primitive in the source mesh
-    vertex_primitive : (V,) int32, index of the primitive that vertex belongs to
+    vertex_primitive : (V,) int32, index of the primitive that the vertex belongs to
     source_vertex : (V,) int32
-        Row of each vertex in its source primitive's accessors (after de-indexing of strips and
-        fans nothing changes: these are accessor rows). For flat normals made by the importer
-        one accessor row may appear several times.
+        Row of each vertex in the accessors of its source primitive. Where the importer computed flat normals
+        a row may appear several times.
     texcoord : tuple of (V, 2) float32 or None
-        TEXCOORD sets by number. Set 1 is the candidate for a kept lightmap uv.
-    colour : (V, 4) float32, linear, or None
+        TEXCOORD sets by number. Set 1 may serve as lightmap uv.
+    colour : (V, 4) float32, linear Rec.709, or None
     """
 
     name: str
@@ -119,7 +118,9 @@ class Instance:
     Attributes
     ----------
     node : int
-        glTF node index in `scene.glb` (for other formats: the index the writer gives it).
+        glTF node index in `scene.glb` (for other formats: the index that the writer assigns).
+    name : str
+        Name of the node, or of the mesh if the node has none.
     mesh : int
         Index into `Scene.meshes`.
     world_from_object : (4, 4) float64
@@ -133,7 +134,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class PunctualLight:
-    """A light without area; what its kind means is in `core.light_kind` and `baker.lights.families`.
+    """A light without area; its kind is described in `core.light_kind` and `baker.lights.families`.
 
     Attributes
     ----------
@@ -141,10 +142,12 @@ class PunctualLight:
         Name of a `LightKind`: "point", "spot" or "directional" (KHR_lights_punctual).
     intensity : (3,) tuple
         Colour times intensity, in the unit of the kind.
-    position, direction : (3,) tuple, world space; direction is where the light shines to, unit.
+    position : (3,) tuple, metres, world
+    direction : (3,) tuple, unit, world
+        Direction in which the light travels along the axis, away from the light.
     inner_cone, outer_cone : float, radians (spot)
     range : float, metres
-        Distance at which a point or spot light has faded out, inf if it never does.
+        Distance at which a point or spot light has faded to 0; inf for no limit.
     """
 
     kind: str
@@ -165,7 +168,7 @@ class PunctualLight:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera of the file.
+    """A pinhole camera.
 
     Attributes
     ----------
@@ -186,7 +189,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class SceneWarning:
-    """A finding that does not stop the work: a stable code, a sentence, the object concerned."""
+    """A problem that does not stop the work: a stable code, a sentence, the object concerned."""
 
     code: str
     message: str
@@ -195,20 +198,20 @@ class SceneWarning:
 
 @dataclass(frozen=True)
 class SourceDocument:
-    """The glTF a scene came from, so that the writer can keep what it does not understand.
+    """The glTF document of a scene, from which the writer copies everything that baking does not change.
 
     Attributes
     ----------
     json : dict
-        The document as parsed (never changed: the writer copies it).
+        The document as parsed; never changed.
     buffers : tuple of bytes
-        Every buffer's bytes, resolved from the BIN chunk, files or data URIs.
+        The bytes of each buffer, read from the BIN chunk, files or data URIs.
     folder : Path or None
-        Where relative image URIs are found.
+        Folder that relative image URIs refer to.
     missing, missing_images : frozenset of int
-        Buffers and image files that cannot be read; nothing that is baked needs them.
+        Buffers and image files that cannot be read; baking does not need them.
     chunks : tuple of (int, bytes)
-        Kind and content of the GLB chunks that glTF does not define.
+        Type and content of the GLB chunks that glTF does not define.
     """
 
     json: dict[str, Any]
@@ -221,16 +224,16 @@ class SourceDocument:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is baked.
+    """Meshes, materials and lights of a scene.
 
     Attributes
     ----------
     source : SourceDocument or None
         None for formats other than glTF: the writer builds a new document.
     sha256 : str
-        Hash over the scene file and every file it names, in order of mention.
-    raw : SourceScene or None
-        The triangles as the file has them, if the scene was loaded leniently.
+        Hash of the scene file and of every file that it refers to, in the order of the references.
+    source_scene : SourceScene or None
+        The triangles as the file holds them, if the scene was loaded leniently.
     """
 
     name: str
@@ -243,11 +246,11 @@ class Scene:
     source: SourceDocument | None = None
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
-    raw: SourceScene | None = None
+    source_scene: SourceScene | None = None
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
-        """Return what world positions of a bake are relative to, (3,) float64, metres; see `core.origin`."""
+        """Return the point (3,) float64, metres, world, that positions of a bake are relative to."""
         return scene_origin(
             [mesh.position for mesh in self.meshes],
             [len(mesh.triangle) for mesh in self.meshes],
@@ -268,5 +271,5 @@ class Scene:
 
     @property
     def n_triangles(self) -> int:
-        """Count the triangles of all instances."""
+        """Return the number of triangles of all instances."""
         return sum(len(self.meshes[i.mesh].triangle) for i in self.instances)

@@ -1,4 +1,4 @@
-"""A scene's triangles as its file has them, bad ones included, for those who judge the file itself."""
+"""A scene's triangles as its file holds them, invalid ones included, for checks and repairs of the file."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
-class PrimitiveArrays:
-    """One primitive as its file has it.
+class SourcePrimitive:
+    """One primitive as its file holds it.
 
     Attributes
     ----------
@@ -18,16 +18,19 @@ class PrimitiveArrays:
         Number of the primitive in its mesh.
     material : int
         Index into the scene's materials.
-    position : (V, 3) float32, object space
-    triangle : (T, 3) int64, indices into the vertices, not yet known to be in range
-    normal : (V, 3) float32 or None
+    position : (V, 3) float32, metres, object space
+    triangle : (T, 3) int64
+        Indices into the vertices, not yet checked to be in range.
+    normal : (V, 3) float32 or None, object space
         None asks for flat normals.
     texcoord : dict of int to (V, 2) float32
-    colour : (V, 4) float32, linear, or None
+        TEXCOORD sets by number.
+    colour : (V, 4) float32 or None, linear Rec.709
     further : (V, B) uint8 or None
-        Bytes of the vertex attributes that are not above; only where a file is read leniently.
+        Bytes of all other vertex attributes; only where a file is read leniently.
     stitched : bool
-        True for strips, whose triangles with a repeated index only join pieces: left out without a word.
+        True for strips: a triangle with a repeated index joins two parts of a strip and is dropped without
+        a warning.
     """
 
     index: int
@@ -42,20 +45,22 @@ class PrimitiveArrays:
 
 
 @dataclass(frozen=True)
-class RawMesh:
-    """A mesh with everything that its file says, however wrong."""
+class SourceMesh:
+    """A mesh with all primitives of its file, unchecked."""
 
     name: str
-    primitives: tuple[PrimitiveArrays, ...]
+    primitives: tuple[SourcePrimitive, ...]
 
 
 @dataclass(frozen=True)
-class RawInstance:
-    """A node that shows a mesh, even one that cannot be baked.
+class SourceInstance:
+    """A node that shows a mesh, including a mesh without a valid triangle.
 
     Attributes
     ----------
     node : int
+        As in `Instance`.
+    name : str
         As in `Instance`.
     mesh : int
         Index into `SourceScene.meshes`.
@@ -70,7 +75,7 @@ class RawInstance:
 
 @dataclass(frozen=True)
 class SourceScene:
-    """All meshes that stand in the scene, in the order of their first instance."""
+    """All meshes that a scene's nodes show, in the order of their first instance."""
 
-    meshes: tuple[RawMesh, ...]
-    instances: tuple[RawInstance, ...]
+    meshes: tuple[SourceMesh, ...]
+    instances: tuple[SourceInstance, ...]

@@ -26,8 +26,8 @@ _MOST_TILES = 64
 _LOOK = 0.02
 
 
-class ClusterFarm:
-    """Is a `core.executor.Farm` of many machines.
+class DistributedTileExecutor:
+    """Is a `core.executor.TileExecutor` of many machines.
 
     Parameters
     ----------

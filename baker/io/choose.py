@@ -54,13 +54,13 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
     used = sorted({i.mesh for i in instances})
     number = {old: new for new, old in enumerate(used)}
-    raw = scene.raw
-    if raw is not None:
-        shown = [i for i in raw.instances if kept(i.node, i.name)]
+    source = scene.source_scene
+    if source is not None:
+        shown = [i for i in source.instances if kept(i.node, i.name)]
         filled = sorted({i.mesh for i in shown})
         at = {old: new for new, old in enumerate(filled)}
-        raw = SourceScene(
-            tuple(raw.meshes[k] for k in filled), tuple(replace(i, mesh=at[i.mesh]) for i in shown)
+        source = SourceScene(
+            tuple(source.meshes[k] for k in filled), tuple(replace(i, mesh=at[i.mesh]) for i in shown)
         )
     idle = [p for p in (*include, *exclude) if p not in names.matched]
     return replace(
@@ -68,7 +68,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
         meshes=tuple(scene.meshes[k] for k in used),
         instances=tuple(replace(i, mesh=number[i.mesh]) for i in instances),
         lights=lights,
-        raw=raw,
+        source_scene=source,
         warnings=(
             *scene.warnings,
             *(SceneWarning("no-match", f"the pattern '{p}' matches no object and no light", p) for p in idle),

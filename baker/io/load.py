@@ -37,7 +37,7 @@ class SceneFile:
     reflections : bool
         Also read textures that only say how mirror-like a surface is.
     lenient : bool
-        Report what a bake refuses instead of raising, and keep the raw triangles.
+        Report what a bake refuses instead of raising, and keep the triangles as the file has them.
     """
 
     path: Path
@@ -78,7 +78,7 @@ def load_scene(
         Also read textures that only say how mirror-like a surface is: bakes do not look at them.
     lenient : bool
         For those who judge the file: indices out of range, negative or far too strong lights and a scene
-        without a good triangle are no errors, and `Scene.raw` holds all triangles as they are in the file.
+        without a good triangle are no errors, and `Scene.source_scene` holds the triangles of the file.
 
     Returns
     -------

@@ -12,7 +12,7 @@ from pathlib import Path
 from baker.channels.channel import CHANNELS, Channel
 from baker.checks.in_bake import bake_warnings
 from baker.core.errors import ResourceError
-from baker.core.executor import Farm, LocalFarm
+from baker.core.executor import LocalTileExecutor, TileExecutor
 from baker.core.export import check_exports
 from baker.core.light_kind import check_lights
 from baker.core.lightmap import BakeResult
@@ -37,7 +37,7 @@ def bake(
     out: Path | str | None = None,
     progress: Progress = silent,
     force: bool = False,
-    farm: Farm | None = None,
+    executor: TileExecutor | None = None,
 ) -> BakeResult:
     """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
 
@@ -50,7 +50,7 @@ def bake(
     progress : Progress
     force : bool
         Replace an `out` that baker did not write.
-    farm : Farm, optional
+    executor : TileExecutor, optional
         Works on the tiles of the ray stages; None is this process.
 
     Raises
@@ -65,7 +65,7 @@ def bake(
         check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
         check_exports(settings.export, settings.channels)
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
-    record, farm = Record(progress), farm or LocalFarm()
+    record, executor = Record(progress), executor or LocalTileExecutor()
     compiling = precompile.start()
     try:
         with record.stage("load"):
@@ -78,13 +78,13 @@ def bake(
         with record.stage("unwrap"):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
-        farm.open(scene, atlas, settings)
+        executor.open(scene, atlas, settings)
         world = prepare(scene, atlas, settings, record)
         if any(channel.needs_light for channel in channels.values()):
             precompile.wait_for_rays(compiling, progress)
-        transport = trace_transport(scene, world, channels, settings, record, farm)
+        transport = trace_transport(scene, world, channels, settings, record, executor)
         world.rays.close()
-        farm.close()
+        executor.close()
         # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
         texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
         del world

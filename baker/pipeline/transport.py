@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.channels.channel import Channel, Transport
-from baker.core.executor import Farm, LocalFarm
+from baker.core.executor import LocalTileExecutor, TileExecutor
 from baker.core.parallel import TileRunner, thread_count
 from baker.core.progress import Progress
 from baker.core.scene import Scene, SceneWarning
@@ -34,28 +34,30 @@ def trace_transport(
     channels: dict[str, Channel],
     settings: BakeSettings,
     record: Record,
-    farm: Farm | None = None,
+    executor: TileExecutor | None = None,
 ) -> Transport:
     """Cast the rays of all stages that the channels need."""
-    farm = farm or LocalFarm()
+    executor = executor or LocalTileExecutor()
     transport = Transport()
     n_samples = settings.hemisphere_samples
     ao_samples = settings.ao_samples or n_samples
     if any(channel.needs_light for channel in channels.values()):
-        transport = _light(scene, world, settings, record, farm)
+        transport = _light(scene, world, settings, record, executor)
     if any(channel.needs_open for channel in channels.values()):
         share = transport.gathered
         if share is not None and ao_samples == n_samples:
             return replace(transport, open=share.open, ao_samples=ao_samples)
         with record.stage("ambient occlusion"):
-            run = farm.runner("ambient occlusion", {"inside": world.inside})
+            run = executor.runner("ambient occlusion", {"inside": world.inside})
             opened = open_sky(world, settings, record.progress, run)
             record.rays["ambient occlusion"] = world.texels.n_front * ao_samples
         transport = replace(transport, open=opened, ao_samples=ao_samples)
     return transport
 
 
-def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, farm: Farm) -> Transport:
+def _light(
+    scene: Scene, world: World, settings: BakeSettings, record: Record, executor: TileExecutor
+) -> Transport:
     """Direct light, radiosity and final gather."""
     texels, sky = world.texels, np.array(settings.sky_radiance)
     if not scene.lights and not len(world.emitters.power) and not sky.any():
@@ -63,7 +65,7 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
             SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use --sky")
         )
     with record.stage("direct light"):
-        run = farm.runner("direct light", {"inside": world.inside})
+        run = executor.runner("direct light", {"inside": world.inside})
         direct = light_directly(scene, world, settings, record.progress, run)
         record.rays["direct light"] = direct.rays
     with record.stage("form factors"):
@@ -80,11 +82,11 @@ def _light(scene: Scene, world: World, settings: BakeSettings, record: Record, f
         record.rays["form factors"] = cast
     exitance = np.zeros((texels.n, 4), np.float32)
     if settings.bounces != 0:
-        exitance[:, :3] = _reflected(world, direct.complete, depth, settings, record, farm)
+        exitance[:, :3] = _reflected(world, direct.complete, depth, settings, record, executor)
     # It has done its part.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage("final gather"):
-        run = farm.runner(
+        run = executor.runner(
             "final gather", {"inside": world.inside, "exitance": exitance, "exact": direct.exact}
         )
         seen = world.sides.seen_light(exitance)
@@ -180,7 +182,7 @@ def _reflected(
     depth: NDArray[np.uint8],
     settings: BakeSettings,
     record: Record,
-    farm: Farm,
+    executor: TileExecutor,
 ) -> NDArray[np.float32]:
     """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own.
 
@@ -202,7 +204,7 @@ def _reflected(
             threads=thread_count(settings.threads),
             progress=record.progress,
             kept=world.kept,
-            run=farm.runner("form factors", {"inside": world.inside, "depth": depth}),
+            run=executor.runner("form factors", {"inside": world.inside, "depth": depth}),
         )
         record.rays["form factors"] += matrix.rays
     with record.stage("solve"):

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SourceDocument
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
+from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
 from baker.io.gltf.write_fixed import write_mended
-from baker.io.gltf.write_source import raw_glb
+from baker.io.gltf.write_source import source_glb
 from baker.io.load import IMPORTERS, SceneFile, load_scene
 from baker.repairs.inside_out import faces_to_turn
 from baker.repairs.lightmap_uv import new_lightmap_uv
@@ -149,8 +149,8 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     data: bytes | None = None
     if scene.source is None:
         # What other formats hold is written as GLB first, bad triangles and all, and that is mended.
-        assert scene.raw is not None
-        data = raw_glb(scene, scene.raw)
+        assert scene.source_scene is not None
+        data = source_glb(scene, scene.source_scene)
         scene = _read_glb(path, data)
     elif not _names_files(scene.source):
         written = path.read_bytes()
@@ -183,13 +183,13 @@ def _mend(
     inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
 ) -> Mended:
     """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
-    source, raw = _parsed(scene)
-    area = _area_shares(raw)
+    source, source_scene = _parsed(scene)
+    area = _area_shares(source_scene)
     mended: dict[tuple[int, int], EditedPrimitive] = {}
     fixed: list[Fix] = []
     left: list[LeftAlone] = []
-    for number, mesh, shown in _shown_meshes(raw):
-        report(progress, STAGE, number / len(raw.meshes), mesh.name)
+    for number, mesh, shown in _shown_meshes(source_scene):
+        report(progress, STAGE, number / len(source_scene.meshes), mesh.name)
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
         plan = plan_mesh(
@@ -203,7 +203,7 @@ def _mend(
             area[number],
             resolution=settings.resolution,
             threads=settings.threads,
-            progress=_within(progress, number, len(raw.meshes)),
+            progress=_within(progress, number, len(source_scene.meshes)),
         )
         for k, part in enumerate(plan.parts):
             made = finish_part(part, None if uv is None else uv[k])
@@ -219,11 +219,11 @@ def _mend(
 
 def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
     """Repair the shapes of a scene that is mended otherwise; what was done so far is told first."""
-    source, raw = _parsed(scene)
+    source, source_scene = _parsed(scene)
     made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
-    for number, mesh, shown in _shown_meshes(raw):
-        report(progress, "repair", number / len(raw.meshes), mesh.name)
+    for number, mesh, shown in _shown_meshes(source_scene):
+        report(progress, "repair", number / len(source_scene.meshes), mesh.name)
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
         primitives = source.json["meshes"][index]["primitives"]
@@ -238,15 +238,15 @@ def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
 
 def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
     assert scene.source is not None
-    assert scene.raw is not None
-    return scene.source, scene.raw
+    assert scene.source_scene is not None
+    return scene.source, scene.source_scene
 
 
-def _shown_meshes(raw: SourceScene) -> Iterator[tuple[int, RawMesh, list[RawInstance]]]:
+def _shown_meshes(source_scene: SourceScene) -> Iterator[tuple[int, SourceMesh, list[SourceInstance]]]:
     """List the meshes that have triangles, with their number and the nodes that show them."""
-    for number, mesh in enumerate(raw.meshes):
+    for number, mesh in enumerate(source_scene.meshes):
         if mesh.primitives:
-            yield number, mesh, [instance for instance in raw.instances if instance.mesh == number]
+            yield number, mesh, [instance for instance in source_scene.instances if instance.mesh == number]
 
 
 def _names_files(source: SourceDocument) -> bool:
@@ -264,13 +264,13 @@ def _within(progress: Progress, number: int, count: int) -> Progress:
     return lambda stage, fraction, detail="": progress(STAGE, (number + fraction) / count, detail)
 
 
-def _area_shares(raw: SourceScene) -> NDArray[np.float64]:
+def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
     """Return each mesh's part of the scene's area, by its first instance, (M,) float64."""
-    area = np.zeros(len(raw.meshes))
-    for instance in raw.instances:
+    area = np.zeros(len(source_scene.meshes))
+    for instance in source_scene.instances:
         if area[instance.mesh] == 0.0:
             linear = instance.world_from_object[:3, :3]
-            for arrays in raw.meshes[instance.mesh].primitives:
+            for arrays in source_scene.meshes[instance.mesh].primitives:
                 triangle = arrays.triangle[_in_range(arrays)]
                 with np.errstate(over="ignore", invalid="ignore"):
                     normal = face_normal(arrays.position, triangle) @ np.linalg.pinv(linear)
@@ -279,13 +279,13 @@ def _area_shares(raw: SourceScene) -> NDArray[np.float64]:
     return np.asarray(area / max(float(area.sum()), 1e-300))
 
 
-def _in_range(arrays: PrimitiveArrays) -> NDArray[np.bool_]:
+def _in_range(arrays: SourcePrimitive) -> NDArray[np.bool_]:
     """Tell which faces name only vertices that exist, (T,) bool."""
     n = np.full(len(arrays.triangle), len(arrays.position))
     return in_range(arrays.triangle, np.zeros_like(n), n)
 
 
-def _parts(source: SourceDocument, index: int, mesh: RawMesh) -> list[Part]:
+def _parts(source: SourceDocument, index: int, mesh: SourceMesh) -> list[Part]:
     document = source.json
     primitives = document["meshes"][index]["primitives"]
     parts = []

@@ -26,7 +26,7 @@ def faces_to_turn(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
         if not parts:
             continue
         face = facts.good[np.concatenate(parts)]
-        masks = [np.zeros(len(p.triangle), bool) for p in facts.raw.primitives]
+        masks = [np.zeros(len(p.triangle), bool) for p in facts.source.primitives]
         for k, mask in enumerate(masks):
             mask[facts.local[face[facts.primitive[face] == k]]] = True
         found[number] = masks

@@ -12,7 +12,7 @@ from baker.core.errors import InputError
 from baker.core.progress import Progress
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.settings import make_settings
-from baker.core.source_mesh import RawInstance
+from baker.core.source_mesh import SourceInstance
 from baker.repairs.plan import Change, MeshPlan
 from baker.topology.triangle_check import duplicates, usable_vertices
 from baker.uv.keep import find_fault
@@ -24,7 +24,7 @@ _SMALLEST = 64
 
 def new_lightmap_uv(
     plan: MeshPlan,
-    shown: Sequence[RawInstance],
+    shown: Sequence[SourceInstance],
     share: float,
     *,
     resolution: int,
@@ -36,7 +36,7 @@ def new_lightmap_uv(
     Parameters
     ----------
     plan : MeshPlan
-    shown : sequence of RawInstance
+    shown : sequence of SourceInstance
         The nodes that show the mesh; it is cut for the first one's scale.
     share : float
         The mesh's part of the scene's area, 0 to 1: it will get about this part of a page.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from baker.core.source_mesh import RawInstance
+from baker.core.source_mesh import SourceInstance
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.repairs.part import Part
 from baker.repairs.plan import Change, finish_part
@@ -32,7 +32,7 @@ class MeshRepair:
     left: tuple[str, ...]
 
 
-def repair_mesh(parts: list[Part], textured: bool, shown: RawInstance) -> MeshRepair:
+def repair_mesh(parts: list[Part], textured: bool, shown: SourceInstance) -> MeshRepair:
     """Repair one mesh, unless that moved its surface too far.
 
     Parameters
@@ -40,7 +40,7 @@ def repair_mesh(parts: list[Part], textured: bool, shown: RawInstance) -> MeshRe
     parts : list of Part
     textured : bool
         A texture reads the mesh's uv, so that new vertices would lose it.
-    shown : RawInstance
+    shown : SourceInstance
         Its scale makes metres of the distance.
     """
     surface = join(parts)

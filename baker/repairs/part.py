@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Part:
 
     Attributes
     ----------
-    arrays : PrimitiveArrays
+    arrays : SourcePrimitive
         Positions, normals and triangles in numbers.
     column : dict of str to (V, B) uint8
         Every vertex attribute by its name in the file, as raw bytes of each vertex.
@@ -30,7 +30,7 @@ class Part:
         Why the primitive must stay as it is, as the end of a sentence; empty if it may be mended.
     """
 
-    arrays: PrimitiveArrays
+    arrays: SourcePrimitive
     column: dict[str, NDArray[np.uint8]]
     double_sided: bool = False
     blends: bool = False

@@ -18,7 +18,7 @@ from gltf_builder import quad_builder, write
 from baker.core.errors import ResourceError, SettingsError
 from baker.core.settings import make_settings
 from baker.distributed.connection import Cluster
-from baker.distributed.tile_executor import ClusterFarm
+from baker.distributed.tile_executor import DistributedTileExecutor
 from baker.pipeline.bake import bake
 
 pytest.importorskip("distributed")
@@ -122,7 +122,14 @@ def test_a_bake_is_spread_and_its_bytes_are_the_same(machines, alone):
     sent = []
     send = cluster.send
     cluster.send = lambda value: sent.append(value) or send(value)
-    same(alone, bake(ASSETS / "cornell.glb", settings=make_settings(SETTINGS), farm=ClusterFarm(cluster)))
+    same(
+        alone,
+        bake(
+            ASSETS / "cornell.glb",
+            settings=make_settings(SETTINGS),
+            executor=DistributedTileExecutor(cluster),
+        ),
+    )
     cluster.close()
     assert sum(isinstance(value, tuple) for value in sent) == 1, "the scene goes out once"
     assert len(sent) == 5, "and what each of four stages needs"
@@ -173,7 +180,12 @@ def test_a_worker_killed_in_the_middle_costs_its_tiles_only(machines, alone):
 
     cluster = Cluster(machines.address)
     settings = make_settings(SETTINGS)
-    result = bake(ASSETS / "cornell.glb", settings=settings, farm=ClusterFarm(cluster), progress=progress)
+    result = bake(
+        ASSETS / "cornell.glb",
+        settings=settings,
+        executor=DistributedTileExecutor(cluster),
+        progress=progress,
+    )
     assert victim.poll() is not None, "it was killed"
     assert len(cluster.workers()) == 1
     cluster.close()

@@ -31,9 +31,9 @@ def collision_hull(context: CheckContext) -> Iterator[RawFinding]:
     black. Known are Unreal's UCX_, UBX_, USP_, UCP_ and MCDCX_, Godot's -colonly, -convcolonly, -navmesh and
     -occonly, and names that end in collision, collider or hitbox.
     """
-    for instance in context.raw.instances:
+    for instance in context.source.instances:
         name = next(
-            (n for n in (instance.name, context.raw.meshes[instance.mesh].name) if _NAME.search(n)), None
+            (n for n in (instance.name, context.source.meshes[instance.mesh].name) if _NAME.search(n)), None
         )
         if name is not None and len(context.meshes[instance.mesh].good):
             place = Place(instance.name, instance.node)

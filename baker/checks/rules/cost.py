@@ -44,7 +44,7 @@ class Cost:
 def estimate_cost(context: CheckContext) -> Cost:
     """Estimate what a bake with the subject's settings takes."""
     settings, world = context.settings, context.world
-    area = np.bincount(world.instance, world.area, len(context.raw.instances))
+    area = np.bincount(world.instance, world.area, len(context.source.instances))
     page = settings.resolution**2
     texels, pages = FILLED * page, 1
     if settings.density is not None:
@@ -54,15 +54,15 @@ def estimate_cost(context: CheckContext) -> Cost:
             pages = settings.max_pages
             texels = FILLED * page * pages
     elif all(context.uv(m).valid for m, f in enumerate(context.meshes) if len(f.good)):
-        laid = sum(float(np.abs(context.uv(i.mesh).signed_area).sum()) for i in context.raw.instances)
+        laid = sum(float(np.abs(context.uv(i.mesh).signed_area).sum()) for i in context.source.instances)
         texels = min(laid, FILLED) * page
     n = round(texels)
     order = np.argsort(-area, kind="stable")[:MOST_SHARES]
     total = max(float(area.sum()), 1e-300)
     shares = [
         {
-            "object": context.raw.instances[k].name,
-            "node": context.raw.instances[k].node,
+            "object": context.source.instances[k].name,
+            "node": context.source.instances[k].node,
             "percent": round(100.0 * float(area[k]) / total, 2),
             "texels": round(n * float(area[k]) / total),
         }

@@ -62,7 +62,7 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
         if len(hidden):
             name, count = np.unique(holder[hidden], return_counts=True)
             most = int(name[count.argmax()])
-            around = f"'{context.raw.instances[most].name}'" if most != number else "another part of it"
+            around = f"'{context.source.instances[most].name}'" if most != number else "another part of it"
             others = "" if len(name) == 1 else f" and {len(name) - 1} more"
             yield _found(context, hidden, f"{{some}} inside of {around}{others}: nobody sees them")
         if len(turned):
@@ -71,7 +71,7 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
 
 def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFinding:
     world = context.world
-    instance = context.raw.instances[int(world.instance[rows[0]])]
+    instance = context.source.instances[int(world.instance[rows[0]])]
     facts = context.meshes[instance.mesh]
     faces = world.face[rows]
     area = float(world.area[rows].sum())
@@ -79,7 +79,7 @@ def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFind
     x, y, z = world.place_of(rows[0])
     return RawFinding(
         text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
-        Place(instance.name or context.raw.meshes[instance.mesh].name, instance.node),
+        Place(instance.name or context.source.meshes[instance.mesh].name, instance.node),
         len(rows),
         percent=100.0 * area / max(whole, 1e-300),
         primitive=facts.primitive_of(faces),

@@ -97,7 +97,7 @@ def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece:
                     return True
     if first_inside(corner, np.concatenate(others)) is not None:
         return True
-    for instance in context.raw.instances:
+    for instance in context.source.instances:
         if instance.mesh == mesh:
             inverse = np.linalg.pinv(instance.world_from_object)
             points = _things(context, instance.node)
@@ -112,7 +112,7 @@ def _things(context: CheckContext, node: int) -> NDArray[np.float64]:
     scene = context.scene
     points = list(light_positions(scene))
     points += [np.array(camera.position) for camera in scene.cameras]
-    for instance in context.raw.instances:
+    for instance in context.source.instances:
         facts = context.meshes[instance.mesh]
         if instance.node == node or not len(facts.good):
             continue

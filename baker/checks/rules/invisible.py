@@ -50,7 +50,7 @@ def invisible(context: CheckContext) -> Iterator[RawFinding]:
         used = [int(k) for k in np.unique(material)]
         if any(_seen(facts, k, context.scene.materials[k]) for k in used):
             continue
-        places = sum(instance.mesh == m for instance in context.raw.instances)
+        places = sum(instance.mesh == m for instance in context.source.instances)
         if places:
             yield RawFinding(_sentence([context.scene.materials[k] for k in used]), context.place(m), places)
 
@@ -99,7 +99,7 @@ def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
         np.ones(len(p.position), np.float32)
         if p.colour is None
         else np.clip(np.nan_to_num(p.colour[:, 3], nan=1.0), 0.0, 1.0).astype(np.float32)
-        for p in facts.raw.primitives
+        for p in facts.source.primitives
     ]
     return np.concatenate(parts)
 
@@ -110,7 +110,7 @@ def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
         np.nan_to_num(
             p.texcoord.get(texture.texcoord, np.zeros((len(p.position), 2))), nan=0.0, posinf=0.0, neginf=0.0
         )
-        for p in facts.raw.primitives
+        for p in facts.source.primitives
     ]
     return np.concatenate(parts).astype(np.float64) @ texture.transform[:, :2].T + texture.transform[:, 2]
 

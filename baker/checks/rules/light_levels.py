@@ -53,7 +53,7 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
         x, y, z = (float(v) for v in levels.position[worst] + context.scene.origin)
         most = levels.irradiance[worst]
         text = f"about {share:.3g}% of the surface gets more than 65504 lx, up to {most:.3g}"
-        at = context.raw.instances[context.world.instance[levels.triangle[worst]]]
+        at = context.source.instances[context.world.instance[levels.triangle[worst]]]
         yield RawFinding(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
 
 
@@ -86,7 +86,7 @@ def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
     Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
     their front only.
     """
-    if not context.glows or len(context.raw.instances) < 2:
+    if not context.glows or len(context.source.instances) < 2:
         return
     world = context.world
     random = np.random.default_rng(context.settings.seed)
@@ -105,7 +105,7 @@ def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
             hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
             met = met or bool((hit >= 0).any())
         if not met:
-            instance = context.raw.instances[k]
+            instance = context.source.instances[k]
             x, y, z = world.place_of(own[0])
             place = Place(instance.name, instance.node)
             yield RawFinding(

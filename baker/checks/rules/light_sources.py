@@ -118,7 +118,7 @@ def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
     materials = context.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
     position = light_positions(context.scene)
-    for instance in context.raw.instances:
+    for instance in context.source.instances:
         facts = context.meshes[instance.mesh]
         if not len(facts.good):
             continue
@@ -214,7 +214,7 @@ def _painted(context: CheckContext, material: int) -> float:
     """Return the brightest vertex colour on a material's surfaces, 1 where there are none."""
     brightest = []
     for facts in context.meshes:
-        for k, p in enumerate(facts.raw.primitives):
+        for k, p in enumerate(facts.source.primitives):
             if p.material == material and (facts.primitive[facts.good] == k).any():
                 if p.colour is None:
                     return 1.0

@@ -12,15 +12,15 @@ from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.topology.weld import number_rows
 
 # Deviation of a normal's length from 1 that is more than a byte's rounding.
 UNIT_SLACK = 0.02
 
 
-def _parts(facts: MeshFacts) -> Iterator[tuple[int, PrimitiveArrays]]:
-    yield from enumerate(facts.raw.primitives)
+def _parts(facts: MeshFacts) -> Iterator[tuple[int, SourcePrimitive]]:
+    yield from enumerate(facts.source.primitives)
 
 
 def _faces_at(facts: MeshFacts, part: int, vertex: NDArray[np.bool_]) -> NDArray[np.int64]:

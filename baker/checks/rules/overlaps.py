@@ -123,11 +123,11 @@ def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
     mine = np.flatnonzero(partner >= 0)
     if not len(mine):
         return
-    n = len(context.raw.instances)
+    n = len(context.source.instances)
     one, two = world.instance[mine], world.instance[partner[mine]]
     key = np.minimum(one, two) * n + np.maximum(one, two)
     for k in np.unique(key):
-        a, b = (context.raw.instances[int(v)] for v in divmod(int(k), n))
+        a, b = (context.source.instances[int(v)] for v in divmod(int(k), n))
         own = mine[(key == k) & (one == int(k) // n)]
         rest = mine[(key == k) & (one != int(k) // n)]
         chosen = own if len(own) else rest
@@ -153,7 +153,7 @@ def _partners(context: CheckContext) -> NDArray[np.int64]:
     """Return for each world triangle one of another instance that it overlaps in its plane, or -1."""
     world = context.world
     partner = np.full(len(world.triangle), -1, np.int64)
-    if len(context.raw.instances) < 2 or not len(world.triangle):
+    if len(context.source.instances) < 2 or not len(world.triangle):
         return partner
     tolerance = min(max(COPLANAR * context.diagonal, LEAST), MOST)
     corner = world.position[world.triangle[:, 0]].astype(np.float64)

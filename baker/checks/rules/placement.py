@@ -21,11 +21,11 @@ SMALLEST, LARGEST = 0.05, 5000.0
 def _stretches(
     context: CheckContext,
 ) -> Iterator[tuple[Place, np.ndarray, float, tuple[float, float, float]]]:
-    for instance in context.raw.instances:
+    for instance in context.source.instances:
         matrix = instance.world_from_object[:3, :3]
         stretch = np.linalg.svd(matrix, compute_uv=False)
         x, y, z = (float(v) for v in instance.world_from_object[:3, 3])
-        place = Place(instance.name or context.raw.meshes[instance.mesh].name, instance.node)
+        place = Place(instance.name or context.source.meshes[instance.mesh].name, instance.node)
         yield place, stretch, float(np.linalg.det(matrix)), (x, y, z)
 
 

@@ -27,7 +27,7 @@ def black_colours(context: CheckContext) -> Iterator[RawFinding]:
     layers that an engine's shader uses for something else (wind, wetness) or that were never painted.
     """
     for m, facts in enumerate(context.meshes):
-        for k, primitive in enumerate(facts.raw.primitives):
+        for k, primitive in enumerate(facts.source.primitives):
             if primitive.colour is None:
                 continue
             faces = facts.good[facts.primitive[facts.good] == k]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import SceneWarning
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.io.gltf.accessor import FLOAT, component_type, read_accessor, read_indices
 from baker.io.gltf.accessor_bytes import fault_of, gather_rows
 from baker.io.gltf.document import GltfDocument
@@ -24,7 +24,7 @@ _DRACO = "KHR_draco_mesh_compression"
 
 def read_primitives(
     document: GltfDocument, mesh: JsonObject, name: str, materials: MaterialReader, *, lenient: bool = False
-) -> tuple[list[PrimitiveArrays], list[SceneWarning]]:
+) -> tuple[list[SourcePrimitive], list[SceneWarning]]:
     """Return the triangle primitives of a mesh; points and lines are left out with a warning.
 
     Parameters
@@ -43,7 +43,7 @@ def read_primitives(
     InputError
         For a missing POSITION, arrays of different length, or an index out of range.
     """
-    arrays: list[PrimitiveArrays] = []
+    arrays: list[SourcePrimitive] = []
     warnings: list[SceneWarning] = []
     skipped = 0
     for i, primitive in enumerate(mesh.children("primitives")):
@@ -75,7 +75,7 @@ def read_primitives(
     return arrays, warnings
 
 
-def _corner_count(document: GltfDocument, primitive: JsonObject, arrays: PrimitiveArrays) -> int:
+def _corner_count(document: GltfDocument, primitive: JsonObject, arrays: SourcePrimitive) -> int:
     if "indices" not in primitive:
         return len(arrays.position)
     accessors = document.root.children("accessors")
@@ -89,7 +89,7 @@ def _primitive(
     mode: int,
     materials: MaterialReader,
     lenient: bool,
-) -> PrimitiveArrays:
+) -> SourcePrimitive:
     accessors = document.root.children("accessors")
     attributes = primitive.child("attributes")
     _refuse_draco(primitive, attributes, accessors)
@@ -131,7 +131,7 @@ def _primitive(
     colour = optional("COLOR_0", ("VEC3", "VEC4"))
     if colour is not None:
         colour = _colour(document, attributes, colour)
-    return PrimitiveArrays(
+    return SourcePrimitive(
         index=number,
         material=material,
         position=position,
@@ -158,7 +158,7 @@ def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) ->
 
 
 def _unreadable(
-    document: GltfDocument, primitive: JsonObject, arrays: PrimitiveArrays, mesh: str
+    document: GltfDocument, primitive: JsonObject, arrays: SourcePrimitive, mesh: str
 ) -> list[SceneWarning]:
     """Return a warning for each vertex attribute that cannot be read and that no bake needs."""
     root, buffers, n_vertices = document.root.value, document.buffers, len(arrays.position)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.io.gltf.accessor import FLOAT, component_type, read_accessor
 from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.document import GltfDocument
@@ -36,14 +36,14 @@ class Poser:
         self._parent: dict[int, int] | None = None
 
     def pose(
-        self, mesh: JsonObject, arrays: Sequence[PrimitiveArrays], node: Placed
-    ) -> tuple[list[PrimitiveArrays], NDArray[np.float64]]:
+        self, mesh: JsonObject, arrays: Sequence[SourcePrimitive], node: Placed
+    ) -> tuple[list[SourcePrimitive], NDArray[np.float64]]:
         """Return a mesh's primitives in their pose and the (4, 4) float64 matrix that places them.
 
         Parameters
         ----------
         mesh : JsonObject
-        arrays : sequence of PrimitiveArrays
+        arrays : sequence of SourcePrimitive
             As `read_primitives` returned them.
         node : Placed
             Names the skin, and places primitives without joints.
@@ -150,7 +150,7 @@ class Poser:
 
 
 def _moved(
-    part: PrimitiveArrays, blend: NDArray[np.float64]
+    part: SourcePrimitive, blend: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32] | None]:
     """Return positions in the world, (V, 3) float64, and normals, (V, 3) float32 or None."""
     with np.errstate(over="ignore", invalid="ignore"):

@@ -10,19 +10,19 @@ import numpy as np
 
 from baker.core.errors import InputError
 from baker.core.scene import Scene
-from baker.core.source_mesh import PrimitiveArrays, SourceScene
+from baker.core.source_mesh import SourcePrimitive, SourceScene
 from baker.io.gltf.build_document import material_json
 from baker.io.gltf.packer import Json, Packer
 
 
-def raw_glb(scene: Scene, raw: SourceScene) -> bytes:
+def source_glb(scene: Scene, source: SourceScene) -> bytes:
     """Return a GLB of every mesh with triangles, without lightmap uv.
 
     Parameters
     ----------
     scene : Scene
         Its materials are used.
-    raw : SourceScene
+    source : SourceScene
 
     Raises
     ------
@@ -35,16 +35,16 @@ def raw_glb(scene: Scene, raw: SourceScene) -> bytes:
     images: dict[int, int] = {}
     if scene.materials:
         document["materials"] = [material_json(packer, m, images, extensions) for m in scene.materials]
-    filled = [k for k, mesh in enumerate(raw.meshes) if any(len(p.triangle) for p in mesh.primitives)]
+    filled = [k for k, mesh in enumerate(source.meshes) if any(len(p.triangle) for p in mesh.primitives)]
     document["meshes"] = [
         {
-            "name": raw.meshes[k].name,
-            "primitives": [_primitive(packer, p) for p in raw.meshes[k].primitives if len(p.triangle)],
+            "name": source.meshes[k].name,
+            "primitives": [_primitive(packer, p) for p in source.meshes[k].primitives if len(p.triangle)],
         }
         for k in filled
     ]
     nodes: list[Json] = []
-    for instance in raw.instances:
+    for instance in source.instances:
         if instance.mesh not in filled:
             continue
         node: Json = {"name": instance.name, "mesh": filled.index(instance.mesh)}
@@ -61,7 +61,7 @@ def raw_glb(scene: Scene, raw: SourceScene) -> bytes:
     return packer.glb()
 
 
-def _primitive(packer: Packer, arrays: PrimitiveArrays) -> Json:
+def _primitive(packer: Packer, arrays: SourcePrimitive) -> Json:
     attributes = {"POSITION": packer.add_floats(arrays.position, bounds=True)}
     if arrays.normal is not None:
         attributes["NORMAL"] = packer.add_floats(arrays.normal)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
-from baker.core.source_mesh import RawInstance, RawMesh, SourceScene
+from baker.core.source_mesh import SourceInstance, SourceMesh, SourceScene
 from baker.io.gltf.camera import read_cameras
 from baker.io.gltf.document import GltfDocument, open_document
 from baker.io.gltf.instancing import refuse_broken, spread_instances
@@ -45,14 +45,14 @@ class _Built:
     ----------
     number : int, in the order of reading
     mesh : int or None, index of the mesh that is baked
-    raw : RawMesh
+    source : SourceMesh
     extent : (3,) float64, the largest coordinate of that mesh along each axis
     place : (4, 4) float64 or None, world from the posed mesh
     """
 
     number: int
     mesh: int | None
-    raw: RawMesh
+    source: SourceMesh
     extent: NDArray[np.float64]
     place: NDArray[np.float64] | None
 
@@ -80,7 +80,7 @@ def import_gltf(source: SceneFile) -> Scene:
     spread_instances(document)
     number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
     reader = MaterialReader(document, reflections=source.reflections)
-    meshes, instances, raw = _instances(document, placed, reader, warnings, lenient=source.lenient)
+    meshes, instances, source_scene = _instances(document, placed, reader, warnings, lenient=source.lenient)
     lights = _lights(placed, document, warnings, lenient=source.lenient)
     cameras = read_cameras(placed, document, warnings)
     warnings += [*reader.warnings, *unneeded_faults(document, reader.told)]
@@ -110,7 +110,7 @@ def import_gltf(source: SceneFile) -> Scene:
         ),
         sha256=document.sha256,
         cameras=tuple(cameras),
-        raw=raw,
+        source_scene=source_scene,
     )
 
 
@@ -149,7 +149,7 @@ def _instances(
     built: dict[_Key, _Built] = {}
     meshes: list[Mesh] = []
     instances: list[Instance] = []
-    shown: list[RawInstance] = []
+    shown: list[SourceInstance] = []
     for node in placed:
         if "mesh" not in node.json:
             continue
@@ -169,9 +169,9 @@ def _instances(
                 warnings.append(
                     SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
                 )
-            raw = RawMesh(name, tuple(arrays) if lenient else ())
+            source_mesh = SourceMesh(name, tuple(arrays) if lenient else ())
             extent = np.zeros(3) if mesh is None else np.abs(mesh.position).max(axis=0).astype(np.float64)
-            built[key] = _Built(len(built), None if mesh is None else len(meshes), raw, extent, place)
+            built[key] = _Built(len(built), None if mesh is None else len(meshes), source_mesh, extent, place)
             meshes += [] if mesh is None else [mesh]
         made = built[key]
         label = node.json.string("name", name)
@@ -179,10 +179,10 @@ def _instances(
             node = Placed(node.index, node.json, made.place)
             message = "the mesh is skinned; it is baked in the pose that its joints have in the file"
             warnings.append(SceneWarning("skinned", message, label))
-        shown.append(RawInstance(node.index, label, made.number, node.matrix))
+        shown.append(SourceInstance(node.index, label, made.number, node.matrix))
         if made.mesh is not None and _stands(node, made.extent, label, warnings):
             instances.append(Instance(node.index, label, made.mesh, node.matrix))
-    kept = SourceScene(tuple(made.raw for made in built.values()), tuple(shown)) if lenient else None
+    kept = SourceScene(tuple(made.source for made in built.values()), tuple(shown)) if lenient else None
     return *_drop_unused(meshes, instances), kept
 
 

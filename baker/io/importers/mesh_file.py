@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
 from baker.core.scene import Material, Scene
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
@@ -60,7 +60,7 @@ def import_mesh_file(source: SceneFile) -> Scene:
                 f"face index {worst} is out of range: there are {len(position)} vertices", file=file
             )
         primitives.append(
-            PrimitiveArrays(
+            SourcePrimitive(
                 index=number,
                 material=0,
                 position=to_world(position, source.up, source.scale),

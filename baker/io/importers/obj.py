@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import IndexRangeError, InputError
 from baker.core.scene import Material, Scene, SceneWarning
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.io.images import decode_image
 from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.mtl import read_mtl
@@ -60,7 +60,7 @@ def import_obj(source: SceneFile) -> Scene:
         texcoord=np.array(attributes.texcoords, np.float64).reshape(-1, 2),
         colour=_colours(attributes, len(position)),
     )
-    groups: list[tuple[str, list[PrimitiveArrays]]] = []
+    groups: list[tuple[str, list[SourcePrimitive]]] = []
     for number, shape in enumerate(reader.GetShapes()):
         name = shape.name or f"shape_{number}"
         groups.append((name, _primitives(shape.mesh, corners, len(materials))))
@@ -220,7 +220,7 @@ class _Corners:
         self.colour = colour
 
 
-def _primitives(mesh: Any, corners: _Corners, grey: int) -> list[PrimitiveArrays]:
+def _primitives(mesh: Any, corners: _Corners, grey: int) -> list[SourcePrimitive]:
     """Split a shape by material and give each part its own vertices."""
     vertex, normal, texcoord = (
         np.array(values, np.int64)
@@ -252,7 +252,7 @@ def _primitive(
     normal: NDArray[np.int64],
     texcoord: NDArray[np.int64],
     corners: _Corners,
-) -> PrimitiveArrays:
+) -> SourcePrimitive:
     # One vertex for each combination of indices that occurs; two steps keep the key within 64 bits.
     _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
     _, row, index = np.unique(
@@ -267,7 +267,7 @@ def _primitive(
     if (t >= 0).any():
         uv[0] = np.zeros((len(t), 2), np.float32)
         uv[0][t >= 0] = corners.texcoord[t[t >= 0]]
-    return PrimitiveArrays(
+    return SourcePrimitive(
         index=number,
         material=material,
         position=corners.position[v],

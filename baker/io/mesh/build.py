@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.scene import Material, Mesh, SceneWarning
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
 
 
 def build_mesh(
-    name: str, primitives: Sequence[PrimitiveArrays], materials: Sequence[Material]
+    name: str, primitives: Sequence[SourcePrimitive], materials: Sequence[Material]
 ) -> tuple[Mesh | None, list[SceneWarning]]:
     """Join primitives to a mesh that holds only good triangles.
 
     Parameters
     ----------
     name : str
-    primitives : sequence of PrimitiveArrays
+    primitives : sequence of SourcePrimitive
     materials : sequence of Material
         The scene's; says which are double-sided and which texture coordinates they read.
 
@@ -71,7 +71,7 @@ def build_mesh(
 
 def _good_triangles(
     name: str,
-    primitives: Sequence[PrimitiveArrays],
+    primitives: Sequence[SourcePrimitive],
     materials: Sequence[Material],
     warnings: list[SceneWarning],
 ) -> list[NDArray[np.int64]]:
@@ -116,7 +116,7 @@ def _good_triangles(
 class _Part:
     """The good triangles of a primitive with the rows of its arrays that they use."""
 
-    def __init__(self, source: PrimitiveArrays, triangle: NDArray[np.int64]) -> None:
+    def __init__(self, source: SourcePrimitive, triangle: NDArray[np.int64]) -> None:
         self.source = source
         if source.normal is None:
             # Flat normals differ at each corner, so nothing is shared (glTF 2.0, section 3.7.2.1).

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
-from baker.core.source_mesh import PrimitiveArrays, RawInstance, RawMesh, SourceScene
+from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 from baker.io.load import SceneFile
 from baker.io.mesh.build import build_mesh
 
@@ -33,7 +33,7 @@ def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.f
 
 def scene_of_meshes(
     source: SceneFile,
-    groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]],
+    groups: Sequence[tuple[str, Sequence[SourcePrimitive]]],
     materials: Sequence[Material],
     warnings: Sequence[SceneWarning],
     sha256: str,
@@ -72,11 +72,11 @@ def scene_of_meshes(
         instances=tuple(instances),
         warnings=tuple(found),
         sha256=sha256,
-        raw=_raw(groups) if source.lenient else None,
+        source_scene=_source_scene(groups) if source.lenient else None,
     )
 
 
-def _raw(groups: Sequence[tuple[str, Sequence[PrimitiveArrays]]]) -> SourceScene:
-    meshes = tuple(RawMesh(name, tuple(primitives)) for name, primitives in groups)
-    stand = tuple(RawInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
+def _source_scene(groups: Sequence[tuple[str, Sequence[SourcePrimitive]]]) -> SourceScene:
+    meshes = tuple(SourceMesh(name, tuple(primitives)) for name, primitives in groups)
+    stand = tuple(SourceInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
     return SourceScene(meshes, stand)

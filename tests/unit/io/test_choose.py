@@ -66,9 +66,9 @@ def test_nothing_left_is_refused(level):
 
 
 def test_the_checker_sees_only_what_is_left(level):
-    raw = load_for_bake(level, make_settings({"exclude": "House"}), lenient=True).raw
-    assert [m.name for m in raw.meshes] == ["Floor mesh", "Wall mesh"]
-    assert [(i.name, i.mesh) for i in raw.instances] == [("Floor", 0), ("Wall", 1)]
+    source = load_for_bake(level, make_settings({"exclude": "House"}), lenient=True).source_scene
+    assert [m.name for m in source.meshes] == ["Floor mesh", "Wall mesh"]
+    assert [(i.name, i.mesh) for i in source.instances] == [("Floor", 0), ("Wall", 1)]
 
 
 def test_objects_of_other_formats_are_chosen_by_name(tmp_path):

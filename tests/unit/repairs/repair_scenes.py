@@ -8,7 +8,7 @@ import numpy as np
 from glb_reader import Glb
 from gltf_builder import GltfBuilder
 
-from baker.core.source_mesh import PrimitiveArrays
+from baker.core.source_mesh import SourcePrimitive
 from baker.io.png import encode_png
 from baker.repairs.part import Part
 
@@ -61,7 +61,7 @@ def part(position, triangle, normal=None, *, stitched=False, uv=None, **members)
     if uv is not None:
         column["TEXCOORD_0"], texcoord[0] = bytes_of(uv), uv
     column |= members.pop("column", {})
-    arrays = PrimitiveArrays(0, 0, position, triangle, normal, texcoord, stitched=stitched)
+    arrays = SourcePrimitive(0, 0, position, triangle, normal, texcoord, stitched=stitched)
     return Part(arrays, column, **members)
 
 
