@@ -22,7 +22,15 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scram
 from baker.kernels.surface import N_POINTS
 from baker.pipeline.world import World
 from baker.radiosity.point_cache import points_of
-from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR, call_embree_with, new_caster, trace_lanes
+from baker.trace.packets import (
+    DIR_X,
+    ORG_X,
+    PACKET_WIDTH,
+    TFAR,
+    call_embree_with,
+    new_packet_buffers,
+    trace_lanes,
+)
 
 # Rows of a packet that hold the ray; the hit needs only its geometry number reset.
 RAY_ROWS = 12
@@ -48,7 +56,7 @@ def _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, cor
     for lane in range(lanes):
         i = group + lane
         u = texel_scramble(net[s, 0], seeds[lane], shared)
-        v = texel_scramble(net[s, 1], seeds[LANES + lane], shared)
+        v = texel_scramble(net[s, 1], seeds[PACKET_WIDTH + lane], shared)
         m = min(np.searchsorted(cumulative, u, side="right"), len(cumulative) - 1)
         low = cumulative[m - 1] if m else np.float32(0.0)
         u = min(max((u - low) / (cumulative[m] - low), np.float32(0.0)), np.float32(1.0))
@@ -59,65 +67,71 @@ def _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, cor
             d[c] = corner[m, c] + b1 * edge1 + b2 * edge2 - origin[i, k, c]
             facing += d[c] * normal[i, k, c]
             emitted -= d[c] * corner[m, 9 + c]
-            rays[(ORG_X + c) * LANES + lane] = origin[i, k, c]
-            rays[(DIR_X + c) * LANES + lane] = d[c]
-        rays[TFAR * LANES + lane] = np.float32(0.9999)
+            rays[(ORG_X + c) * PACKET_WIDTH + lane] = origin[i, k, c]
+            rays[(DIR_X + c) * PACKET_WIDTH + lane] = d[c]
+        rays[TFAR * PACKET_WIDTH + lane] = np.float32(0.9999)
         on[lane] = -1 if facing > 0.0 and emitted > 0.0 else 0
 
 
 @njit(cache=True, nogil=True)
-def _made(function, caster, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
+def _made(function, buffers, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
     """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
-    width, scene = caster.width, caster.scene
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    width, scene = buffers.width, buffers.scene
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     seeds, frame = new_seeds(), new_frame()
     mixed = np.uint32(0)
-    for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = min(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
-            trace_lanes(function, scene, width, caster.query, on, rays, spare_on, spare)
-            mixed ^= words[TFAR * LANES]
+            trace_lanes(function, scene, width, buffers.query, on, rays, spare_on, spare)
+            mixed ^= words[TFAR * PACKET_WIDTH]
     return mixed
 
 
 @njit(cache=True, nogil=True)
-def _store(caster, origin, normal, begin, net, shared, far, corner, cumulative, bank, lanes_on):  # type: ignore[no-untyped-def]
+def _store(buffers, origin, normal, begin, net, shared, far, corner, cumulative, bank, lanes_on):  # type: ignore[no-untyped-def]
     """Write the packets of a tile to `bank` (packets, 12 * width) and their lanes to `lanes_on`.
 
     With emitters in `corner` the rays go there, else over the hemisphere.
     """
-    width = caster.width
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    width = buffers.width
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     seeds, frame = new_seeds(), new_frame()
     packet = 0
-    for group in range(0, len(origin), LANES):
-        lanes = min(LANES, len(origin) - group)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = min(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             if len(corner):
                 _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative)
             else:
                 _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
-            for first in range(0, LANES, width):
+            for first in range(0, PACKET_WIDTH, width):
                 for row in range(RAY_ROWS):
                     for lane in range(width):
-                        bank[packet, row * width + lane] = rays[row * LANES + first + lane]
+                        bank[packet, row * width + lane] = rays[row * PACKET_WIDTH + first + lane]
                 for lane in range(width):
                     lanes_on[packet, lane] = on[first + lane]
                 packet += 1
 
 
 @njit(cache=True, nogil=True)
-def _ready(function, caster, bank, lanes_on):  # type: ignore[no-untyped-def]
+def _ready(function, buffers, bank, lanes_on):  # type: ignore[no-untyped-def]
     """Trace stored packets; return a number that depends on them."""
-    width, scene, valid, floats, words = caster.width, caster.scene, caster.valid, caster.floats, caster.words
+    width, scene, valid, floats, words = (
+        buffers.width,
+        buffers.scene,
+        buffers.valid,
+        buffers.floats,
+        buffers.words,
+    )
     mixed = np.uint32(0)
     for packet in range(len(bank)):
         some = np.int32(0)
@@ -129,7 +143,7 @@ def _ready(function, caster, bank, lanes_on):  # type: ignore[no-untyped-def]
             continue
         for j in range(RAY_ROWS * width):
             floats[j] = bank[packet, j]
-        call_embree_with(function, valid, scene, floats, caster.query)
+        call_embree_with(function, valid, scene, floats, buffers.query)
         mixed ^= words[GEOM_ROW * width]
     return mixed
 
@@ -194,12 +208,12 @@ class BareRays:
     ) -> _Tile:
         origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
         width, n_samples = self._tracer.width, len(self._net)
-        packets = -(-(end - begin) // LANES) * (LANES // width) * n_samples
+        packets = -(-(end - begin) // PACKET_WIDTH) * (PACKET_WIDTH // width) * n_samples
         bank = np.zeros((packets, RAY_ROWS * width), np.float32)
         lanes_on = np.zeros((packets, width), np.int32)
-        caster = new_caster(self._tracer)
+        buffers = new_packet_buffers(self._tracer)
         _store(
-            caster, origin, normal, begin, self._net, self._shared, self._far, corner, cumulative,
+            buffers, origin, normal, begin, self._net, self._shared, self._far, corner, cumulative,
             bank, lanes_on,
         )  # fmt: skip
         return _Tile(begin, origin, normal, bank, lanes_on, (end - begin) * n_samples)
@@ -217,14 +231,14 @@ class BareRays:
         local = threading.local()
 
         def work(begin: int, end: int) -> None:
-            if not hasattr(local, "caster"):
-                local.caster = new_caster(self._tracer)
+            if not hasattr(local, "buffers"):
+                local.buffers = new_packet_buffers(self._tracer)
             for tile in self._tiles[begin:end]:
                 if ready:
-                    _ready(self._function, local.caster, tile.bank, tile.lanes_on)
+                    _ready(self._function, local.buffers, tile.bank, tile.lanes_on)
                 else:
                     _made(
-                        self._function, local.caster, tile.origin, tile.normal, tile.begin,
+                        self._function, local.buffers, tile.origin, tile.normal, tile.begin,
                         self._net, self._shared, self._far,
                     )  # fmt: skip
 

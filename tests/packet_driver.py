@@ -8,13 +8,23 @@ import numpy as np
 from numba import njit
 
 from baker.trace.embree import Tracer
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, PRIM_ID, TFAR, TNEAR, new_caster, set_ray, trace
+from baker.trace.packets import (
+    GEOM_ID,
+    HIT_U,
+    HIT_V,
+    PRIM_ID,
+    TFAR,
+    TNEAR,
+    new_packet_buffers,
+    set_ray,
+    trace,
+)
 
 
 @njit(nogil=True)
-def _cast(occluded, caster, origin, direction, near, far, valid_ray, geom, prim, u, v, reach):  # type: ignore[no-untyped-def]
-    width, valid, floats, words = caster.width, caster.valid, caster.floats, caster.words
-    function = caster.occluded if occluded else caster.intersect
+def _cast(occluded, buffers, origin, direction, near, far, valid_ray, geom, prim, u, v, reach):  # type: ignore[no-untyped-def]
+    width, valid, floats, words = buffers.width, buffers.valid, buffers.floats, buffers.words
+    function = buffers.occluded if occluded else buffers.intersect
     for group in range(0, len(origin), width):
         lanes = min(width, len(origin) - group)
         for lane in range(width):
@@ -27,7 +37,7 @@ def _cast(occluded, caster, origin, direction, near, far, valid_ray, geom, prim,
                 )  # fmt: skip
                 floats[TNEAR * width + lane] = near[i]
                 valid[lane] = -1 if valid_ray[i] else 0
-        trace(function, caster.scene, valid, floats)
+        trace(function, buffers.scene, valid, floats)
         for lane in range(lanes):
             i = group + lane
             geom[i] = words[GEOM_ID * width + lane]
@@ -54,6 +64,6 @@ def cast(rays, origin, direction, near=0.0, far=1e30, *, width=0, valid=True, oc
     geom, prim = np.zeros(n, np.uint32), np.zeros(n, np.uint32)
     u, v, reach = (np.zeros(n, np.float32) for _ in range(3))
     valid = np.broadcast_to(np.asarray(valid, bool), n).copy()
-    caster = new_caster(tracer)
-    _cast(occluded, caster, origin, direction, near, far, valid, geom, prim, u, v, reach)
+    buffers = new_packet_buffers(tracer)
+    _cast(occluded, buffers, origin, direction, near, far, valid, geom, prim, u, v, reach)
     return geom.astype(np.int32), prim.astype(np.int32), u, v, reach

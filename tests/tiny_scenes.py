@@ -14,9 +14,9 @@ from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.lights.emissive import build_emitters
 from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, no_sides
 from baker.radiosity.texels import build_texels
-from baker.radiosity.triangle_lookup import build_hit_table
+from baker.radiosity.triangle_lookup import build_triangle_lookup
 from baker.shading.materials import resolve_materials
-from baker.shading.scene_solids import scene_solids, tell_tales
+from baker.shading.scene_solids import hit_kinds, scene_solids
 from baker.trace.embree import RayScene
 
 
@@ -54,7 +54,7 @@ class World:
     def tells(self):
         """What triangles tell rays that come from inside of something."""
         solids = scene_solids(self.scene, self.geometry, self.shading)
-        return tell_tales(self.geometry, self.shading, solids)
+        return hit_kinds(self.geometry, self.shading, solids)
 
 
 def seen_patches(texels, patch):
@@ -138,7 +138,7 @@ def world_of(scene, atlas):
     texels, surface = build_texels(geometry, shading, atlas, seed=0, threads=1, progress=silent)
     rays = RayScene(geometry.position, geometry.triangle, threads=1)
     emitters = build_emitters(geometry, shading)
-    table = build_hit_table(geometry, texels, emitters)
+    table = build_triangle_lookup(geometry, texels, emitters)
     return World(scene, atlas, geometry, shading, texels, surface, rays, emitters, table)
 
 

@@ -140,14 +140,14 @@ def cast(
     from baker.core.parallel import run_tiles
     from baker.core.progress import silent
     from baker.kernels.cast import first_hits
-    from baker.trace.packets import new_caster
+    from baker.trace.packets import new_packet_buffers
 
     n = len(origin)
     triangle, distance = np.full(n, -1, np.int32), np.zeros(n, np.float32)
     a, b, c, d = (np.ascontiguousarray(value, np.float32) for value in (origin, way, near, far))
 
     def work(i: int, j: int) -> None:
-        first_hits(new_caster(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
+        first_hits(new_packet_buffers(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
 
     run_tiles(n, _TILE, work, threads=threads, stage="rays", progress=silent)
     return triangle, distance

@@ -17,7 +17,7 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.cast import first_hits
 from baker.trace.embree import RayScene
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 # How far off a surface may be, as a share of the diagonal of the box around the object.
 _REACH = 1.0e-3
@@ -185,7 +185,13 @@ def _near(
         for _ in range(_LAYERS):
             hit, distance = np.full(len(going), -1, np.int32), np.zeros(len(going), np.float32)
             first_hits(
-                new_caster(rays.tracer), origin[going], way[going], near[going], far[going], hit, distance
+                new_packet_buffers(rays.tracer),
+                origin[going],
+                way[going],
+                near[going],
+                far[going],
+                hit,
+                distance,
             )
             going, hit, distance = going[hit >= 0], hit[hit >= 0], distance[hit >= 0]
             off = np.abs(distance.astype(np.float64) - reach)

@@ -10,14 +10,14 @@ from baker.trace.packets import GEOM_ID, NO_HIT, PRIM_ID, TFAR, TNEAR, set_ray, 
 
 
 @njit(cache=True, nogil=True)
-def first_hits(caster, origin, way, near, far, triangle, distance):
+def first_hits(buffers, origin, way, near, far, triangle, distance):
     """Trace n rays.
 
     origin, way : (n, 3) float32; near, far : (n,) float32, in units of the direction's length
     triangle : (n,) int32 output, -1 where nothing is hit; distance : (n,) float32 output
     """
-    width, scene, intersect = caster.width, caster.scene, caster.intersect
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    width, scene, intersect = buffers.width, buffers.scene, buffers.intersect
+    valid, floats, words = buffers.valid, buffers.floats, buffers.words
     for group in range(0, len(origin), width):
         for lane in range(width):
             i = group + lane

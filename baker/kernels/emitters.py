@@ -63,7 +63,7 @@ class Emitters(NamedTuple):
     root: NDArray[np.int32]
 
 
-class Lamps(NamedTuple):
+class TileEmitters(NamedTuple):
     """Emitters as a tile of texels samples them: `Emitters` with the chances of its clusters.
 
     row, triangle, first, node: see `Emitters`; chance, cumulative (C,) float32; apart (C,) uint8, 1 for
@@ -79,14 +79,16 @@ class Lamps(NamedTuple):
     apart: NDArray[np.uint8]
 
 
-def lamps_for(emitters: Emitters, origin: NDArray[np.float32]) -> Lamps:
+def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitters:
     """Return the emitters with the chances that points (m, w, 3) float32, metres, give their clusters."""
     chance = np.zeros(len(emitters.power), np.float32)
     cumulative = np.zeros_like(chance)
     if len(chance) and len(origin):
         cluster_chances(emitters, origin, chance, cumulative)
     apart = np.zeros(len(chance), np.uint8)
-    return Lamps(emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node, apart)
+    return TileEmitters(
+        emitters.row, emitters.triangle, emitters.first, chance, cumulative, emitters.node, apart
+    )
 
 
 def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:

@@ -12,14 +12,14 @@ import numpy as np
 
 from baker.kernels.sampling import cosine_direction, hash_combine, tangent_frame, texel_scramble
 from baker.trace.jit import inner, scratch
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, LANES, ORG_X, TFAR
+from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, ORG_X, PACKET_WIDTH, TFAR
 
 FAR = np.float32(1.0e30)
 # Rows of a frame: tangent, bitangent, normal (three each).
 FRAME_ROWS = 9
 # Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
-new_seeds = scratch((2 * LANES,), np.uint32)
-new_frame = scratch((FRAME_ROWS * LANES,), np.float32)
+new_seeds = scratch((2 * PACKET_WIDTH,), np.uint32)
+new_frame = scratch((FRAME_ROWS * PACKET_WIDTH,), np.float32)
 
 
 @inner
@@ -27,7 +27,7 @@ def lane_seeds(first, lanes, salt, seeds):
     """Write the two scramble seeds of items first to first + lanes to `seeds` (2 * 16,) uint32."""
     for lane in range(lanes):
         seeds[lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt))
-        seeds[LANES + lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt + 1))
+        seeds[PACKET_WIDTH + lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt + 1))
 
 
 @inner
@@ -38,14 +38,18 @@ def load_frames(rays, frame, origin, normal, group, lanes, k):
     """
     for lane in range(lanes):
         for a in range(3):
-            rays[(ORG_X + a) * LANES + lane] = origin[group + lane, k, a]
-            frame[(6 + a) * LANES + lane] = normal[group + lane, k, a]
-    for lane in range(LANES):
+            rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[group + lane, k, a]
+            frame[(6 + a) * PACKET_WIDTH + lane] = normal[group + lane, k, a]
+    for lane in range(PACKET_WIDTH):
         tx, ty, tz, bx, by, bz = tangent_frame(
-            frame[6 * LANES + lane], frame[7 * LANES + lane], frame[8 * LANES + lane]
+            frame[6 * PACKET_WIDTH + lane], frame[7 * PACKET_WIDTH + lane], frame[8 * PACKET_WIDTH + lane]
         )
-        frame[lane], frame[LANES + lane], frame[2 * LANES + lane] = tx, ty, tz
-        frame[3 * LANES + lane], frame[4 * LANES + lane], frame[5 * LANES + lane] = bx, by, bz
+        frame[lane], frame[PACKET_WIDTH + lane], frame[2 * PACKET_WIDTH + lane] = tx, ty, tz
+        frame[3 * PACKET_WIDTH + lane], frame[4 * PACKET_WIDTH + lane], frame[5 * PACKET_WIDTH + lane] = (
+            bx,
+            by,
+            bz,
+        )
 
 
 @inner
@@ -55,19 +59,23 @@ def aim_lanes(rays, words, frame, seeds, first, second, shared, far):
     first, second : uint32, the sample's bit-reversed Sobol numbers; shared : uint32, see `sampling`
     far : float32, reach in metres
     """
-    for lane in range(LANES):
+    for lane in range(PACKET_WIDTH):
         u = texel_scramble(first, seeds[lane], shared)
-        v = texel_scramble(second, seeds[LANES + lane], shared)
+        v = texel_scramble(second, seeds[PACKET_WIDTH + lane], shared)
         a, b, c = cosine_direction(u, v)
-        rays[DIR_X * LANES + lane] = (
-            a * frame[lane] + b * frame[3 * LANES + lane] + c * frame[6 * LANES + lane]
+        rays[DIR_X * PACKET_WIDTH + lane] = (
+            a * frame[lane] + b * frame[3 * PACKET_WIDTH + lane] + c * frame[6 * PACKET_WIDTH + lane]
         )
-        rays[DIR_Y * LANES + lane] = (
-            a * frame[LANES + lane] + b * frame[4 * LANES + lane] + c * frame[7 * LANES + lane]
+        rays[DIR_Y * PACKET_WIDTH + lane] = (
+            a * frame[PACKET_WIDTH + lane]
+            + b * frame[4 * PACKET_WIDTH + lane]
+            + c * frame[7 * PACKET_WIDTH + lane]
         )
-        rays[DIR_Z * LANES + lane] = (
-            a * frame[2 * LANES + lane] + b * frame[5 * LANES + lane] + c * frame[8 * LANES + lane]
+        rays[DIR_Z * PACKET_WIDTH + lane] = (
+            a * frame[2 * PACKET_WIDTH + lane]
+            + b * frame[5 * PACKET_WIDTH + lane]
+            + c * frame[8 * PACKET_WIDTH + lane]
         )
-    for lane in range(LANES):
-        rays[TFAR * LANES + lane] = far
-        words[GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
+    for lane in range(PACKET_WIDTH):
+        rays[TFAR * PACKET_WIDTH + lane] = far
+        words[GEOM_ID * PACKET_WIDTH + lane] = np.uint32(0xFFFFFFFF)

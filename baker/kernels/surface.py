@@ -23,7 +23,7 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
 # Ray origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever
-# is less; but at least by sixteen float32 steps of either: origins and hits lose one, modellers some.
+# is less; but by at least sixteen float32 steps of either: origins and hits lose one, modellers some.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # They also move so many of these steps towards the middle of their triangle (at most half the way).
 INWARD = 2.0
@@ -40,8 +40,9 @@ class Surface(NamedTuple):
 
     position, normal (V, 3) float32; uv (V, 2) float32; triangle (T, 3) int32; face_normal (T, 3)
     float32; size int; pixel (n,) int64; front (n,) int32, the front entry of each; back (n,) bool;
-    first (n_front + 1,) int64; entry (m,) int32; entry_area (m,) float32; net (16, 2) uint32;
-    least float32, metres: no offset is computed from a smaller coordinate (but from smaller triangles).
+    first (n_front + 1,) int64; entry (m,) int32; entry_area (m,) float32; sobol_points (16, 2) uint32;
+    min_offset_scale float32, metres: no offset is computed from a smaller coordinate (but from smaller
+    triangles).
     """
 
     position: NDArray[np.float32]
@@ -56,8 +57,8 @@ class Surface(NamedTuple):
     first: NDArray[np.int64]
     entry: NDArray[np.int32]
     entry_area: NDArray[np.float32]
-    net: NDArray[np.uint32]
-    least: np.float32
+    sobol_points: NDArray[np.uint32]
+    min_offset_scale: np.float32
 
 
 @inner
@@ -77,20 +78,20 @@ def inverse_uv(uv, triangle, size, t):
 
 
 @inner
-def offset_step(x, y, z, size, least):
+def offset_step(x, y, z, size, min_offset_scale):
     """Return how far a ray origin at (x, y, z) leaves a triangle of this size, metres.
 
-    size : largest edge component of the triangle; least : see `Surface`
+    size : largest edge component of the triangle; min_offset_scale : see `Surface`
     """
     far = larger(larger(abs(x), abs(y)), abs(z))
-    return larger(ROUNDING * larger(far, size), OFFSET * smaller(larger(far, least), size))
+    return larger(ROUNDING * larger(far, size), OFFSET * smaller(larger(far, min_offset_scale), size))
 
 
 @inner
-def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):
+def place(p, m, face, triangle, min_offset_scale, t, b1, b2, flip, origin, normal, n, k):
     """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
 
-    p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; least : see `Surface`
+    p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; min_offset_scale : see `Surface`
     """
     b1 = smaller(larger(b1, 0.0), 1.0)
     b2 = smaller(larger(b2, 0.0), 1.0 - b1)
@@ -123,7 +124,7 @@ def place(p, m, face, triangle, least, t, b1, b2, flip, origin, normal, n, k):
     size = 0.0
     for a in range(3):
         size = larger(size, larger(abs(float(p[i1, a]) - p[i0, a]), abs(float(p[i2, a]) - p[i0, a])))
-    step = offset_step(px, py, pz, size, least)
+    step = offset_step(px, py, pz, size, min_offset_scale)
     away = sign * step
     if smaller(smaller(b0, b1), b2) < BORDER:
         # Also along the face: rounding must not put a point of its border behind the wall that meets it.
@@ -165,12 +166,12 @@ def load_flat(p, m, face, triangle, t, sign, row):
 
 
 @inner
-def place_flat(row, least, b1, b2, origin, normal, n, k):
+def place_flat(row, min_offset_scale, b1, b2, origin, normal, n, k):
     """Do the work of `place` for a point inside a flat triangle, away from its border."""
     px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
     py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
     pz = row[0, 2] + b1 * row[1, 2] + b2 * row[2, 2]
-    step = offset_step(px, py, pz, row[4, 0], least)
+    step = offset_step(px, py, pz, row[4, 0], min_offset_scale)
     origin[n, k, 0] = px + step * row[3, 0]
     origin[n, k, 1] = py + step * row[3, 1]
     origin[n, k, 2] = pz + step * row[3, 2]
@@ -193,10 +194,10 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
     located = len(hit_triangle) > 0
     # Out of the tuple once: every access to a tuple's array costs an atomic reference count.
     position, shading, face = surface.position, surface.normal, surface.face_normal
-    uv, triangle, net = surface.uv, surface.triangle, surface.net
+    uv, triangle, sobol_points = surface.uv, surface.triangle, surface.sobol_points
     pixels, fronts, back = surface.pixel, surface.front, surface.back
     starts, entry, entry_area = surface.first, surface.entry, surface.entry_area
-    size, least = surface.size, surface.least
+    size, min_offset_scale = surface.size, surface.min_offset_scale
     full = _u(0)
     same = len(wanted) == 1
     x0 = y0 = t = first = last = 0
@@ -224,9 +225,9 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
             sign = -1.0 if back[i] else 1.0
             flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
         for w in range(wanted.shape[1]):
-            k = free_point(mask[i], wanted[0 if same else n, w])
-            u = texel_scramble(net[k, 0], seed_x, full)
-            v = texel_scramble(net[k, 1], seed_y, full)
+            k = valid_point(mask[i], wanted[0 if same else n, w])
+            u = texel_scramble(sobol_points[k, 0], seed_x, full)
+            v = texel_scramble(sobol_points[k, 1], seed_y, full)
             x = float(u)
             y = float(v)
             if not whole:
@@ -253,9 +254,23 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
             b1 = a * x + b * y + c
             b2 = d * x + g * y + h
             if flat and smaller(smaller(b1, b2), 1.0 - b1 - b2) >= BORDER:
-                place_flat(flat_row, least, b1, b2, origin, normal, n, w)
+                place_flat(flat_row, min_offset_scale, b1, b2, origin, normal, n, w)
             else:
-                place(position, shading, face, triangle, least, t, b1, b2, back[i], origin, normal, n, w)
+                place(
+                    position,
+                    shading,
+                    face,
+                    triangle,
+                    min_offset_scale,
+                    t,
+                    b1,
+                    b2,
+                    back[i],
+                    origin,
+                    normal,
+                    n,
+                    w,
+                )
             if located:
                 hit_triangle[n, w] = t
                 bary[n, w, 0] = b1
@@ -263,7 +278,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
 
 
 @inner
-def free_point(bits, k):
+def valid_point(bits, k):
     """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
     bits = np.int64(bits)
     k = np.int64(k)

@@ -58,9 +58,20 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
         a, b, c, d, g, h = inverse_uv(surface.uv, surface.triangle, surface.size, main)
         x, y = x0 + cx / total, y0 + cy / total
         place(
-            surface.position, surface.normal, surface.face_normal, surface.triangle, surface.least, main,
-            a * x + b * y + c, d * x + g * y + h, False, spot, facing, 0, 0,
-        )  # fmt: skip
+            surface.position,
+            surface.normal,
+            surface.face_normal,
+            surface.triangle,
+            surface.min_offset_scale,
+            main,
+            a * x + b * y + c,
+            d * x + g * y + h,
+            False,
+            spot,
+            facing,
+            0,
+            0,
+        )
         for axis in range(3):
             position[i, axis] = spot[0, 0, axis]
             normal[i, axis] = facing[0, 0, axis]

@@ -26,8 +26,8 @@ from baker.trace.packets import (
     DIR_Z,
     GEOM_ID,
     ID,
-    LANES,
     NO_HIT,
+    PACKET_WIDTH,
     PASSES,
     PRIM_ID,
     TFAR,
@@ -57,59 +57,59 @@ class TransmittanceTable(NamedTuple):
     coloured: bool = False
 
 
-def no_tint() -> TransmittanceTable:
+def no_transmittance() -> TransmittanceTable:
     """Return the table of a scene in which nothing is BLEND."""
     return TransmittanceTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
 @inner
-def trace_shadow_lanes(tint, function, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Trace sixteen shadow rays; `light_kept` then tells the transmittance of those that are not blocked.
+def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Trace sixteen shadow rays; `transmittance` then tells the transmittance of those that are not blocked.
 
-    tint, scene, width, query, spare_on, spare : of a caster; function : its `occluded`
+    blend, scene, width, query, spare_on, spare : of a buffers; function : its `occluded`
     on, rays, words : (16,) int32 and (21 * 16,) float32 and uint32, see `trace_lanes`
     """
-    if tint is None:
+    if blend is None:
         trace_lanes(function, scene, width, query, on, rays, spare_on, spare)
         return
-    clear_colours(tint)
-    for lane in range(LANES):
-        words[ID * LANES + lane] = np.uint32(lane + 1)
-    trace_lanes(function, scene, width, tint.arguments, on, rays, spare_on, spare)
-    for lane in range(LANES):
-        words[ID * LANES + lane] = np.uint32(0)
+    reset_transmittance(blend)
+    for lane in range(PACKET_WIDTH):
+        words[ID * PACKET_WIDTH + lane] = np.uint32(lane + 1)
+    trace_lanes(function, scene, width, blend.arguments, on, rays, spare_on, spare)
+    for lane in range(PACKET_WIDTH):
+        words[ID * PACKET_WIDTH + lane] = np.uint32(0)
 
 
 @inner
-def trace_shadow_packet(tint, function, scene, width, on, packet):  # type: ignore[no-untyped-def]
+def trace_shadow_packet(blend, function, scene, width, on, packet):  # type: ignore[no-untyped-def]
     """Do the same for one packet, where it lies.
 
     width : at most 16; packet : (12 * width or more,) float32
     """
-    if tint is None:
+    if blend is None:
         call_embree(function, on, scene, packet)
         return
-    clear_colours(tint)
+    reset_transmittance(blend)
     words = packet.view(np.uint32)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(lane + 1)
-    call_embree_with(function, on, scene, packet, tint.arguments)
+    call_embree_with(function, on, scene, packet, blend.arguments)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(0)
 
 
 @inner
-def clear_colours(tint):  # type: ignore[no-untyped-def]
+def reset_transmittance(blend):  # type: ignore[no-untyped-def]
     """Set what sixteen rays are multiplied by to 1, and forget the edges that they met."""
-    colour, edges = tint.colour, tint.edges
-    for j in range(3 * LANES):
+    colour, edges = blend.transmittance, blend.edges
+    for j in range(3 * PACKET_WIDTH):
         colour[j] = _f(1.0)
-    for lane in range(LANES):
+    for lane in range(PACKET_WIDTH):
         edges[lane] = np.uint32(0)
 
 
 @inner
-def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
+def filter_colour_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
     """Write lerp(1, c, a) of row k at barycentrics to `out` (3,), and return a.
 
     pack : TexturePack; rgba : (4,) float64, memory
@@ -129,32 +129,32 @@ def tint_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def follow(tint, function, width, on, rays, hits, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Find the colours that sixteen rays passed, see `light_kept`; for tint None: nothing to do.
+def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Find the colours that sixteen rays passed, see `transmittance`; for blend None: nothing to do.
 
-    tint, width : of a caster; function : its `occluded`
+    blend, width : of a buffers; function : its `occluded`
     on, rays : (16,) int32 and (21 * 16,) float32, the lanes as they were traced
     hits : `rays` as uint32 if they were traced to their first hit, None if to any
     spare_on, spare : packet memory of the native width
     """
-    if tint is None:
+    if blend is None:
         return
-    clear_colours(tint)
-    if tint.coloured == 0:
+    reset_transmittance(blend)
+    if blend.coloured == 0:
         return
-    stop = tint.stop
-    for lane in range(LANES):
+    stop = blend.stop
+    for lane in range(PACKET_WIDTH):
         stop[lane] = NO_HIT
-        if hits is not None and hits[GEOM_ID * LANES + lane] != NO_HIT:
+        if hits is not None and hits[GEOM_ID * PACKET_WIDTH + lane] != NO_HIT:
             # Where the ray ends no light passed.
-            stop[lane] = hits[PRIM_ID * LANES + lane]
-    _ask_lanes(tint, function, width, on, rays, spare_on, spare, 0)
+            stop[lane] = hits[PRIM_ID * PACKET_WIDTH + lane]
+    _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, 0)
 
 
 @inner
-def _ask_lanes(tint, function, width, on, rays, spare_on, spare, number):  # type: ignore[no-untyped-def]
-    """Do what `_ask` does for sixteen rays; number : 0 or PASSES, see `packets`."""
-    for first in range(0, LANES, width):
+def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number):  # type: ignore[no-untyped-def]
+    """Do what `_trace_blend` does for sixteen rays; number : 0 or PASSES, see `packets`."""
+    for first in range(0, PACKET_WIDTH, width):
         some = False
         for lane in range(width):
             spare_on[lane] = on[first + lane]
@@ -163,120 +163,120 @@ def _ask_lanes(tint, function, width, on, rays, spare_on, spare, number):  # typ
             continue
         for to in range(0, width, 4):
             for row in range(DIR_Z + 1):
-                copy_four(spare, row * width + to, rays, row * LANES + first + to)
-            copy_four(spare, TFAR * width + to, rays, TFAR * LANES + first + to)
-        _ask(tint, function, width, spare_on, spare, number + first)
+                copy_four(spare, row * width + to, rays, row * PACKET_WIDTH + first + to)
+            copy_four(spare, TFAR * width + to, rays, TFAR * PACKET_WIDTH + first + to)
+        _trace_blend(blend, function, width, spare_on, spare, number + first)
 
 
 @inner
-def follow_packet(tint, function, width, on, packet, hits):  # type: ignore[no-untyped-def]
+def trace_transmittance_packet(blend, function, width, on, packet, hits):  # type: ignore[no-untyped-def]
     """Do the same for one packet, where it lies.
 
     width : at most 16; packet : (12 * width or more,) float32
     hits : whether it was traced to first hits
     """
-    if tint is None:
+    if blend is None:
         return
-    clear_colours(tint)
-    if tint.coloured == 0:
+    reset_transmittance(blend)
+    if blend.coloured == 0:
         return
-    stop, words = tint.stop, packet.view(np.uint32)
+    stop, words = blend.stop, packet.view(np.uint32)
     for lane in range(width):
         stop[lane] = NO_HIT
         if hits and words[GEOM_ID * width + lane] != NO_HIT:
             stop[lane] = words[PRIM_ID * width + lane]
-    _ask(tint, function, width, on, packet, 0)
+    _trace_blend(blend, function, width, on, packet, 0)
 
 
 @inner
-def _ask(tint, function, width, on, packet, first):  # type: ignore[no-untyped-def]
+def _trace_blend(blend, function, width, on, packet, first):  # type: ignore[no-untyped-def]
     """Trace a packet in the tree of BLEND triangles: the filter multiplies colours of rays `first` and on."""
     words = packet.view(np.uint32)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(first + lane + 1)
-    call_embree_with(function, on, tint.scene, packet, tint.arguments)
+    call_embree_with(function, on, blend.scene, packet, blend.arguments)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(0)
 
 
 @inner
-def gather_turns(tint):  # type: ignore[no-untyped-def]
+def gather_turns(blend):  # type: ignore[no-untyped-def]
     """Return in how many turns each gather ray brings its light, see `trace_gather`."""
-    return 1 if tint is None else 2
+    return 1 if blend is None else 2
 
 
 @inner
-def trace_gather(tint, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
     """Trace sixteen gather rays to their first hit.
 
     Where there are BLEND surfaces, in turn 0 rays stop at them by chance, with probability alpha: that finds
     the light that these surfaces send. In turn 1 rays pass them all (but where alpha is 1), and find what is
     behind with certainty.
     """
-    if tint is None:
+    if blend is None:
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
         return
-    number_rays(tint, words, UNAWARE if turn == 1 else np.uint32(0))
+    set_blend_rule(blend, words, UNAWARE if turn == 1 else np.uint32(0))
     trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-    number_rays(tint, words, np.uint32(0))
+    set_blend_rule(blend, words, np.uint32(0))
 
 
 @inner
-def number_rays(tint, words, number):  # type: ignore[no-untyped-def]
+def set_blend_rule(blend, words, number):  # type: ignore[no-untyped-def]
     """Say of sixteen rays what BLEND surfaces are to them: 0, `packets.UNAWARE` or `packets.SOLID`."""
-    if tint is None:
+    if blend is None:
         return
-    for lane in range(LANES):
-        words[ID * LANES + lane] = number
+    for lane in range(PACKET_WIDTH):
+        words[ID * PACKET_WIDTH + lane] = number
 
 
 @inner
-def any_stopped(tint, words):  # type: ignore[no-untyped-def]
+def any_stopped(blend, words):  # type: ignore[no-untyped-def]
     """Tell whether any of sixteen rays stopped at a BLEND surface; True without such surfaces."""
-    if tint is None:
+    if blend is None:
         return True
     found = False
-    for lane in range(LANES):
-        found = found or words[GEOM_ID * LANES + lane] == BLEND_GEOMETRY
+    for lane in range(PACKET_WIDTH):
+        found = found or words[GEOM_ID * PACKET_WIDTH + lane] == BLEND_GEOMETRY
     return found
 
 
 @inner
-def follow_gather(tint, turn, function, width, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Find what the light that gather rays bring in a turn is multiplied by, see `light_kept`.
+def trace_gather_transmittance(blend, turn, function, width, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+    """Find what the light that gather rays bring in a turn is multiplied by, see `transmittance`.
 
     In turn 0 rays that stopped at a BLEND surface bring its light in the colours of those passed before it.
     In turn 1 the others bring theirs, multiplied by the transmittance of all BLEND surfaces on the way.
     """
-    if tint is None:
+    if blend is None:
         return
     if turn == 0:
-        follow(tint, function, width, on, rays, words, spare_on, spare)
+        trace_transmittance(blend, function, width, on, rays, words, spare_on, spare)
     else:
-        clear_colours(tint)
-        _ask_lanes(tint, function, width, on, rays, spare_on, spare, PASSES)
-    colour = tint.colour
-    for lane in range(LANES):
-        if (words[GEOM_ID * LANES + lane] == BLEND_GEOMETRY) != (turn == 0):
+        reset_transmittance(blend)
+        _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, PASSES)
+    colour = blend.transmittance
+    for lane in range(PACKET_WIDTH):
+        if (words[GEOM_ID * PACKET_WIDTH + lane] == BLEND_GEOMETRY) != (turn == 0):
             for c in range(3):
-                colour[c * LANES + lane] = _f(0.0)
+                colour[c * PACKET_WIDTH + lane] = _f(0.0)
 
 
 @inner
-def light_kept(tint, c, lane):  # type: ignore[no-untyped-def]
+def transmittance(blend, c, lane):  # type: ignore[no-untyped-def]
     """Return the share of channel c that the light along a lane's ray kept, after it was traced."""
-    if tint is None:
+    if blend is None:
         return _f(1.0)
-    return tint.colour[c * LANES + lane]
+    return blend.transmittance[c * PACKET_WIDTH + lane]
 
 
 @inner
-def count_coloured(tint):  # type: ignore[no-untyped-def]
+def count_coloured(blend):  # type: ignore[no-untyped-def]
     """Count the colours that lost some of their light; no ray met anything BLEND if that is 0."""
-    if tint is None:
+    if blend is None:
         return 0
-    colour = tint.colour
+    colour = blend.transmittance
     found = 0
-    for j in range(3 * LANES):
+    for j in range(3 * PACKET_WIDTH):
         found += 1 if colour[j] != _f(1.0) else 0
     return found

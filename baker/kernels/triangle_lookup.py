@@ -17,7 +17,7 @@ from baker.trace.jit import inner, larger, smaller
 BACK_FACE = -1
 
 
-class HitTable(NamedTuple):
+class TriangleLookup(NamedTuple):
     """What is looked up at a hit.
 
     row (T, 16) float32, one cache line a triangle: lightmap uv of corner 0, its two edges (2 each), page,

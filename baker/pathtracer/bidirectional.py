@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from baker.kernels.emitters import emitter_at
-from baker.kernels.transmittance import follow_packet, light_kept, trace_shadow_packet
+from baker.kernels.transmittance import trace_shadow_packet, trace_transmittance_packet, transmittance
 from baker.pathtracer.bidirectional_lights import (
     aim_both_ways,
     fade,
@@ -211,12 +211,26 @@ def show(path, row, lane, camera, n_subpaths, value, way):
 
 @kernel
 def trace_both_ways(
-    where, toward, normal, begin, camera, n_subpaths, surfaces, lamps, shading, sphere, caster, net, how, out,
-    splat_pixel, splat,
-):  # fmt: skip
+    where,
+    toward,
+    normal,
+    begin,
+    camera,
+    n_subpaths,
+    surfaces,
+    lamps,
+    shading,
+    sphere,
+    buffers,
+    net,
+    how,
+    out,
+    splat_pixel,
+    splat,
+):
     """Do what `trace_paths` does, with paths from both ends.
 
-    where, toward, normal, begin, surfaces, lamps, shading, caster, net, how, out : see `trace_paths`
+    where, toward, normal, begin, surfaces, lamps, shading, buffers, net, how, out : see `trace_paths`
     camera : (15,) float64: position, right, up, forward, tangent of half the height, pixels across and down
     n_subpaths : float, lamps' subpaths that can be seen by one pixel for each of the pixel's own samples,
         which is the number of pixels; 0 if paths begin at surfaces
@@ -229,8 +243,8 @@ def trace_both_ways(
     tuple of int
         Closest-hit rays, shadow rays, splats.
     """
-    width, scene, intersect, occluded = caster.width, caster.scene, caster.intersect, caster.occluded
-    valid, floats, words = caster.valid, caster.floats, caster.words
+    width, scene, intersect, occluded = buffers.width, buffers.scene, buffers.intersect, buffers.occluded
+    valid, floats, words = buffers.valid, buffers.floats, buffers.words
     surface, material, least, lambertian = (
         surfaces.row,
         surfaces.material,
@@ -308,11 +322,11 @@ def trace_both_ways(
             break
         if any_ray:
             trace(intersect, scene, valid, floats)
-            follow_packet(caster.tint, occluded, width, valid, floats, True)
+            trace_transmittance_packet(buffers.blend, occluded, width, valid, floats, True)
             for lane in range(width):
                 if stage[lane] == _RAY:
                     for c in range(3):
-                        path[BETA + c, lane] *= light_kept(caster.tint, c, lane)
+                        path[BETA + c, lane] *= transmittance(buffers.blend, c, lane)
         for lane in range(width):
             if stage[lane] != _RAY:
                 continue
@@ -404,17 +418,17 @@ def trace_both_ways(
                     for c in range(3):
                         values[c, lane] = value[c]
             if any_shadow:
-                trace_shadow_packet(caster.tint, occluded, scene, width, valid, floats)
+                trace_shadow_packet(buffers.blend, occluded, scene, width, valid, floats)
                 for lane in range(width):
                     if valid[lane] == 0 or floats[TFAR * width + lane] < np.float32(0.0):
                         continue
                     if eye[lane]:
                         for c in range(3):
-                            path[LIGHT + c, lane] += values[c, lane] * light_kept(caster.tint, c, lane)
+                            path[LIGHT + c, lane] += values[c, lane] * transmittance(buffers.blend, c, lane)
                     else:
                         splat_pixel[splats] = pixel[lane]
                         for c in range(3):
-                            splat[splats, c] = values[c, lane] * light_kept(caster.tint, c, lane)
+                            splat[splats, c] = values[c, lane] * transmittance(buffers.blend, c, lane)
                         splats += 1
             if not more:
                 break

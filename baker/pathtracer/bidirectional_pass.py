@@ -20,7 +20,7 @@ from baker.pathtracer.bidirectional_weights import MOST_FROM_LAMP
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 _TILE = 512
 _BLOCK = 64 * _TILE
@@ -37,7 +37,7 @@ def surface_tile(
     """Add E / pi of points to `out` (m, 3), see `irradiance_pass`; return closest-hit and shadow rays."""
     rays, shadows, _ = trace_both_ways(
         *places, begin, np.zeros(15), 0.0, reference.surfaces, reference.lamps, reference.shading,
-        reference.sphere, new_caster(reference.rays.tracer), net, setting, out, np.zeros(0, np.int64),
+        reference.sphere, new_packet_buffers(reference.rays.tracer), net, setting, out, np.zeros(0, np.int64),
         np.zeros((0, 3)),
     )  # fmt: skip
     return int(rays), int(shadows)
@@ -82,7 +82,7 @@ def picture_pass(
             span = slice(block + begin, block + end)
             cast, shadows, splats = trace_both_ways(
                 origin, way, way, block + begin, lens, float(n), reference.surfaces, reference.lamps,
-                reference.shading, reference.sphere, new_caster(reference.rays.tracer), net, setting,
+                reference.shading, reference.sphere, new_packet_buffers(reference.rays.tracer), net, setting,
                 seen[span], splat_pixel, splat,
             )  # fmt: skip
             found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast, shadows)

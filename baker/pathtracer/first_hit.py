@@ -7,11 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.transmittance import follow_packet, light_kept
+from baker.kernels.transmittance import trace_transmittance_packet, transmittance
 from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED, Reference
 from baker.pathtracer.vertex import base_colour
 from baker.trace.jit import kernel, scratch
-from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, NO_HIT, PRIM_ID, TFAR, new_caster, set_ray, trace
+from baker.trace.packets import (
+    GEOM_ID,
+    HIT_U,
+    HIT_V,
+    NO_HIT,
+    PRIM_ID,
+    TFAR,
+    new_packet_buffers,
+    set_ray,
+    trace,
+)
 
 _new_colour = scratch((4,), np.float64)
 
@@ -58,9 +68,9 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
     depth, albedo = np.full(n, np.inf), np.zeros((n, 3))
     surfaces = reference.surfaces
     origin = np.ascontiguousarray(np.broadcast_to(origin, (n, 3)))
-    caster, kept = new_caster(reference.rays.tracer), np.zeros((n, 3))
+    buffers, kept = new_packet_buffers(reference.rays.tracer), np.zeros((n, 3))
     _meet(
-        origin, way, caster, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
+        origin, way, buffers, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
         albedo, kept,
     )  # fmt: skip
     row = surfaces.row[triangle].astype(np.float64)
@@ -78,9 +88,9 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
 
 
 @kernel
-def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
-    width, scene, intersect = caster.width, caster.scene, caster.intersect
-    valid, floats, words = caster.valid, caster.floats, caster.words
+def _meet(origin, way, buffers, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
+    width, scene, intersect = buffers.width, buffers.scene, buffers.intersect
+    valid, floats, words = buffers.valid, buffers.floats, buffers.words
     colour = _new_colour()
     for group in range(0, len(way), width):
         for lane in range(width):
@@ -93,13 +103,13 @@ def _meet(origin, way, caster, surface, material, shading, triangle, bary, depth
                     np.float32(1.0e30),
                 )  # fmt: skip
         trace(intersect, scene, valid, floats)
-        follow_packet(caster.tint, caster.occluded, width, valid, floats, True)
+        trace_transmittance_packet(buffers.blend, buffers.occluded, width, valid, floats, True)
         for lane in range(width):
             i = group + lane
             if i >= len(way):
                 continue
             for c in range(3):
-                kept[i, c] = light_kept(caster.tint, c, lane)
+                kept[i, c] = transmittance(buffers.blend, c, lane)
             if words[GEOM_ID * width + lane] == NO_HIT:
                 continue
             prim = np.int64(words[PRIM_ID * width + lane])

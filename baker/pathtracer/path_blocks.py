@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.transmittance import follow_packet, light_kept
+from baker.kernels.transmittance import trace_transmittance_packet, transmittance
 from baker.trace.embree import RayScene
 from baker.trace.jit import inner
 from baker.trace.packets import (
@@ -29,10 +29,10 @@ from baker.trace.packets import (
     PRIM_ID,
     ROWS,
     TFAR,
-    Tint,
+    BlendBuffers,
     aligned_floats,
     call_embree,
-    new_tint,
+    new_blend_buffers,
 )
 from baker.trace.pointers import prefetch
 
@@ -69,7 +69,7 @@ class PathMemory(NamedTuple):
     on (8,) int32 : lanes to trace
     s (BLOCKS * BLOCK,) float32, words (the same as uint32) : blocks
     bins (BINS * BIN_ROWS * 8,) float32 : packets of shadow rays
-    tint : see `Caster.tint`
+    blend : see `PacketBuffers.blend`
     """
 
     scene: int
@@ -79,7 +79,7 @@ class PathMemory(NamedTuple):
     s: NDArray[np.float32]
     words: NDArray[np.uint32]
     bins: NDArray[np.float32]
-    tint: Tint | None
+    blend: BlendBuffers | None
 
 
 def new_path_memory(rays: RayScene) -> PathMemory:
@@ -89,9 +89,9 @@ def new_path_memory(rays: RayScene) -> PathMemory:
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, LANES)[:, MASK] = NO_HIT
     bins.view(np.uint32).reshape(BINS, BIN_ROWS, LANES)[:, MASK] = NO_HIT
     intersect, occluded = rays.functions(LANES)
-    tinted, coloured = rays.tracer.tint, rays.tracer.coloured
-    tint = None if tinted is None else new_tint(tinted, coloured)
-    return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins, tint)
+    blend_scene, coloured = rays.tracer.blend_scene, rays.tracer.coloured
+    blend = None if blend_scene is None else new_blend_buffers(blend_scene, coloured)
+    return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins, blend)
 
 
 @inner
@@ -107,18 +107,18 @@ def place_of(lane):  # type: ignore[no-untyped-def]
 
 
 @inner
-def colour_lanes(tint, occluded, s, base, on):  # type: ignore[no-untyped-def]
+def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
     """Multiply the lanes' throughput by the colours of what their rays passed."""
-    if tint is None:
+    if blend is None:
         return
-    follow_packet(tint, occluded, LANES, on, s[base : base + BLOCK], True)
+    trace_transmittance_packet(blend, occluded, LANES, on, s[base : base + BLOCK], True)
     for c in range(3):
         for lane in range(LANES):
-            s[base + (BETA + c) * LANES + lane] *= light_kept(tint, c, lane)
+            s[base + (BETA + c) * LANES + lane] *= transmittance(blend, c, lane)
 
 
 @inner
-def trace_blocks(s, words, blocks, on, intersect, occluded, scene, tint, surface):  # type: ignore[no-untyped-def]
+def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surface):  # type: ignore[no-untyped-def]
     """Trace the rays of the first blocks and ask for the rows (two cache lines each) of what they hit.
 
     Shading begins when all is traced: by then the rows have come from memory.
@@ -138,7 +138,7 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, tint, surface
             s[base + TFAR * LANES + lane] = _f(1.0e30)
             words[base + GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
         call_embree(intersect, on, scene, s[base : base + BLOCK])
-        colour_lanes(tint, occluded, s, base, on)
+        colour_lanes(blend, occluded, s, base, on)
         for lane in range(LANES):
             if on[lane] != 0 and words[base + GEOM_ID * LANES + lane] != NO_HIT:
                 row = surface.ctypes.data + 4 * surface.shape[1] * np.int64(

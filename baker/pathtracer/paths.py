@@ -256,7 +256,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     tuple of int
         Closest-hit and shadow rays cast.
     """
-    scene, intersect, occluded, tint = memory.scene, memory.intersect, memory.occluded, memory.tint
+    scene, intersect, occluded, blend = memory.scene, memory.intersect, memory.occluded, memory.blend
     on, s, words, bins = memory.on, memory.s, memory.words, memory.bins
     surface, material, least, lambertian = (
         surfaces.row,
@@ -292,7 +292,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
             if following == total or blocks == BLOCKS:
                 if blocks == 0:
                     break
-                rays += trace_blocks(s, words, blocks, on, intersect, occluded, scene, tint, surface)
+                rays += trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surface)
                 block, traced = 0, True
                 continue
             base = unsigned(blocks * BLOCK)
@@ -411,7 +411,7 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                         for c in range(3):
                             s[base + (VALUE + c) * LANES + lane] = value[c]
             shadows += cast_to_lamps(
-                s, base, lamp, len(cumulative), bins, filled, occluded, scene, tint, on, out
+                s, base, lamp, len(cumulative), bins, filled, occluded, scene, blend, on, out
             )
         if plain:
             scatter_lanes(s, base)
@@ -421,5 +421,5 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                     turn_alone(path, row, lane, s, words, base, hemisphere, value)
     for k in range(BINS):
         if filled[k] > 0:
-            cast_packet(bins, filled, k, occluded, scene, tint, on, out)
+            cast_packet(bins, filled, k, occluded, scene, blend, on, out)
     return rays, shadows

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baker.kernels.transmittance import light_kept, trace_shadow_packet
+from baker.kernels.transmittance import trace_shadow_packet, transmittance
 from baker.pathtracer.path_blocks import (
     ALIVE,
     BIN_POINT,
@@ -26,26 +26,26 @@ _f = np.float32
 
 
 @inner
-def cast_packet(bins, filled, k, occluded, scene, tint, on, out):
+def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
     """Trace packet k, add the light of rays that nothing blocks to their points, and empty it.
 
-    tint : of the path memory; out : (m, 3) float64
+    blend : of the path memory; out : (m, 3) float64
     """
     n, start = filled[k], unsigned(k * BIN_ROWS * LANES)
     for lane in range(LANES):
         on[lane] = -1 if lane < n else 0
     packet = bins[start : start + BIN_ROWS * LANES]
-    trace_shadow_packet(tint, occluded, scene, LANES, on, packet)
+    trace_shadow_packet(blend, occluded, scene, LANES, on, packet)
     for lane in range(n):
         if bins[start + TFAR * LANES + lane] >= _f(0.0):
             point = unsigned(bins[start + BIN_POINT * LANES + lane])
             for c in range(3):
-                out[point, c] += bins[start + (BIN_VALUE + c) * LANES + lane] * light_kept(tint, c, lane)
+                out[point, c] += bins[start + (BIN_VALUE + c) * LANES + lane] * transmittance(blend, c, lane)
     filled[k] = 0
 
 
 @inner
-def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, on, out):
+def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, blend, on, out):
     """Put the lanes' rays to lamps into packets, those to one lamp together; trace what is full.
 
     lamp : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
@@ -75,5 +75,5 @@ def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, tint, o
         bins[place + BIN_POINT * LANES] = s[here + POINT * LANES]
         filled[k] += 1
         if filled[k] == LANES:
-            cast_packet(bins, filled, k, occluded, scene, tint, on, out)
+            cast_packet(bins, filled, k, occluded, scene, blend, on, out)
     return n

@@ -103,9 +103,9 @@ def cast_rays(kind: str = "") -> None:
     """
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
-    from baker.kernels.emitters import lamps_for, needed_shading, widest_view
+    from baker.kernels.emitters import needed_shading, tile_emitters, widest_view
     from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-    from baker.kernels.triangle_lookup import HitTable
+    from baker.kernels.triangle_lookup import TriangleLookup
     from baker.lights.emissive import build_emitters
     from baker.radiosity.kernels.area_light import light_samples
     from baker.radiosity.kernels.emitter_probe import probe_clusters
@@ -113,7 +113,7 @@ def cast_rays(kind: str = "") -> None:
     from baker.radiosity.kernels.side_table import nothing_seen
     from baker.shading.materials import resolve_materials
     from baker.shading.ray_tree import build_ray_tree
-    from baker.trace.packets import new_caster
+    from baker.trace.packets import new_packet_buffers
 
     corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
@@ -129,12 +129,12 @@ def cast_rays(kind: str = "") -> None:
     shading = resolve_materials(scene, geometry)
     emitters = build_emitters(geometry, shading)
     rays = build_ray_tree(geometry, shading, threads=1)
-    table = HitTable(np.zeros((1, 16), np.float32), 16, 256)
+    table = TriangleLookup(np.zeros((1, 16), np.float32), 16, 256)
 
     origin, normal = np.zeros((_TEXELS, 16, 3), np.float32), np.zeros((_TEXELS, 16, 3), np.float32)
     origin[..., 2], normal[..., 2] = 1.0, -1.0
-    caster, net, shared = new_caster(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
-    lamps, exact = lamps_for(emitters, origin), np.zeros(_TEXELS, np.uint8)
+    buffers, net, shared = new_packet_buffers(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
+    lamps, exact = tile_emitters(emitters, origin), np.zeros(_TEXELS, np.uint8)
     needed = needed_shading(emitters, shading)
     # In the order in which a bake needs them. As long again takes what it compiles itself: everything before
     # direct light, the rays of gaps and form factors, and the matrix.
@@ -142,12 +142,12 @@ def cast_rays(kind: str = "") -> None:
     widest_view(emitters, origin)
     counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
     bounds = np.array([0, _TEXELS])
-    probe_clusters(origin, normal, emitters.row, emitters.first, caster, bounds, every, 16, *counts)
+    probe_clusters(origin, normal, emitters.row, emitters.first, buffers, bounds, every, 16, *counts)
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
-    light_samples(origin, normal, lamps, needed, caster, 0, net, shared, weigh, exact, sums, squares)
+    light_samples(origin, normal, lamps, needed, buffers, 0, net, shared, weigh, exact, sums, squares)
     dark, black = nothing_seen(), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
-    gather(origin, normal, table, dark, lamps, needed, caster, 0, net, shared, black, two, exact, out)
+    gather(origin, normal, table, dark, lamps, needed, buffers, 0, net, shared, black, two, exact, out)
     rays.close()
 
 

@@ -16,14 +16,14 @@ from baker.core.texels import TexelBuffer
 from baker.kernels.emitters import Emitters
 from baker.kernels.shading import Shading
 from baker.kernels.surface import Surface
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.lights.emissive import build_emitters
 from baker.pipeline.record import Record
 from baker.radiosity.inside_geometry import find_buried
 from baker.radiosity.point_cache import PointCache, keep_points
 from baker.radiosity.sides import Sides, split_texels
 from baker.radiosity.texels import build_texels
-from baker.radiosity.triangle_lookup import build_hit_table
+from baker.radiosity.triangle_lookup import build_triangle_lookup
 from baker.shading.materials import resolve_materials
 from baker.shading.ray_tree import build_ray_tree
 from baker.shading.scene_solids import hide_backs
@@ -43,7 +43,7 @@ class World:
     surface: Surface
     rays: RayScene
     emitters: Emitters
-    table: HitTable
+    table: TriangleLookup
     tells: NDArray[np.uint8]
     inside: NDArray[np.uint16]
     sides: Sides
@@ -74,7 +74,7 @@ def prepare(
     with record.stage("ray tree"):
         rays = build_ray_tree(geometry, shading, threads=threads)
         emitters = build_emitters(geometry, shading)
-        table = build_hit_table(geometry, texels, emitters)
+        table = build_triangle_lookup(geometry, texels, emitters)
     if inside is None:
         with record.stage("buried texels"):
             inside, cast = find_buried(

@@ -19,7 +19,7 @@ from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shading import Shading
 from baker.kernels.surface import N_POINTS, Surface
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.emitter_choice import Choice, LampChooser
 from baker.radiosity.kernels.area_light import light_samples
 from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
@@ -27,7 +27,7 @@ from baker.radiosity.kernels.shadow import add_visible
 from baker.radiosity.kernels.side_table import nothing_seen
 from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
-from baker.trace.packets import Caster, new_caster
+from baker.trace.packets import PacketBuffers, new_packet_buffers
 
 # Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
 TILE = 512
@@ -61,7 +61,7 @@ class DirectLight:
 def direct_light(
     surface: Surface,
     mask: NDArray[np.uint16],
-    table: HitTable,
+    table: TriangleLookup,
     lights: tuple[PunctualLight, ...],
     emitters: Emitters,
     shading: Shading,
@@ -113,7 +113,7 @@ def direct_light(
         origin: NDArray[np.float32],
         normal: NDArray[np.float32],
         begin: int,
-        caster: Caster,
+        buffers: PacketBuffers,
         out: NDArray[np.float32],
         spread: NDArray[np.float32],
         done: NDArray[np.uint8],
@@ -125,7 +125,7 @@ def direct_light(
             own, second = np.zeros_like(out), np.zeros(len(out), np.float32)
             complete = done if lamps is choice.seen else np.zeros(len(out), np.uint8)
             n_cast += light_samples(
-                origin, normal, lamps, needed, caster, begin, own_net, shared_bits_mask(len(own_net)),
+                origin, normal, lamps, needed, buffers, begin, own_net, shared_bits_mask(len(own_net)),
                 weigh[near], complete, own, second,
             )  # fmt: skip
             out += own
@@ -134,25 +134,25 @@ def direct_light(
             n_cast += N_HEMISPHERE * len(out)
             found = np.zeros((len(out), N_COLUMNS), np.float32)
             gather(
-                origin, normal, table, dark, choice.found, needed, caster, begin, few, few_shared,
+                origin, normal, table, dark, choice.found, needed, buffers, begin, few, few_shared,
                 black, limits, done, found,
             )  # fmt: skip
             out[:, 3:] += found[:, DIRECT : DIRECT + 3]
         return n_cast
 
     def work(begin: int, end: int) -> Part:
-        caster = new_caster(tracer)
+        buffers = new_packet_buffers(tracer)
         origin, normal = tile_points(surface, mask, begin, end, kept)
         out, spread = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
         done, n_cast = np.zeros(end - begin, np.uint8), 0
-        for choice in chooser.choose(begin, origin, normal, caster):
+        for choice in chooser.choose(begin, origin, normal, buffers):
             part = choice.part
             n_cast += from_emitters(
                 choice,
                 origin[part],
                 normal[part],
                 begin + part.start,
-                caster,
+                buffers,
                 out[part],
                 spread[part],
                 done[part],
@@ -162,7 +162,7 @@ def direct_light(
             weight = np.zeros((end - begin, N_POINTS), np.float32)
             for light, kind in punctual:
                 kind.fill(light, origin, normal, ray, weight)
-                add_visible(caster, origin, ray, weight, np.array(light.intensity, np.float32), out)
+                add_visible(buffers, origin, ray, weight, np.array(light.intensity, np.float32), out)
         return out[:, :3], out[:, 3:], spread, done, n_cast
 
     def keep(begin: int, end: int, part: Part) -> None:

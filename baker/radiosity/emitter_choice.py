@@ -26,12 +26,12 @@ from baker.kernels.emitters import (
     NO_CLOSED_FORM,
     TEXTURED,
     Emitters,
-    Lamps,
-    lamps_for,
+    TileEmitters,
+    tile_emitters,
     widest_view,
 )
 from baker.radiosity.kernels.emitter_probe import probe_clusters
-from baker.trace.packets import LANES, Caster
+from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
 # Rays to each cluster from a tile, and what all of them may cost, as a share of a tile's shadow rays.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
@@ -61,9 +61,9 @@ class Choice(NamedTuple):
     """
 
     part: slice
-    seen: Lamps
-    hidden: Lamps | None
-    found: Lamps
+    seen: TileEmitters
+    hidden: TileEmitters | None
+    found: TileEmitters
     view: float
 
 
@@ -92,7 +92,7 @@ class LampChooser:
         return cls(emitters, n_light, n_hidden, _one_lamp(emitters), chart)
 
     def choose(
-        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], caster: Caster
+        self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], buffers: PacketBuffers
     ) -> list[Choice]:
         """Return the choices of a tile's parts, which cover it in order.
 
@@ -102,25 +102,25 @@ class LampChooser:
         origin, normal : (m, 16, 3) float32, points of the tile's texels, world
         """
         whole = slice(0, len(origin))
-        lamps = lamps_for(self.emitters, origin)
+        lamps = tile_emitters(self.emitters, origin)
         if self.single or np.count_nonzero(lamps.chance) < 2:
             return [Choice(whole, lamps, None, lamps, widest_view(self.emitters, origin))]
-        bounds, hidden = self._find_hidden(lamps, begin, origin, normal, caster)
+        bounds, hidden = self._find_hidden(lamps, begin, origin, normal, buffers)
         parts = [slice(*span) for span in pairwise(bounds.tolist())]
         if len(parts) == 1:
             return [self._choice(whole, origin, lamps, hidden[0])]
         return [
-            self._choice(part, origin[part], lamps_for(self.emitters, origin[part]), own)
+            self._choice(part, origin[part], tile_emitters(self.emitters, origin[part]), own)
             for part, own in zip(parts, hidden, strict=True)
         ]
 
     def _find_hidden(
         self,
-        lamps: Lamps,
+        lamps: TileEmitters,
         begin: int,
         origin: NDArray[np.float32],
         normal: NDArray[np.float32],
-        caster: Caster,
+        buffers: PacketBuffers,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return where parts of a tile begin, (P + 1,), and the clusters (P, C) hidden from each."""
         weight = self._weights(lamps, origin)
@@ -130,13 +130,13 @@ class LampChooser:
         unlike = weight.max() > _OUTSHINES * weight[chosen].min()
         seen = np.zeros((1, len(weight)), np.int32)
         if not (unlike and broken):
-            asked, seen = self._probe(origin, normal, caster, bounds, chosen)
+            asked, seen = self._probe(origin, normal, buffers, bounds, chosen)
             partly = (seen[0] > 0) & (seen[0] < asked[0])
             dimmest = weight[seen[0] > 0].min(initial=np.inf)
             if not (partly & (weight > _OUTSHINES * dimmest)).any():
                 return bounds, self._hidden(weight, seen[0])[None]
             chosen = partly
-        by_block = self._probe(origin, normal, caster, blocks, chosen)[1]
+        by_block = self._probe(origin, normal, buffers, blocks, chosen)[1]
         hidden = np.stack([self._hidden(weight, np.where(chosen, own, seen[0])) for own in by_block])
         new = np.flatnonzero(np.append(True, (hidden[1:] != hidden[:-1]).any(axis=1)))
         return np.append(blocks[new], len(origin)), hidden[new]
@@ -154,27 +154,27 @@ class LampChooser:
             own = self.chart[begin : begin + len(origin)]
             apart |= own[1:] != own[:-1]
         breaks = np.flatnonzero(apart) + 1
-        bounds = np.unique(np.concatenate([np.arange(0, len(origin), LANES), breaks, [len(origin)]]))
+        bounds = np.unique(np.concatenate([np.arange(0, len(origin), PACKET_WIDTH), breaks, [len(origin)]]))
         return bounds, bool(apart.any())
 
     def _probe(
         self,
         origin: NDArray[np.float32],
         normal: NDArray[np.float32],
-        caster: Caster,
+        buffers: PacketBuffers,
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the counts of `probe_clusters` (B, C) for some clusters (C,) bool."""
         shape = (len(bounds) - 1, len(chosen))
         share = _COST * self.n_light * len(origin) / (shape[0] * np.count_nonzero(chosen))
-        n_rays = int(np.clip(share, _FEWEST_RAYS, _MOST_RAYS if shape[0] == 1 else LANES))
+        n_rays = int(np.clip(share, _FEWEST_RAYS, _MOST_RAYS if shape[0] == 1 else PACKET_WIDTH))
         asked, seen = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
         row, first = self.emitters.row, self.emitters.first
-        probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, asked, seen)
+        probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen)
         return asked, seen
 
-    def _weights(self, lamps: Lamps, origin: NDArray[np.float32]) -> NDArray[np.float64]:
+    def _weights(self, lamps: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return (C,) roughly how bright clusters are at points (m, w, 3); 0 if they are turned away."""
         points = origin.reshape(-1, 3)
         low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
@@ -195,7 +195,7 @@ class LampChooser:
         return hidden
 
     def _choice(
-        self, part: slice, origin: NDArray[np.float32], lamps: Lamps, hidden: NDArray[np.bool_]
+        self, part: slice, origin: NDArray[np.float32], lamps: TileEmitters, hidden: NDArray[np.bool_]
     ) -> Choice:
         """Return the choice for points (m, w, 3) that do not see the clusters `hidden` (C,)."""
         hidden = hidden & (lamps.chance > 0)
@@ -204,7 +204,7 @@ class LampChooser:
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
         # No closed form for these: a ray that gets there after all is never taken for many.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
-        seen, apart = lamps_for(visible, origin), lamps_for(others, origin)
+        seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
         chance = np.zeros_like(lamps.chance)
         chance[~hidden] = seen.chance / seen.cumulative[-1]
         chance[hidden] = apart.chance / apart.cumulative[-1] * (self.n_hidden / self.n_light)

@@ -13,14 +13,22 @@ from baker.kernels.emitters import Emitters, needed_shading
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shading import Shading
 from baker.kernels.surface import Surface
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.direct import TILE, batch_variance
 from baker.radiosity.emitter_choice import LampChooser
-from baker.radiosity.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
+from baker.radiosity.kernels.gather import (
+    DIRECT,
+    INDIRECT,
+    N_COLUMNS,
+    OPEN,
+    SQUARE,
+    estimate_occlusion,
+    gather,
+)
 from baker.radiosity.kernels.side_table import SeenLight
 from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 STAGE = "final gather"
 AO_STAGE = "ambient occlusion"
@@ -49,7 +57,7 @@ def final_gather(
     n_front: int,
     surface: Surface,
     mask: NDArray[np.uint16],
-    table: HitTable,
+    table: TriangleLookup,
     seen: SeenLight,
     exact: NDArray[np.uint8],
     emitters: Emitters,
@@ -94,13 +102,13 @@ def final_gather(
         # Lights are chosen for the tile that `direct_light` saw, which goes on with backs.
         whole = min(begin + TILE, len(surface.pixel))
         origin, normal = tile_points(surface, mask, begin, whole, kept)
-        caster, out = new_caster(tracer), np.zeros((end - begin, N_COLUMNS), np.float32)
-        for choice in chooser.choose(begin, origin, normal, caster):
+        buffers, out = new_packet_buffers(tracer), np.zeros((end - begin, N_COLUMNS), np.float32)
+        for choice in chooser.choose(begin, origin, normal, buffers):
             part = slice(choice.part.start, min(choice.part.stop, end - begin))
             if part.start >= part.stop:
                 break
             gather(
-                origin[part], normal[part], table, seen, choice.found, needed, caster,
+                origin[part], normal[part], table, seen, choice.found, needed, buffers,
                 begin + part.start, net, shared, radiance, limits, exact[begin:end][part], out[part],
             )  # fmt: skip
         spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
@@ -144,7 +152,9 @@ def ambient_occlusion(
 
     def work(begin: int, end: int) -> Part:
         points = tile_points(surface, mask, begin, end, kept)
-        open_share(*points, new_caster(tracer.grey()), begin, net, shared, reach, 0, out)
+        estimate_occlusion(
+            *points, new_packet_buffers(tracer.without_transmittance()), begin, net, shared, reach, 0, out
+        )
         return (out[begin:end],)
 
     def keep(begin: int, end: int, part: Part) -> None:

@@ -18,7 +18,7 @@ from baker.core.parallel import Part, TileRunner, run_tiles
 from baker.core.progress import Progress
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.kernels.form_factor import (
     SKY,
     cast_form_factors,
@@ -30,7 +30,7 @@ from baker.radiosity.kernels.side_table import SeenPatch
 from baker.radiosity.patches import PatchSet
 from baker.radiosity.point_cache import PointCache, some_points
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 STAGE = "form factors"
 _TILE = 256
@@ -90,7 +90,7 @@ def build_form_factors(
     seen: SeenPatch,
     surface: Surface,
     mask: NDArray[np.uint16],
-    table: HitTable,
+    table: TriangleLookup,
     tracer: Tracer,
     *,
     n_rays: int,
@@ -155,7 +155,7 @@ def cast_rows(
     seen: SeenPatch,
     surface: Surface,
     mask: NDArray[np.uint16],
-    table: HitTable,
+    table: TriangleLookup,
     tracer: Tracer,
     *,
     n_rays: int,
@@ -199,7 +199,7 @@ def cast_rows(
         target = np.full((end - begin, n_rays), -1, np.int32)
         colour = np.zeros((end - begin if tracer.coloured else 0, n_rays, 3), np.float32)
         cast_form_factors(
-            origin, normal, table, seen, new_caster(tracer), begin, net, shared, target, tally, colour
+            origin, normal, table, seen, new_packet_buffers(tracer), begin, net, shared, target, tally, colour
         )
         passed = sum_colours(target, colour) if len(colour) else ()
         column, count, length = count_targets(target)

@@ -19,10 +19,10 @@ from baker.core.texels import TexelBuffer
 from baker.kernels.probe import BLACK_BACK, ELSEWHERE, PROOF, inside_hits
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.point_cache import points_of
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 STAGE = "buried texels"
 _TILE = 2048
@@ -34,7 +34,7 @@ _RAYS_PER_POINT = 8
 def find_buried(
     texels: TexelBuffer,
     surface: Surface,
-    table: HitTable,
+    table: TriangleLookup,
     tells: NDArray[np.uint8],
     tracer: Tracer,
     *,
@@ -66,9 +66,9 @@ def find_buried(
 
         def work(begin: int, end: int) -> None:
             points = points_of(surface, mask, chosen[begin:end], wanted)
-            caster = new_caster(tracer.grey())
+            buffers = new_packet_buffers(tracer.without_transmittance())
             rays[begin // _TILE] = inside_hits(
-                *points, table, tells, caster, begin, net, shared, rays_per_point, proof, hits
+                *points, table, tells, buffers, begin, net, shared, rays_per_point, proof, hits
             )
 
         run_tiles(

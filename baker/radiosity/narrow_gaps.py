@@ -15,10 +15,10 @@ from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import Surface
 from baker.radiosity.direct import TILE
-from baker.radiosity.kernels.gather import open_share
+from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.point_cache import PointCache, tile_points
 from baker.trace.embree import Tracer
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 STAGE = "crevices"
 # Sixteen neighbouring texels of which at most one of these first rays each was blocked are in the open.
@@ -65,8 +65,15 @@ def gap_depth(
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = tile_points(surface, mask, begin, end, kept)
         for share, reach in ((far, _FAR), (near, _NEAR)):
-            cast[begin // TILE] += open_share(
-                *points, new_caster(tracer.grey()), begin, net, shared, np.float32(reach * side), _LOOK, share
+            cast[begin // TILE] += estimate_occlusion(
+                *points,
+                new_packet_buffers(tracer.without_transmittance()),
+                begin,
+                net,
+                shared,
+                np.float32(reach * side),
+                _LOOK,
+                share,
             )
             # Whatever lies in a narrow gap lies in a wide one, too.
             if (share[begin:end] >= _OPEN).all():

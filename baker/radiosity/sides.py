@@ -24,7 +24,7 @@ from baker.core.progress import Progress
 from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface, place_points
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.kernels.form_factor import SPLIT
 from baker.radiosity.kernels.regions import join_linked, neighbour_pairs
 from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
@@ -39,7 +39,7 @@ from baker.radiosity.kernels.sides import (
 from baker.radiosity.lent_regions import lend_regions
 from baker.radiosity.point_cache import points_of
 from baker.trace.embree import Tracer
-from baker.trace.packets import Caster, new_caster
+from baker.trace.packets import PacketBuffers, new_packet_buffers
 
 STAGE = "texel sides"
 _TILE = 4096
@@ -142,7 +142,7 @@ def split_texels(
     texels: TexelBuffer,
     surface: Surface,
     mask: NDArray[np.uint16],
-    table: HitTable,
+    table: TriangleLookup,
     tracer: Tracer,
     *,
     seed: int,
@@ -159,7 +159,7 @@ def split_texels(
         The same entries.
     mask : (n,) uint16
         Bit k is set where point k is outside geometry.
-    table : HitTable
+    table : TriangleLookup
     tracer : Tracer
     seed, threads : int
     progress : Progress
@@ -168,14 +168,14 @@ def split_texels(
     -------
     Sides
     """
-    tracer = tracer.grey()
+    tracer = tracer.without_transmittance()
     n = texels.n
     crossed, side = np.zeros(n, np.uint8), np.zeros(n, np.float32)
     cast = np.zeros(-(-n // _TILE), np.int64)
 
     def look(begin: int, end: int) -> None:
         cast[begin // _TILE] = crossed_texels(
-            surface, begin, end, new_caster(tracer, solid=True), crossed, side
+            surface, begin, end, new_packet_buffers(tracer, solid=True), crossed, side
         )
 
     run_tiles(n, _TILE, look, threads=threads, stage=STAGE, progress=progress, rays_per_item=4)
@@ -216,14 +216,14 @@ def _group(
     def work(begin: int, end: int) -> None:
         own = chosen[begin:end]
         point, normal = points_of(surface, mask, own)
-        caster, label = new_caster(tracer, solid=True), np.zeros(point.shape[:2], np.int8)
-        height = _with_heights(point, normal, side[own], caster)[2].reshape(label.shape)
-        cast = group_points(point, normal, height, mask[own], caster, label)
+        buffers, label = new_packet_buffers(tracer, solid=True), np.zeros(point.shape[:2], np.int8)
+        height = _with_heights(point, normal, side[own], buffers)[2].reshape(label.shape)
+        cast = group_points(point, normal, height, mask[own], buffers, label)
         several = label.max(axis=1, initial=0) > 0
         whole = np.flatnonzero(~several)
         one, hidden = own[whole], np.zeros(len(whole), np.uint8)
         cast += hidden_corners(
-            surface, one, point[whole], normal[whole], height[whole], mask[one], side[one], caster, hidden
+            surface, one, point[whole], normal[whole], height[whole], mask[one], side[one], buffers, hidden
         )
         several[whole] = hidden != 0
         found = _Groups(
@@ -249,12 +249,12 @@ def _group(
 
 
 def _with_heights(
-    point: NDArray[np.float32], normal: NDArray[np.float32], side: NDArray[np.float32], caster: Caster
+    point: NDArray[np.float32], normal: NDArray[np.float32], side: NDArray[np.float32], buffers: PacketBuffers
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Return points and normals (m * w, 3), from (m, w, 3), and the heights (m * w,) of their segments."""
     height = np.zeros(point.shape[0] * point.shape[1], np.float32)
     flat, up = point.reshape(-1, 3), normal.reshape(-1, 3)
-    point_heights(flat, up, np.repeat(side, point.shape[1]), caster, height)
+    point_heights(flat, up, np.repeat(side, point.shape[1]), buffers, height)
     return flat, up, height
 
 
@@ -331,14 +331,14 @@ def _see(
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
         def work(begin: int, end: int) -> None:
-            own, caster = chosen[begin:end], new_caster(tracer, solid=True)
+            own, buffers = chosen[begin:end], new_packet_buffers(tracer, solid=True)
             ends: list[NDArray[np.float32]] = []
             for k in range(2):
                 entry = pair[own, k].astype(np.int64)
                 points = points_of(entries.surface, entries.mask, entry, wanted)
-                ends += _with_heights(*points, entries.side[entry], caster)
+                ends += _with_heights(*points, entries.side[entry], buffers)
             free = np.zeros(len(own) * wanted.size, np.uint8)
-            free_segments(*ends, caster, free)
+            free_segments(*ends, buffers, free)
             connected[own] = free.reshape(len(own), -1).max(axis=1)
 
         run_tiles(len(chosen), _PAIRS, work, threads=threads, stage=STAGE, progress=progress)
@@ -381,7 +381,7 @@ def _keep_largest(
 
 
 def _back_share(
-    entries: _Entries, groups: _Groups, table: HitTable, tracer: Tracer, seed: int
+    entries: _Entries, groups: _Groups, table: TriangleLookup, tracer: Tracer, seed: int
 ) -> tuple[NDArray[np.float64], int]:
     """Return the share (S, groups) of rays of each side that meet backs of one-sided surfaces; rays cast."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
@@ -394,7 +394,7 @@ def _back_share(
             own = chosen[begin : begin + _SUSPECTS]
             points = points_of(entries.surface, entries.mask, own)
             count = np.zeros(len(own), np.int32)
-            count_backs(*points, table, new_caster(tracer), net, shared_bits_mask(N_POINTS), count)
+            count_backs(*points, table, new_packet_buffers(tracer), net, shared_bits_mask(N_POINTS), count)
             cast += N_POINTS * len(own)
             share[row[begin : begin + _SUSPECTS], group] = count / N_POINTS
     return share, cast

@@ -54,8 +54,8 @@ def build_texels(
         first=first,
         entry=entry,
         entry_area=entry_area,
-        net=sobol_reversed(N_POINTS, seed, 7),
-        least=np.float32(0.05 * geometry.diagonal),
+        sobol_points=sobol_reversed(N_POINTS, seed, 7),
+        min_offset_scale=np.float32(0.05 * geometry.diagonal),
     )
     area = np.zeros(n_front, np.float32)
     centroid = np.zeros((n_front, 2), np.float32)

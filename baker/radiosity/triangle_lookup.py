@@ -7,10 +7,10 @@ import numpy as np
 from baker.core.geometry import Geometry
 from baker.core.texels import TexelBuffer
 from baker.kernels.emitters import Emitters
-from baker.kernels.triangle_lookup import HitTable
+from baker.kernels.triangle_lookup import TriangleLookup
 
 
-def build_hit_table(geometry: Geometry, texels: TexelBuffer, emitters: Emitters) -> HitTable:
+def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emitters) -> TriangleLookup:
     """Return the table for `kernels.triangle_lookup`."""
     row = np.zeros((len(geometry.triangle), 16), np.float32)
     uv = geometry.uv[geometry.triangle]
@@ -24,4 +24,4 @@ def build_hit_table(geometry: Geometry, texels: TexelBuffer, emitters: Emitters)
     row[:, 11] = geometry.area
     row[:, 12] = emitters.root
     row[:, 13] = geometry.material
-    return HitTable(row, texels.resolution, len(texels.lookup))
+    return TriangleLookup(row, texels.resolution, len(texels.lookup))

@@ -64,14 +64,14 @@ def build_alpha(
     return AlphaTable(slot, row)
 
 
-def hit_filter(shading: Shading, tint: TransmittanceTable | None = None) -> HitFilter | None:
+def hit_filter(shading: Shading, table: TransmittanceTable | None = None) -> HitFilter | None:
     """Return what the ray tree has to know of triangles that let light through, None without any.
 
     Parameters
     ----------
     shading : Shading
         Materials as kernels see them.
-    tint : TransmittanceTable, optional
+    table : TransmittanceTable, optional
         Those that let a share of it through; None if none do.
     """
     if not len(shading.alpha.row):
@@ -79,7 +79,7 @@ def hit_filter(shading: Shading, tint: TransmittanceTable | None = None) -> HitF
     # Loading the compiled function takes time that other scenes need not spend.
     from baker.shading.kernels.alpha_filter import filter_of
 
-    return filter_of(shading.alpha, tint, shading.pack)
+    return filter_of(shading.alpha, table, shading.pack)
 
 
 def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:

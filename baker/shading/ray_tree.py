@@ -5,7 +5,7 @@ from __future__ import annotations
 from baker.core.geometry import Geometry
 from baker.kernels.shading import Shading
 from baker.shading.alpha import hit_filter
-from baker.shading.transmittance import build_tint, tint
+from baker.shading.transmittance import build_transmittance_table, transmittance_filter
 from baker.trace.embree import RayScene
 
 
@@ -20,6 +20,8 @@ def build_ray_tree(geometry: Geometry, shading: Shading, *, threads: int) -> Ray
     threads : int
         Threads of the build; 0 means all.
     """
-    table = build_tint(shading)
-    passing, colouring = hit_filter(shading, table), tint(shading, table)
-    return RayScene(geometry.position, geometry.triangle, threads=threads, hit_filter=passing, tint=colouring)
+    table = build_transmittance_table(shading)
+    passing, colouring = hit_filter(shading, table), transmittance_filter(shading, table)
+    return RayScene(
+        geometry.position, geometry.triangle, threads=threads, hit_filter=passing, blend_filter=colouring
+    )

@@ -11,7 +11,7 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.shading import Shading
-from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
+from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
 
 
 def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
@@ -33,7 +33,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
         double_sided=geometry.double_sided,
         glows=(shading.emission.max(axis=1) > 0)[geometry.material],
     )
-    return find_solids(surfaces, lamps_and_cameras(scene))
+    return find_solids(surfaces, lights_and_cameras(scene))
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
@@ -50,10 +50,10 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
     hidden = solids.sealed & (solids.inside == BEHIND) & geometry.double_sided
     if hidden.any():
         geometry = replace(geometry, double_sided=geometry.double_sided & ~hidden)
-    return geometry, tell_tales(geometry, shading, solids)
+    return geometry, hit_kinds(geometry, shading, solids)
 
 
-def tell_tales(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
+def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
     """Return (T,) uint8 for `kernels.probe`: what a ray from inside of something meets.
 
     Backs of one-sided sheets are black, those of covers as good as black; those of rooms and of what lets

@@ -13,7 +13,7 @@ from baker.kernels.transmittance import COLOUR, ROW_LENGTH, TransmittanceTable
 from baker.trace.embree import HitFilter
 
 
-def build_tint(shading: Shading) -> TransmittanceTable | None:
+def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
     """Find the BLEND triangles, but for those without alpha anywhere; None if there are none.
 
     Parameters
@@ -50,7 +50,7 @@ def build_tint(shading: Shading) -> TransmittanceTable | None:
     return TransmittanceTable(slot, row, bool((there & ~white).any()))
 
 
-def tint(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None:
+def transmittance_filter(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None:
     """Return what the ray tree has to know of triangles that let a share of light through, None without any.
 
     Parameters
@@ -58,7 +58,7 @@ def tint(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None
     shading : Shading
         Materials as kernels see them.
     table : TransmittanceTable or None
-        `build_tint` of the same.
+        `build_transmittance_table` of the same.
     """
     if table is None:
         return None

@@ -82,7 +82,7 @@ class Solids(NamedTuple):
     parts: ClosedParts
 
 
-def lamps_and_cameras(scene: Scene) -> NDArray[np.float64]:
+def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
     """Return where lamps and cameras are, (N, 3) float64, metres, relative to the scene's origin."""
     cameras = np.array([camera.position for camera in scene.cameras], np.float64).reshape(-1, 3)
     return np.concatenate([light_positions(scene), cameras]) - scene.origin

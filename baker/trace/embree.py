@@ -27,7 +27,7 @@ _SCENE_ROBUST = 1 << 2
 # Up to so many triangles rays of neighbouring texels meet the same ones, and packets of them are traced as
 # coherent. *Measured*, final gather at 512 with 64 rays, share of the time without: 0.79 with 36 triangles,
 # 0.81 with 446, 0.77 with 986, 0.74 with 2714, 0.93 to 1.2 with 11 thousand, 1.35 with 70 thousand.
-FEW = 4096
+MAX_COHERENT_TRIANGLES = 4096
 _QUALITY_MEDIUM = 1
 _ERROR_OUT_OF_MEMORY = 4
 _ERRORS = {
@@ -103,25 +103,26 @@ class Tracer(NamedTuple):
         Addresses of rtcIntersectN and rtcOccludedN.
     width : int
         N, the widest packet this CPU traces natively.
-    tint : int or None
+    blend_scene : int or None
         RTCScene of the triangles that let a share of light through (BLEND), None without any.
     coloured : bool
         Whether any of these colours what it lets through.
-    few : bool
-        Whether the scene has so few triangles (`FEW`) that rays of neighbouring texels meet the same ones.
+    coherent : bool
+        Whether packets are traced as coherent: the scene has at most `MAX_COHERENT_TRIANGLES`, and rays of
+        neighbouring texels meet the same ones.
     """
 
     scene: int
     intersect: int
     occluded: int
     width: int
-    tint: int | None = None
-    few: bool = False
+    blend_scene: int | None = None
+    coherent: bool = False
     coloured: bool = False
 
-    def grey(self) -> Tracer:
+    def without_transmittance(self) -> Tracer:
         """Return the same for rays that ask only whether and where they end."""
-        return self._replace(tint=None)
+        return self._replace(blend_scene=None)
 
 
 class HitFilter(NamedTuple):
@@ -159,10 +160,11 @@ class RayScene:
         0.7 % do (17 % without the flag): Embree's own limit.
     threads : int
         Threads of the tree's build; 0 means all.
-    see_through : HitFilter, optional
+    hit_filter : HitFilter, optional
         A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
-    tint : HitFilter, optional
-        Some of these triangles, whose hits have geometry 2. They also form a tree of their own: `tint`.
+    blend_filter : HitFilter, optional
+        Some of these triangles, whose hits have geometry 2. They also form a second tree,
+        `Tracer.blend_scene`.
 
     Raises
     ------
@@ -178,11 +180,11 @@ class RayScene:
         robust: bool = True,
         threads: int = 0,
         hit_filter: HitFilter | None = None,
-        tint: HitFilter | None = None,
+        blend_filter: HitFilter | None = None,
     ) -> None:
         library = _library()
         self._library = library
-        self._owners = hit_filter, tint
+        self._owners = hit_filter, blend_filter
         n = len(position)
         # Row n belongs to triangles that a geometry leaves out: Embree skips those with a vertex that is no
         # number. It reads 16 bytes from each vertex: one spare row keeps the last read inside.
@@ -193,8 +195,8 @@ class RayScene:
         if hit_filter is not None:
             self._position[n] = np.nan
             chosen = hit_filter.chosen
-            share = np.zeros_like(chosen) if tint is None else tint.chosen
-            kept = [~chosen, chosen & ~share, *([] if tint is None else [share])]
+            share = np.zeros_like(chosen) if blend_filter is None else blend_filter.chosen
+            kept = [~chosen, chosen & ~share, *([] if blend_filter is None else [share])]
             self._triangles = [np.where(own[:, None], whole, np.uint32(n)) for own in kept]
         config = f"threads={threads},set_affinity=0".encode() if threads else b"set_affinity=0"
         self._device = library.rtcNewDevice(ctypes.cast(ctypes.c_char_p(config), ctypes.c_void_p))
@@ -209,11 +211,11 @@ class RayScene:
         parts = zip(range(3), self._triangles, filters, strict=False) if len(triangle) else ()
         # A geometry in which no triangle is left needs no place in the tree; the others keep their numbers.
         scene = self._add_scene([part for part in parts if part[0] != 1 or kept[1].any()], robust)
-        tinted = None
-        if tint is not None:
-            tinted = self._add_scene([(0, self._triangles[-1], tint)], robust)
+        blend_scene = None
+        if blend_filter is not None:
+            blend_scene = self._add_scene([(0, self._triangles[-1], blend_filter)], robust)
         self._check("building the ray tree")
-        self.tracer = self._tracer(scene, tinted, tint is not None and tint.coloured)
+        self.tracer = self._tracer(scene, blend_scene, blend_filter is not None and blend_filter.coloured)
 
     def _add_scene(self, parts: list[tuple[int, NDArray[np.uint32], HitFilter | None]], robust: bool) -> int:
         library = self._library
@@ -259,15 +261,15 @@ class RayScene:
         if code:
             raise ResourceError(f"Embree failed while {what}: {_ERRORS.get(code, code)}")
 
-    def _tracer(self, scene: int, tint: int | None, coloured: bool) -> Tracer:
+    def _tracer(self, scene: int, blend_scene: int | None, coloured: bool) -> Tracer:
         library = self._library
         width = 4
         for candidate, name in ((16, _PROPERTY_RAY16), (8, _PROPERTY_RAY8)):
             if library.rtcGetDeviceProperty(self._device, name):
                 width = candidate
                 break
-        few = len(self._triangles[0]) <= FEW
-        return Tracer(scene, *self.functions(width), width, tint, few, coloured)
+        coherent = len(self._triangles[0]) <= MAX_COHERENT_TRIANGLES
+        return Tracer(scene, *self.functions(width), width, blend_scene, coherent, coloured)
 
     def functions(self, width: int) -> tuple[int, int]:
         """Return the addresses of rtcIntersectN and rtcOccludedN for packets of 4, 8 or 16 rays."""

@@ -30,21 +30,27 @@ NG_X, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID = range(12, 19)
 ROWS = 21
 MAX_WIDTH = 16
 # Rays that the kernels of a bake handle together.
-LANES = 16
+PACKET_WIDTH = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
 # Geometry of BLEND triangles.
 BLEND_GEOMETRY = np.uint32(2)
-# What the ID of a ray says about BLEND surfaces. In the tree of all triangles: 0, it stops at them by chance;
-# n from 1 to 16, it passes, and the transmittance is multiplied into the n-th of `Tint.colour`; UNAWARE, it
-# passes but where alpha is 1; SOLID, it stops but where alpha is 0. In the tree of BLEND triangles: n,
-# lerp(1, c, a) is multiplied; PASSES + n, the transmittance.
-PASSES, UNAWARE, SOLID = LANES, np.uint32(2 * LANES + 1), np.uint32(2 * LANES + 2)
-# Words of what filter functions of BLEND triangles find: RTCRayQueryContext, `Tint.stop`, `Tint.colour`,
-# `Tint.edge_hits`, and so many hits on edges for each ray: distance and surface of each (`edge_hits`).
+# ID row of a ray: how it meets BLEND surfaces of alpha a and colour c.
+#
+#     tree of all triangles    0             stops with probability a
+#                              n = 1 to 16   passes; T = (1 - a) lerp(1, c, a) is multiplied into
+#                                            `BlendBuffers.transmittance` of ray n - 1
+#                              UNAWARE       stops only where a = 1
+#                              SOLID         passes only where a = 0
+#     tree of BLEND triangles  n = 1 to 16   passes; lerp(1, c, a) is multiplied
+#                              PASSES + n    passes; T is multiplied
+PASSES, UNAWARE, SOLID = PACKET_WIDTH, np.uint32(2 * PACKET_WIDTH + 1), np.uint32(2 * PACKET_WIDTH + 2)
+# Four-byte words that filter functions of BLEND triangles read at the address of the query context:
+# RTCRayQueryContext, then `BlendBuffers.stop`, `.transmittance` and `.edges`, then EDGE_HITS pairs for each
+# ray, distance and surface of a hit on an edge (`edge_hits`).
 EDGE_HITS = 32
-TINT_STOP, TINT_COLOUR, TINT_EDGES = 16, 16 + LANES, 16 + 4 * LANES
-TINT_EDGE_HITS = TINT_EDGES + LANES
-CONTEXT_WORDS = TINT_EDGE_HITS + LANES * EDGE_HITS * 2
+BLEND_STOP, BLEND_TRANSMITTANCE, BLEND_EDGES = 16, 16 + PACKET_WIDTH, 16 + 4 * PACKET_WIDTH
+BLEND_EDGE_HITS = BLEND_EDGES + PACKET_WIDTH
+CONTEXT_WORDS = BLEND_EDGE_HITS + PACKET_WIDTH * EDGE_HITS * 2
 # RTC_RAY_QUERY_FLAG_COHERENT.
 _COHERENT = 1 << 16
 
@@ -109,14 +115,14 @@ def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-un
 copy_four: Any = intrinsic(_copy_four)
 
 
-class Tint(NamedTuple):
+class BlendBuffers(NamedTuple):
     """Memory for the transmittance of BLEND surfaces along rays; each thread has its own.
 
-    scene : int, see `Tracer.tint`
+    scene : int, see `Tracer.blend_scene`
     coloured : int, 0 if no triangle of that tree colours light
     arguments : (5,) int64, RTCOccludedArguments; they hand the arrays below to filter functions
     stop : (16,) uint32, triangle at which each of sixteen rays ends: it lets nothing through
-    colour : (3 * 16,) float32, what RGB is multiplied by
+    transmittance : (3 * 16,) float32, what RGB is multiplied by
     edges : (16,) uint32, hits on edges of triangles found so far, see `edge_hits`
     """
 
@@ -124,18 +130,18 @@ class Tint(NamedTuple):
     coloured: int
     arguments: NDArray[np.int64]
     stop: NDArray[np.uint32]
-    colour: NDArray[np.float32]
+    transmittance: NDArray[np.float32]
     edges: NDArray[np.uint32]
 
 
-class Caster(NamedTuple):
+class PacketBuffers(NamedTuple):
     """A tracer with the memory of one packet; each thread has its own.
 
     scene, intersect, occluded, width: see `Tracer`; valid (16,) int32, -1 for lanes to trace;
     floats (21 * 16,) float32 and words, the same memory as uint32: a packet of the native width.
     lane_valid, lane_floats, lane_words: the same for sixteen rays, rows 16 numbers apart.
     query: (5,) int64, `arguments_of` rays of neighbouring texels in this scene.
-    tint: None if there are no BLEND triangles; Numba then compiles kernels without it.
+    blend: None if there are no BLEND triangles; Numba then compiles kernels without it.
     """
 
     scene: int
@@ -149,10 +155,10 @@ class Caster(NamedTuple):
     lane_floats: NDArray[np.float32]
     lane_words: NDArray[np.uint32]
     query: NDArray[np.int64]
-    tint: Tint | None = None
+    blend: BlendBuffers | None = None
 
 
-def new_caster(tracer: Tracer, *, solid: bool = False) -> Caster:
+def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
     """Return packet memory at multiples of 64 bytes, as Embree wants.
 
     What no kernel changes is set here: time and tnear 0, all bits of the mask.
@@ -160,29 +166,29 @@ def new_caster(tracer: Tracer, *, solid: bool = False) -> Caster:
     solid : whether the sixteen rays stop at BLEND surfaces wherever alpha is above 0, see `SOLID`
     """
     valid, floats = _packet_memory(tracer.width)
-    lane_valid, lane_floats = _packet_memory(LANES)
+    lane_valid, lane_floats = _packet_memory(PACKET_WIDTH)
     if solid:
-        lane_floats.view(np.uint32)[ID * LANES : (ID + 1) * LANES] = SOLID
-    return Caster(
+        lane_floats.view(np.uint32)[ID * PACKET_WIDTH : (ID + 1) * PACKET_WIDTH] = SOLID
+    return PacketBuffers(
         *tracer[:4],
         *(valid, floats, floats.view(np.uint32)),
         *(lane_valid, lane_floats, lane_floats.view(np.uint32)),
-        arguments_of(coherent=tracer.few),
-        None if tracer.tint is None else new_tint(tracer.tint, tracer.coloured),
+        arguments_of(coherent=tracer.coherent),
+        None if tracer.blend_scene is None else new_blend_buffers(tracer.blend_scene, tracer.coloured),
     )
 
 
-def new_tint(scene: int, coloured: bool) -> Tint:
-    """Return the memory that one thread needs for transmittance; see `Tracer.tint` and `coloured`."""
+def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
+    """Return the memory that one thread needs for transmittance; see `Tracer.blend_scene` and `coloured`."""
     # RTCRayQueryContext (without instances), and what the filter functions find behind it.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
-    words[:TINT_STOP] = NO_HIT
+    words[:BLEND_STOP] = NO_HIT
     # Never coherent: Embree then follows the rays of each octant apart, but asks about all rays at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
-    stop, edges = words[TINT_STOP:TINT_COLOUR], words[TINT_EDGES:TINT_EDGE_HITS]
-    return Tint(scene, int(coloured), arguments, stop, memory[TINT_COLOUR:TINT_EDGES], edges)
+    stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]
+    return BlendBuffers(scene, int(coloured), arguments, stop, memory[BLEND_TRANSMITTANCE:BLEND_EDGES], edges)
 
 
 def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:
@@ -232,13 +238,13 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
-    function, scene, width, query and the four arrays are a caster's
+    function, scene, width, query and the four arrays are a buffers's
     """
-    if width == LANES:
+    if width == PACKET_WIDTH:
         call_embree_with(function, lane_valid, scene, lane_floats, query)
         return
     # Four at a time by hand: what the compiler makes of loops over lanes here is twenty times as long.
-    for first in range(0, LANES, width):
+    for first in range(0, PACKET_WIDTH, width):
         lane = first
         while lane < first + width and lane_valid[lane] == 0:
             lane += 1
@@ -248,13 +254,13 @@ def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, f
             at = first + to
             copy_four(valid, to, lane_valid, at)
             for row in range(DIR_Z + 1):
-                copy_four(floats, row * width + to, lane_floats, row * LANES + at)
-            copy_four(floats, TFAR * width + to, lane_floats, TFAR * LANES + at)
-            copy_four(floats, ID * width + to, lane_floats, ID * LANES + at)
-            copy_four(floats, GEOM_ID * width + to, lane_floats, GEOM_ID * LANES + at)
+                copy_four(floats, row * width + to, lane_floats, row * PACKET_WIDTH + at)
+            copy_four(floats, TFAR * width + to, lane_floats, TFAR * PACKET_WIDTH + at)
+            copy_four(floats, ID * width + to, lane_floats, ID * PACKET_WIDTH + at)
+            copy_four(floats, GEOM_ID * width + to, lane_floats, GEOM_ID * PACKET_WIDTH + at)
         call_embree_with(function, valid, scene, floats, query)
         for to in range(0, width, 4):
             at = first + to
-            copy_four(lane_floats, TFAR * LANES + at, floats, TFAR * width + to)
+            copy_four(lane_floats, TFAR * PACKET_WIDTH + at, floats, TFAR * width + to)
             for row in range(HIT_U, GEOM_ID + 1):
-                copy_four(lane_floats, row * LANES + at, floats, row * width + to)
+                copy_four(lane_floats, row * PACKET_WIDTH + at, floats, row * width + to)

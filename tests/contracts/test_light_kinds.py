@@ -28,7 +28,7 @@ from baker.pipeline.bake import bake
 from baker.radiosity.direct import direct_light
 from baker.rendering.render import render
 from baker.rendering.settings import RenderSettings
-from baker.topology.solids import lamps_and_cameras
+from baker.topology.solids import lights_and_cameras
 from baker.uv.unwrap import unwrap_scene
 from baker.verification import VerifySettings, verify
 
@@ -132,7 +132,7 @@ REFUSERS = {
     "path tracer": reference,
     "checks": lambda scene: CheckContext(scene, SETTINGS),
     "checks of a bake": lambda scene: bake_warnings(scene, SETTINGS),
-    "solids": lamps_and_cameras,
+    "solids": lights_and_cameras,
     "glTF": lambda scene: new_document(scene, unwrap_scene(scene, SETTINGS)),
 }
 

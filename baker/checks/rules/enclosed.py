@@ -11,7 +11,7 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
 from baker.checks.scene_rays import World
-from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lamps_and_cameras
+from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
 
 # A face is looked at in its middle and beside its corners, which are drawn in by this share.
 _DRAWN_IN = 0.02
@@ -99,7 +99,7 @@ def _solids(context: CheckContext, world: World) -> Solids:
         double_sided=world.double_sided,
         glows=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
     )
-    return find_solids(surfaces, lamps_and_cameras(context.scene))
+    return find_solids(surfaces, lights_and_cameras(context.scene))
 
 
 def _holders(world: World, solids: Solids) -> NDArray[np.int64]:

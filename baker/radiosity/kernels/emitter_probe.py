@@ -10,7 +10,7 @@ from baker.kernels.sampling import hash_combine, triangle_barycentric
 from baker.kernels.surface import N_POINTS
 from baker.kernels.transmittance import trace_shadow_lanes
 from baker.trace.jit import inner, kernel, smaller
-from baker.trace.packets import DIR_X, LANES, ORG_X, TFAR
+from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
 # Shadow rays end this share of their length before the light.
@@ -20,7 +20,7 @@ _INV_2_24 = np.float32(5.9604645e-08)
 
 
 @kernel
-def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, asked, seen):
+def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen):
     """Count the rays to each cluster that could carry light, and those that nothing blocks.
 
     origin, normal : (m, 16, 3) float32, points of neighbouring texels
@@ -29,16 +29,16 @@ def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, a
     n_rays : rays from each block to each cluster; they start at points spread over the block
     asked, seen : (B, C) int32 output
     """
-    scene, occluded, width = caster.scene, caster.occluded, caster.width
-    query = caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
+    query = buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     for b in range(len(bounds) - 1):
         begin, size = bounds[b], bounds[b + 1] - bounds[b]
         for c in range(len(chosen)):
             asked[b, c] = seen[b, c] = 0
-            for group in range(0, n_rays if chosen[c] else 0, LANES):
-                for lane in range(LANES):
+            for group in range(0, n_rays if chosen[c] else 0, PACKET_WIDTH):
+                for lane in range(PACKET_WIDTH):
                     on[lane] = 0
                     r = group + lane
                     if r < n_rays:
@@ -46,14 +46,14 @@ def probe_clusters(origin, normal, row, first, caster, bounds, chosen, n_rays, a
                         i = begin + smaller(np.int64((r + _uniform(code, 0)) * size / n_rays), size - 1)
                         k = smaller(np.int64(_uniform(code, 1) * N_POINTS), N_POINTS - 1)
                         for a in range(3):
-                            rays[(ORG_X + a) * LANES + lane] = origin[i, k, a]
+                            rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, k, a]
                         on[lane] = _aim(rays, lane, normal, i, k, row, first[c], first[c + 1], code)
                         asked[b, c] -= on[lane]
                 trace_shadow_lanes(
-                    caster.tint, occluded, scene, width, query, on, rays, words, spare_on, spare
+                    buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare
                 )
-                for lane in range(LANES):
-                    if on[lane] != 0 and rays[TFAR * LANES + lane] >= _f(0.0):
+                for lane in range(PACKET_WIDTH):
+                    if on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0):
                         seen[b, c] += 1
 
 
@@ -78,11 +78,11 @@ def _aim(rays, lane, normal, i, k, row, start, end, code):
     for a in range(3):
         corner = row[m, a]
         point = corner + b1 * (row[m, 3 + a] - corner) + b2 * (row[m, 6 + a] - corner)
-        way = point - rays[(ORG_X + a) * LANES + lane]
-        rays[(DIR_X + a) * LANES + lane] = way
+        way = point - rays[(ORG_X + a) * PACKET_WIDTH + lane]
+        rays[(DIR_X + a) * PACKET_WIDTH + lane] = way
         received += way * normal[i, k, a]
         sent -= way * row[m, NORMAL + a]
-    rays[TFAR * LANES + lane] = _SHORT
+    rays[TFAR * PACKET_WIDTH + lane] = _SHORT
     if row[m, TWO_SIDED] > _f(0.0):
         sent = abs(sent)
     return np.int32(-1) if received > _f(0.0) and sent > _f(0.0) else np.int32(0)

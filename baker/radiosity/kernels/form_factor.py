@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
-from baker.kernels.transmittance import follow, light_kept
+from baker.kernels.transmittance import trace_transmittance, transmittance
 from baker.kernels.triangle_lookup import front_facing, hit_pixel
 from baker.radiosity.kernels.side_table import find_side, new_hits, note_hit
 from baker.trace.jit import inner, kernel, larger, smaller
@@ -24,8 +24,8 @@ from baker.trace.packets import (
     GEOM_ID,
     HIT_U,
     HIT_V,
-    LANES,
     NO_HIT,
+    PACKET_WIDTH,
     PRIM_ID,
     trace_lanes,
 )  # fmt: skip
@@ -35,51 +35,53 @@ LOST, SKY, SPLIT = -1, -2, -3
 
 
 @kernel
-def cast_form_factors(origin, normal, table, seen, caster, begin, net, shared, target, tally, colour):
+def cast_form_factors(
+    origin, normal, table, seen, buffers, begin, sobol_points, shared, target, tally, colour
+):
     """Cast the rays of patches.
 
     origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
     seen : `side_table.SeenPatch`, patches that hits lie on
-    net : (R, 2) uint32
+    sobol_points : (R, 2) uint32
     target : (m, R) int32 output, patch hit, LOST or SKY
     tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
     colour : (m, R, 3) float32 output, what light along a ray is multiplied by; no rows if nothing colours it
     """
-    scene, intersect, width = caster.scene, caster.intersect, caster.width
-    query = caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
+    query = buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
     patch, of_side = seen.image, seen.value
     side_point, side_normal, side_height = seen.sides.point, seen.sides.normal, seen.sides.height
     side_member, side_length = seen.sides.member, seen.sides.side
     hits = new_hits()
     seeds, frame = new_seeds(), new_frame()
-    for group in range(0, len(origin), LANES):
-        lanes = smaller(LANES, len(origin) - group)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 30, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
-        for r in range(len(net)):
+        for r in range(len(sobol_points)):
             load_frames(rays, frame, origin, normal, group, lanes, r)
-            aim_lanes(rays, words, frame, seeds, net[r, 0], net[r, 1], shared, FAR)
+            aim_lanes(rays, words, frame, seeds, sobol_points[r, 0], sobol_points[r, 1], shared, FAR)
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-            follow(caster.tint, caster.occluded, width, on, rays, words, spare_on, spare)
-            _note_colour(caster.tint, colour, group, lanes, r)
+            trace_transmittance(buffers.blend, buffers.occluded, width, on, rays, words, spare_on, spare)
+            _note_colour(buffers.blend, colour, group, lanes, r)
             n_split = 0
             for lane in range(lanes):
                 p = group + lane
                 target[p, r] = LOST
-                if words[GEOM_ID * LANES + lane] == NO_HIT:
+                if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
                     target[p, r] = SKY
                     tally[begin + p, 0] += 1
                     continue
-                prim = np.int64(words[PRIM_ID * LANES + lane])
+                prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                 front = front_facing(
-                    row, prim, rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane],
-                    rays[DIR_Z * LANES + lane],
+                    row, prim, rays[DIR_X * PACKET_WIDTH + lane], rays[DIR_Y * PACKET_WIDTH + lane],
+                    rays[DIR_Z * PACKET_WIDTH + lane],
                 )  # fmt: skip
-                u, v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
+                u, v = rays[HIT_U * PACKET_WIDTH + lane], rays[HIT_V * PACKET_WIDTH + lane]
                 pixel = hit_pixel(row, size, n_pixels, prim, u, v, front)
                 if pixel >= 0:
                     target[p, r] = patch[pixel]
@@ -95,24 +97,24 @@ def cast_form_factors(origin, normal, table, seen, caster, begin, net, shared, t
                     if at >= 0:
                         found = find_side(
                             side_point, side_normal, side_height, side_member, side_length,
-                            at, hits, lane, caster,
+                            at, hits, lane, buffers,
                         )  # fmt: skip
                         target[p, r] = LOST
                         if found >= 0:
                             target[p, r] = of_side[found]
                         else:
                             tally[begin + p, 1] += 1
-                for lane in range(LANES):
+                for lane in range(PACKET_WIDTH):
                     on[lane] = -1 if lane < lanes else 0
 
 
 @inner
-def _note_colour(tint, colour, group, lanes, r):
-    if tint is None or len(colour) == 0:
+def _note_colour(blend, colour, group, lanes, r):
+    if blend is None or len(colour) == 0:
         return
     for lane in range(lanes):
         for c in range(3):
-            colour[group + lane, r, c] = light_kept(tint, c, lane)
+            colour[group + lane, r, c] = transmittance(blend, c, lane)
 
 
 @kernel
@@ -132,16 +134,16 @@ def multiply(first, column, value, exitance, irradiance):
 
 
 @kernel
-def multiply_coloured(first, column, value, tint, exitance, irradiance):
-    """Write the same where light is multiplied by `tint` (nnz, 3) float32 on its way."""
+def multiply_coloured(first, column, value, transmittance, exitance, irradiance):
+    """Write the same where light is multiplied by `transmittance` (nnz, 3) float32 on its way."""
     for i in range(len(first) - 1):
         red = green = blue = 0.0
         for k in range(first[i], first[i + 1]):
             j = column[k]
             f = value[k]
-            red += f * tint[k, 0] * exitance[j, 0]
-            green += f * tint[k, 1] * exitance[j, 1]
-            blue += f * tint[k, 2] * exitance[j, 2]
+            red += f * transmittance[k, 0] * exitance[j, 0]
+            green += f * transmittance[k, 1] * exitance[j, 1]
+            blue += f * transmittance[k, 2] * exitance[j, 2]
         irradiance[i, 0] = red
         irradiance[i, 1] = green
         irradiance[i, 2] = blue

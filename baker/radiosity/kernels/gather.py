@@ -17,7 +17,13 @@ import numpy as np
 from baker.kernels.emitters import CLUSTER, RADIANCE, TEXTURED, emitted_radiance, emitter_at
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.surface import N_POINTS
-from baker.kernels.transmittance import any_stopped, follow_gather, gather_turns, light_kept, trace_gather
+from baker.kernels.transmittance import (
+    any_stopped,
+    gather_turns,
+    trace_gather,
+    trace_gather_transmittance,
+    transmittance,
+)
 from baker.kernels.triangle_lookup import front_facing, hit_pixel
 from baker.radiosity.kernels.area_light import emitter_hit
 from baker.radiosity.kernels.side_table import find_side, new_hits, note_hit
@@ -29,8 +35,8 @@ from baker.trace.packets import (
     GEOM_ID,
     HIT_U,
     HIT_V,
-    LANES,
     NO_HIT,
+    PACKET_WIDTH,
     PRIM_ID,
     TFAR,
     trace_lanes,
@@ -41,28 +47,34 @@ _f = np.float32
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
 # Memory of the kernels below.
-_parts, _floats = scratch((7 * LANES,), np.float32), scratch((LANES,), np.float32)
-_totals, _doubles = scratch((7 * LANES,), np.float64), scratch((LANES,), np.float64)
-_numbers, _counts, _rgba = scratch((LANES,), np.int64), scratch((LANES,), np.int32), scratch((4,), np.float64)
+_parts, _floats = scratch((7 * PACKET_WIDTH,), np.float32), scratch((PACKET_WIDTH,), np.float32)
+_totals, _doubles = scratch((7 * PACKET_WIDTH,), np.float64), scratch((PACKET_WIDTH,), np.float64)
+_numbers, _counts, _rgba = (
+    scratch((PACKET_WIDTH,), np.int64),
+    scratch((PACKET_WIDTH,), np.int32),
+    scratch((4,), np.float64),
+)
 
 
 @kernel
-def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shared, sky, limits, exact, out):
+def gather(
+    origin, normal, table, seen, lamps, shading, buffers, begin, sobol_points, shared, sky, limits, exact, out
+):
     """Write the gathered light of texels.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
     seen : `side_table.SeenLight`, light that texels reflect
     shading : from `emitters.needed_shading`
-    net : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
+    sobol_points : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
     limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
     exact : (m,) uint8, 1 for texels that have all light of emitters already
     begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
     """
-    n_samples = len(net)
-    scene, intersect, width = caster.scene, caster.intersect, caster.width
-    query = caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    n_samples = len(sobol_points)
+    scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
+    query = buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     row, size, n_pixels = table.row, table.size, table.n_pixels
     lamp, chance, cumulative, node = lamps.row, lamps.chance, lamps.cumulative, lamps.node
     apart = lamps.apart
@@ -84,14 +96,14 @@ def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shar
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
-    turns, opened = gather_turns(caster.tint), _f(1.0)
-    for group in range(0, len(origin), LANES):
-        lanes = smaller(LANES, len(origin) - group)
+    turns, opened = gather_turns(buffers.blend), _f(1.0)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
             squares[lane] = 0.0
-        for j in range(7 * LANES):
+        for j in range(7 * PACKET_WIDTH):
             total[j] = 0.0
         stopped = True
         for step in range(n_samples * turns):
@@ -99,39 +111,43 @@ def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shar
             k = s * N_POINTS // n_samples
             if turn == 0 and (s == 0 or k != (s - 1) * N_POINTS // n_samples):
                 load_frames(rays, frame, origin, normal, group, lanes, k)
-                for j in range(7 * LANES):
+                for j in range(7 * PACKET_WIDTH):
                     part[j] = _f(0.0)
-                for lane in range(LANES):
+                for lane in range(PACKET_WIDTH):
                     missed[lane] = _f(0.0)
             if turn == 0 or stopped:
-                aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, FAR)
+                aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
-                    caster.tint, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
+                    buffers.blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
                 )
             if turn == 0:
                 # AO goes by where rays stop by chance.
                 opened = _f(1.0)
-                stopped = any_stopped(caster.tint, words)
+                stopped = any_stopped(buffers.blend, words)
                 if not stopped:
                     continue
-            follow_gather(caster.tint, turn, caster.occluded, width, on, rays, words, spare_on, spare)
-            for lane in range(LANES):
-                none = words[GEOM_ID * LANES + lane] == NO_HIT
+            trace_gather_transmittance(
+                buffers.blend, turn, buffers.occluded, width, on, rays, words, spare_on, spare
+            )
+            for lane in range(PACKET_WIDTH):
+                none = words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)
-                free = none or rays[TFAR * LANES + lane] > distance
-                part[OPEN * LANES + lane] += opened if free else _f(0.0)
+                free = none or rays[TFAR * PACKET_WIDTH + lane] > distance
+                part[OPEN * PACKET_WIDTH + lane] += opened if free else _f(0.0)
             opened = _f(0.0)
-            _add_coloured_sky(caster.tint, words, sky, missed, part)
+            _add_coloured_sky(buffers.blend, words, sky, missed, part)
             # First only find the pixels, then fetch them: the fetches do not wait for each other.
             for lane in range(lanes):
                 pixel[lane] = -1
-                if words[GEOM_ID * LANES + lane] == NO_HIT:
+                if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
                     continue
-                prim = np.int64(words[PRIM_ID * LANES + lane])
+                prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                 dx, dy, dz = (
-                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
-                )  # fmt: skip
-                hit_u, hit_v = rays[HIT_U * LANES + lane], rays[HIT_V * LANES + lane]
+                    rays[DIR_X * PACKET_WIDTH + lane],
+                    rays[DIR_Y * PACKET_WIDTH + lane],
+                    rays[DIR_Z * PACKET_WIDTH + lane],
+                )
+                hit_u, hit_v = rays[HIT_U * PACKET_WIDTH + lane], rays[HIT_V * PACKET_WIDTH + lane]
                 i = group + lane
                 m = np.int64(row[prim, 12])
                 if m < -1 and (exact[i] == 0 or some_apart):
@@ -139,7 +155,7 @@ def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shar
                 if m >= 0 and (exact[i] == 0 or apart[np.int64(lamp[m, CLUSTER])] != 0):
                     weight = whole * emitter_hit(
                         row, lamp, chance, cumulative, prim, m, dx, dy, dz,
-                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * LANES + lane],
+                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * PACKET_WIDTH + lane],
                         limits[1], n_samples,
                     )  # fmt: skip
                     if weight > 0.0:
@@ -148,8 +164,8 @@ def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shar
                         if shading is not None and lamp[m, TEXTURED] > _f(0.0):
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
-                            kept = light_kept(caster.tint, c, lane)
-                            part[(DIRECT + c) * LANES + lane] += _f(radiance[c] * weight) * kept
+                            kept = transmittance(buffers.blend, c, lane)
+                            part[(DIRECT + c) * PACKET_WIDTH + lane] += _f(radiance[c] * weight) * kept
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             if lit:
@@ -158,89 +174,101 @@ def gather(origin, normal, table, seen, lamps, shading, caster, begin, net, shar
                     p = pixel[lane]
                     if p >= 0:
                         if exitance[p, 3] > _f(0.0):
-                            prim = np.int64(words[PRIM_ID * LANES + lane])
+                            prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                             dx, dy, dz = (
-                                rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane],
-                                rays[DIR_Z * LANES + lane],
+                                rays[DIR_X * PACKET_WIDTH + lane], rays[DIR_Y * PACKET_WIDTH + lane],
+                                rays[DIR_Z * PACKET_WIDTH + lane],
                             )  # fmt: skip
                             note_hit(hits, lane, rays, row, prim, front_facing(row, prim, dx, dy, dz))
                             split[n_split] = lane
                             n_split += 1
                             continue
-                        tint = caster.tint
-                        part[lane] += exitance[p, 0] * inverse_pi * light_kept(tint, 0, lane)
-                        part[LANES + lane] += exitance[p, 1] * inverse_pi * light_kept(tint, 1, lane)
-                        part[2 * LANES + lane] += exitance[p, 2] * inverse_pi * light_kept(tint, 2, lane)
+                        blend = buffers.blend
+                        part[lane] += exitance[p, 0] * inverse_pi * transmittance(blend, 0, lane)
+                        part[PACKET_WIDTH + lane] += (
+                            exitance[p, 1] * inverse_pi * transmittance(blend, 1, lane)
+                        )
+                        part[2 * PACKET_WIDTH + lane] += (
+                            exitance[p, 2] * inverse_pi * transmittance(blend, 2, lane)
+                        )
                 for j in range(n_split):
                     lane = int(split[j])
                     at = np.int64(exitance[pixel[lane], 3]) - 1
                     found = find_side(
-                        side_point, side_normal, side_height, side_member, side_length, at, hits, lane, caster
+                        side_point,
+                        side_normal,
+                        side_height,
+                        side_member,
+                        side_length,
+                        at,
+                        hits,
+                        lane,
+                        buffers,
                     )
                     if found >= 0:
                         for c in range(3):
-                            kept = light_kept(caster.tint, c, lane)
-                            part[c * LANES + lane] += of_side[found, c] * inverse_pi * kept
+                            kept = transmittance(buffers.blend, c, lane)
+                            part[c * PACKET_WIDTH + lane] += of_side[found, c] * inverse_pi * kept
                 if n_split > 0:
-                    for lane in range(LANES):
+                    for lane in range(PACKET_WIDTH):
                         on[lane] = -1 if lane < lanes else 0
             if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
-                for lane in range(LANES):
+                for lane in range(PACKET_WIDTH):
                     for c in range(3):
-                        part[(DIRECT + c) * LANES + lane] += missed[lane] * sky[c]
+                        part[(DIRECT + c) * PACKET_WIDTH + lane] += missed[lane] * sky[c]
                     now = 0.0
                     for c in range(6):
-                        now += part[c * LANES + lane]
+                        now += part[c * PACKET_WIDTH + lane]
                     squares[lane] += now * now
                     for c in range(7):
-                        total[c * LANES + lane] += part[c * LANES + lane]
+                        total[c * PACKET_WIDTH + lane] += part[c * PACKET_WIDTH + lane]
         scale = np.pi / n_samples
         for lane in range(lanes):
             i = group + lane
             for c in range(6):
-                out[i, c] = total[c * LANES + lane] * scale
-            out[i, OPEN] = total[OPEN * LANES + lane] / n_samples
+                out[i, c] = total[c * PACKET_WIDTH + lane] * scale
+            out[i, OPEN] = total[OPEN * PACKET_WIDTH + lane] / n_samples
             out[i, SQUARE] = squares[lane] * scale * scale
 
 
 @inner
-def _add_coloured_sky(tint, words, sky, missed, part):
+def _add_coloured_sky(blend, words, sky, missed, part):
     """Add the sky's light where it passed coloured surfaces; those rays do not count as `missed`."""
-    if tint is None:
+    if blend is None:
         return
-    for lane in range(LANES):
-        if words[GEOM_ID * LANES + lane] != NO_HIT:
+    for lane in range(PACKET_WIDTH):
+        if words[GEOM_ID * PACKET_WIDTH + lane] != NO_HIT:
             continue
         red, green, blue = (
-            light_kept(tint, 0, lane), light_kept(tint, 1, lane), light_kept(tint, 2, lane)
+            transmittance(blend, 0, lane), transmittance(blend, 1, lane), transmittance(blend, 2, lane)
         )  # fmt: skip
         if red != _f(1.0) or green != _f(1.0) or blue != _f(1.0):
             missed[lane] -= _f(1.0)
-            part[DIRECT * LANES + lane] += red * sky[0]
-            part[(DIRECT + 1) * LANES + lane] += green * sky[1]
-            part[(DIRECT + 2) * LANES + lane] += blue * sky[2]
+            part[DIRECT * PACKET_WIDTH + lane] += red * sky[0]
+            part[(DIRECT + 1) * PACKET_WIDTH + lane] += green * sky[1]
+            part[(DIRECT + 2) * PACKET_WIDTH + lane] += blue * sky[2]
 
 
 @kernel
-def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
+def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, distance, look, out):
     """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
 
     origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32
     look : after so many rays sixteen texels are done if at most one of each one's rays was blocked; 0: never
     Returns the number of rays cast.
     """
-    n_samples = len(net)
-    scene, occluded, width = caster.scene, caster.occluded, caster.width
-    query = caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    n_samples = len(sobol_points)
+    scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
+    query = buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     count = _counts()
     seeds, frame = new_seeds(), new_frame()
     cast = 0
-    for group in range(0, len(origin), LANES):
-        lanes = smaller(LANES, len(origin) - group)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
             count[lane] = 0
         done = 0
@@ -248,10 +276,10 @@ def open_share(origin, normal, caster, begin, net, shared, distance, look, out):
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
-            aim_lanes(rays, words, frame, seeds, net[s, 0], net[s, 1], shared, distance)
+            aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, distance)
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
-            for lane in range(LANES):
-                count[lane] += np.int32(1) if rays[TFAR * LANES + lane] >= _f(0.0) else np.int32(0)
+            for lane in range(PACKET_WIDTH):
+                count[lane] += np.int32(1) if rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0) else np.int32(0)
             done += 1
             if done == look:
                 clear = 0

@@ -20,14 +20,14 @@ import numpy as np
 from baker.kernels.emitters import AREA, NORMAL, RADIANCE, TWO_SIDED
 from baker.kernels.surface import N_POINTS
 from baker.trace.jit import inner, larger, pasted, scratch, smaller
-from baker.trace.packets import LANES
+from baker.trace.packets import PACKET_WIDTH
 
 _f = np.float32
 # Rows of the working memory: origin, normal, four corners as arms, heights of three, the sum over edges,
 # what a triangle that looks small gives (-1: it does not), 1 if the triangle's shining side is turned here.
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _TURNED = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
-_work, _corners = scratch((_ROWS * LANES,), _f), scratch((15,), _f)
+_work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
 # Triangles whose longest edge is under a hundredth of their distance shine from their centroid: the sum over
 # edges would lose digits, and the error is of the order of the square, 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
@@ -66,35 +66,40 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
     found : (3 * 16,) float32, lx: RGB by lane, means over the texels' points
     """
     work = _work()
-    for j in range(3 * LANES):
+    for j in range(3 * PACKET_WIDTH):
         found[j] = _f(0.0)
     for k in range(N_POINTS):
         for lane in range(lanes):
             for a in range(3):
-                work[(_ORIGIN + a) * LANES + lane] = origin[group + lane, k, a]
-                work[(_NORMAL + a) * LANES + lane] = normal[group + lane, k, a]
+                work[(_ORIGIN + a) * PACKET_WIDTH + lane] = origin[group + lane, k, a]
+                work[(_NORMAL + a) * PACKET_WIDTH + lane] = normal[group + lane, k, a]
         for m in range(len(row)):
             corners = _reach_for_corners(work, row, m, lanes)
             if corners:
                 _add_edges(work, corners)
                 for c in range(3):
                     scale = row[m, RADIANCE + c] / _f(N_POINTS)
-                    for lane in range(LANES):
-                        small, turned = work[_SMALL * LANES + lane], work[_TURNED * LANES + lane]
-                        light = abs(_f(0.5) * work[_SUM * LANES + lane])
-                        found[c * LANES + lane] += scale * turned * (small if small >= _f(0.0) else light)
+                    for lane in range(PACKET_WIDTH):
+                        small, turned = (
+                            work[_SMALL * PACKET_WIDTH + lane],
+                            work[_TURNED * PACKET_WIDTH + lane],
+                        )
+                        light = abs(_f(0.5) * work[_SUM * PACKET_WIDTH + lane])
+                        found[c * PACKET_WIDTH + lane] += (
+                            scale * turned * (small if small >= _f(0.0) else light)
+                        )
 
 
 @pasted
 def _reach_for(work, j, x, y, z):
     """Write the arms to corner j of a triangle and its heights above the surfaces."""
-    for lane in range(LANES):
-        ax, ay, az = x - work[lane], y - work[LANES + lane], z - work[2 * LANES + lane]
-        work[(_ARM + 3 * j) * LANES + lane] = ax
-        work[(_ARM + 3 * j + 1) * LANES + lane] = ay
-        work[(_ARM + 3 * j + 2) * LANES + lane] = az
-        height = ax * work[_NORMAL * LANES + lane] + ay * work[(_NORMAL + 1) * LANES + lane]
-        work[(_HEIGHT + j) * LANES + lane] = height + az * work[(_NORMAL + 2) * LANES + lane]
+    for lane in range(PACKET_WIDTH):
+        ax, ay, az = x - work[lane], y - work[PACKET_WIDTH + lane], z - work[2 * PACKET_WIDTH + lane]
+        work[(_ARM + 3 * j) * PACKET_WIDTH + lane] = ax
+        work[(_ARM + 3 * j + 1) * PACKET_WIDTH + lane] = ay
+        work[(_ARM + 3 * j + 2) * PACKET_WIDTH + lane] = az
+        height = ax * work[_NORMAL * PACKET_WIDTH + lane] + ay * work[(_NORMAL + 1) * PACKET_WIDTH + lane]
+        work[(_HEIGHT + j) * PACKET_WIDTH + lane] = height + az * work[(_NORMAL + 2) * PACKET_WIDTH + lane]
 
 
 @inner
@@ -117,36 +122,42 @@ def _reach_for_corners(work, row, m, lanes):
     nx, ny, nz = row[m, NORMAL], row[m, NORMAL + 1], row[m, NORMAL + 2]
     two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
     third = _f(1.0 / 3.0)
-    for lane in range(LANES):
-        x = work[_ARM * LANES + lane] + work[(_ARM + 3) * LANES + lane] + work[(_ARM + 6) * LANES + lane]
+    for lane in range(PACKET_WIDTH):
+        x = (
+            work[_ARM * PACKET_WIDTH + lane]
+            + work[(_ARM + 3) * PACKET_WIDTH + lane]
+            + work[(_ARM + 6) * PACKET_WIDTH + lane]
+        )
         y = (
-            work[(_ARM + 1) * LANES + lane]
-            + work[(_ARM + 4) * LANES + lane]
-            + work[(_ARM + 7) * LANES + lane]
+            work[(_ARM + 1) * PACKET_WIDTH + lane]
+            + work[(_ARM + 4) * PACKET_WIDTH + lane]
+            + work[(_ARM + 7) * PACKET_WIDTH + lane]
         )
         z = (
-            work[(_ARM + 2) * LANES + lane]
-            + work[(_ARM + 5) * LANES + lane]
-            + work[(_ARM + 8) * LANES + lane]
+            work[(_ARM + 2) * PACKET_WIDTH + lane]
+            + work[(_ARM + 5) * PACKET_WIDTH + lane]
+            + work[(_ARM + 8) * PACKET_WIDTH + lane]
         )
-        work[(_ARM + 9) * LANES + lane] = work[(_ARM + 6) * LANES + lane]
-        work[(_ARM + 10) * LANES + lane] = work[(_ARM + 7) * LANES + lane]
-        work[(_ARM + 11) * LANES + lane] = work[(_ARM + 8) * LANES + lane]
+        work[(_ARM + 9) * PACKET_WIDTH + lane] = work[(_ARM + 6) * PACKET_WIDTH + lane]
+        work[(_ARM + 10) * PACKET_WIDTH + lane] = work[(_ARM + 7) * PACKET_WIDTH + lane]
+        work[(_ARM + 11) * PACKET_WIDTH + lane] = work[(_ARM + 8) * PACKET_WIDTH + lane]
         facing = -third * (x * nx + y * ny + z * nz)
         square = larger(third * third * (x * x + y * y + z * z), _f(1.0e-30))
-        low = work[_HEIGHT * LANES + lane] + work[(_HEIGHT + 1) * LANES + lane]
-        height = larger(low + work[(_HEIGHT + 2) * LANES + lane], _f(0.0)) * third
+        low = work[_HEIGHT * PACKET_WIDTH + lane] + work[(_HEIGHT + 1) * PACKET_WIDTH + lane]
+        height = larger(low + work[(_HEIGHT + 2) * PACKET_WIDTH + lane], _f(0.0)) * third
         small = longest < _SMALL_VIEW * square
-        work[_SMALL * LANES + lane] = area * height * abs(facing) / (square * square) if small else _f(-1.0)
-        work[_TURNED * LANES + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
+        work[_SMALL * PACKET_WIDTH + lane] = (
+            area * height * abs(facing) / (square * square) if small else _f(-1.0)
+        )
+        work[_TURNED * PACKET_WIDTH + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
     corners = 0
     for lane in range(lanes):
         above = 0
         for j in range(3):
-            above += 1 if work[(_HEIGHT + j) * LANES + lane] > _f(0.0) else 0
+            above += 1 if work[(_HEIGHT + j) * PACKET_WIDTH + lane] > _f(0.0) else 0
         if above == 0:
-            work[_TURNED * LANES + lane] = _f(0.0)
-        if work[_TURNED * LANES + lane] > _f(0.0):
+            work[_TURNED * PACKET_WIDTH + lane] = _f(0.0)
+        if work[_TURNED * PACKET_WIDTH + lane] > _f(0.0):
             corners = larger(corners, 3 if above == 3 else 4)
             if above < 3:
                 _cut(work, lane)
@@ -160,46 +171,55 @@ def _cut(work, lane):
     n = 0
     for j in range(3):
         after = (j + 1) % 3
-        here, there = work[(_HEIGHT + j) * LANES + lane], work[(_HEIGHT + after) * LANES + lane]
+        here, there = work[(_HEIGHT + j) * PACKET_WIDTH + lane], work[(_HEIGHT + after) * PACKET_WIDTH + lane]
         if here > _f(0.0):
             for a in range(3):
-                corner[3 * n + a] = work[(_ARM + 3 * j + a) * LANES + lane]
+                corner[3 * n + a] = work[(_ARM + 3 * j + a) * PACKET_WIDTH + lane]
             n += 1
         if (here > _f(0.0)) != (there > _f(0.0)):
             share = here / (here - there)
             for a in range(3):
-                first = work[(_ARM + 3 * j + a) * LANES + lane]
-                second = work[(_ARM + 3 * after + a) * LANES + lane]
+                first = work[(_ARM + 3 * j + a) * PACKET_WIDTH + lane]
+                second = work[(_ARM + 3 * after + a) * PACKET_WIDTH + lane]
                 corner[3 * n + a] = first + share * (second - first)
             n += 1
     for j in range(4):
         for a in range(3):
-            work[(_ARM + 3 * j + a) * LANES + lane] = corner[3 * smaller(j, n - 1) + a]
+            work[(_ARM + 3 * j + a) * PACKET_WIDTH + lane] = corner[3 * smaller(j, n - 1) + a]
 
 
 @pasted
 def _add_edge(work, first, second):
     """Add the edge between two corners of every lane to its sum; one without length adds nothing."""
-    for lane in range(LANES):
-        ax, bx = work[(_ARM + 3 * first) * LANES + lane], work[(_ARM + 3 * second) * LANES + lane]
-        ay, by = work[(_ARM + 3 * first + 1) * LANES + lane], work[(_ARM + 3 * second + 1) * LANES + lane]
-        az, bz = work[(_ARM + 3 * first + 2) * LANES + lane], work[(_ARM + 3 * second + 2) * LANES + lane]
+    for lane in range(PACKET_WIDTH):
+        ax, bx = (
+            work[(_ARM + 3 * first) * PACKET_WIDTH + lane],
+            work[(_ARM + 3 * second) * PACKET_WIDTH + lane],
+        )
+        ay, by = (
+            work[(_ARM + 3 * first + 1) * PACKET_WIDTH + lane],
+            work[(_ARM + 3 * second + 1) * PACKET_WIDTH + lane],
+        )
+        az, bz = (
+            work[(_ARM + 3 * first + 2) * PACKET_WIDTH + lane],
+            work[(_ARM + 3 * second + 2) * PACKET_WIDTH + lane],
+        )
         ex, ey, ez = bx - ax, by - ay, bz - az
         cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
         squares = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
         inverse = _f(1.0) / math.sqrt(larger(squares, _f(1.0e-30)))
         cosine = smaller(larger((ax * bx + ay * by + az * bz) * inverse, _f(-1.0)), _f(1.0))
         sine = math.sqrt(cx * cx + cy * cy + cz * cz) * inverse
-        spread = cx * work[_NORMAL * LANES + lane] + cy * work[(_NORMAL + 1) * LANES + lane]
-        spread += cz * work[(_NORMAL + 2) * LANES + lane]
-        work[_SUM * LANES + lane] += spread * inverse * angle_over_sine(cosine, sine)
+        spread = cx * work[_NORMAL * PACKET_WIDTH + lane] + cy * work[(_NORMAL + 1) * PACKET_WIDTH + lane]
+        spread += cz * work[(_NORMAL + 2) * PACKET_WIDTH + lane]
+        work[_SUM * PACKET_WIDTH + lane] += spread * inverse * angle_over_sine(cosine, sine)
 
 
 @inner
 def _add_edges(work, corners):
     """Write the sum over the edges between the corners of every lane."""
-    for lane in range(LANES):
-        work[_SUM * LANES + lane] = _f(0.0)
+    for lane in range(PACKET_WIDTH):
+        work[_SUM * PACKET_WIDTH + lane] = _f(0.0)
     _add_edge(work, 0, 1)
     _add_edge(work, 1, 2)
     if corners == 3:

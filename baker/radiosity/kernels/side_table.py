@@ -12,9 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.surface import N_POINTS
-from baker.kernels.transmittance import number_rays
+from baker.kernels.transmittance import set_blend_rule
 from baker.trace.jit import inner, scratch, smaller
-from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, LANES, ORG_X, ORG_Y, ORG_Z, SOLID, TFAR, trace_lanes
+from baker.trace.packets import (
+    DIR_X,
+    DIR_Y,
+    DIR_Z,
+    ORG_X,
+    ORG_Y,
+    ORG_Z,
+    PACKET_WIDTH,
+    SOLID,
+    TFAR,
+    trace_lanes,
+)
 
 _f = np.float32
 # A segment before a hit starts this far back along the ray, one above it that high, in sides of a texel.
@@ -23,7 +34,7 @@ _BACK, _ABOVE = 0.25, 0.02
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
 # Memory of the kernels.
-new_hits, _saved = scratch((HIT_ROWS * LANES,), np.float32), scratch((3 * LANES,), np.float32)
+new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 * PACKET_WIDTH,), np.float32)
 
 
 class SideTable(NamedTuple):
@@ -88,13 +99,13 @@ class SeenPatch(NamedTuple):
 def segment(rays, lane, x, y, z, tx, ty, tz):  # type: ignore[no-untyped-def]
     """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; returns -1 if it has a length, else 0."""
     dx, dy, dz = tx - x, ty - y, tz - z
-    rays[ORG_X * LANES + lane] = x
-    rays[ORG_Y * LANES + lane] = y
-    rays[ORG_Z * LANES + lane] = z
-    rays[DIR_X * LANES + lane] = dx
-    rays[DIR_Y * LANES + lane] = dy
-    rays[DIR_Z * LANES + lane] = dz
-    rays[TFAR * LANES + lane] = _f(1.0)
+    rays[ORG_X * PACKET_WIDTH + lane] = x
+    rays[ORG_Y * PACKET_WIDTH + lane] = y
+    rays[ORG_Z * PACKET_WIDTH + lane] = z
+    rays[DIR_X * PACKET_WIDTH + lane] = dx
+    rays[DIR_Y * PACKET_WIDTH + lane] = dy
+    rays[DIR_Z * PACKET_WIDTH + lane] = dz
+    rays[TFAR * PACKET_WIDTH + lane] = _f(1.0)
     return np.int32(-1) if dx * dx + dy * dy + dz * dz > _f(0.0) else np.int32(0)
 
 
@@ -103,33 +114,33 @@ def note_hit(hits, lane, rays, face, prim, front):  # type: ignore[no-untyped-de
     """Copy what `find_side` needs of a lane's hit to `hits` (10 * 16,); face: rows of the hit table."""
     sign = _f(1.0) if front else _f(-1.0)
     for a in range(3):
-        hits[(HIT_ORIGIN + a) * LANES + lane] = rays[(ORG_X + a) * LANES + lane]
-        hits[(HIT_DIRECTION + a) * LANES + lane] = rays[(DIR_X + a) * LANES + lane]
-        hits[(HIT_NORMAL + a) * LANES + lane] = sign * face[prim, 8 + a]
-    hits[HIT_DISTANCE * LANES + lane] = rays[TFAR * LANES + lane]
+        hits[(HIT_ORIGIN + a) * PACKET_WIDTH + lane] = rays[(ORG_X + a) * PACKET_WIDTH + lane]
+        hits[(HIT_DIRECTION + a) * PACKET_WIDTH + lane] = rays[(DIR_X + a) * PACKET_WIDTH + lane]
+        hits[(HIT_NORMAL + a) * PACKET_WIDTH + lane] = sign * face[prim, 8 + a]
+    hits[HIT_DISTANCE * PACKET_WIDTH + lane] = rays[TFAR * PACKET_WIDTH + lane]
 
 
 @inner
-def find_side(point, normal, height, member, side, s, hits, lane, caster):  # type: ignore[no-untyped-def]
+def find_side(point, normal, height, member, side, s, hits, lane, buffers):  # type: ignore[no-untyped-def]
     """Return the row of values of the side that a hit on split texel s lies on, or -1 if no point sees it.
 
     point, normal, height, member, side : arrays of a `SideTable`
     hits : (10 * 16,) float32, from `note_hit`; lane : int, which of them
-    The caster's sixteen rays are overwritten, but for their origins.
+    The buffers's sixteen rays are overwritten, but for their origins.
     """
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    number_rays(caster.tint, words, SOLID)
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    set_blend_rule(buffers.blend, words, SOLID)
     saved = _saved()
-    for j in range(3 * LANES):
-        saved[j] = rays[ORG_X * LANES + j]
-    distance = hits[HIT_DISTANCE * LANES + lane]
+    for j in range(3 * PACKET_WIDTH):
+        saved[j] = rays[ORG_X * PACKET_WIDTH + j]
+    distance = hits[HIT_DISTANCE * PACKET_WIDTH + lane]
     dx, dy, dz = (
-        hits[HIT_DIRECTION * LANES + lane], hits[(HIT_DIRECTION + 1) * LANES + lane],
-        hits[(HIT_DIRECTION + 2) * LANES + lane],
+        hits[HIT_DIRECTION * PACKET_WIDTH + lane], hits[(HIT_DIRECTION + 1) * PACKET_WIDTH + lane],
+        hits[(HIT_DIRECTION + 2) * PACKET_WIDTH + lane],
     )  # fmt: skip
-    x = hits[HIT_ORIGIN * LANES + lane] + distance * dx
-    y = hits[(HIT_ORIGIN + 1) * LANES + lane] + distance * dy
-    z = hits[(HIT_ORIGIN + 2) * LANES + lane] + distance * dz
+    x = hits[HIT_ORIGIN * PACKET_WIDTH + lane] + distance * dx
+    y = hits[(HIT_ORIGIN + 1) * PACKET_WIDTH + lane] + distance * dy
+    z = hits[(HIT_ORIGIN + 2) * PACKET_WIDTH + lane] + distance * dz
     found = np.int32(-1)
     for turn in range(2):
         # First from the ray, before it hits, which is on the right side whatever rounding did to the hit.
@@ -138,8 +149,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, caster):  # ty
         if turn == 1:
             step = _f(_ABOVE) * side[s]
             vx, vy, vz = (
-                hits[HIT_NORMAL * LANES + lane], hits[(HIT_NORMAL + 1) * LANES + lane],
-                hits[(HIT_NORMAL + 2) * LANES + lane],
+                hits[HIT_NORMAL * PACKET_WIDTH + lane], hits[(HIT_NORMAL + 1) * PACKET_WIDTH + lane],
+                hits[(HIT_NORMAL + 2) * PACKET_WIDTH + lane],
             )  # fmt: skip
         for k in range(N_POINTS):
             on[k] = 0
@@ -151,18 +162,25 @@ def find_side(point, normal, height, member, side, s, hits, lane, caster):  # ty
                     point[s, k, 2] + h * normal[s, k, 2],
                 )  # fmt: skip
         trace_lanes(
-            caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+            buffers.occluded,
+            buffers.scene,
+            buffers.width,
+            buffers.query,
+            on,
+            rays,
+            buffers.valid,
+            buffers.floats,
         )
         least = _f(np.inf)
         for k in range(N_POINTS):
-            if on[k] != 0 and rays[TFAR * LANES + k] >= _f(0.0):
+            if on[k] != 0 and rays[TFAR * PACKET_WIDTH + k] >= _f(0.0):
                 px, py, pz = point[s, k, 0] - x, point[s, k, 1] - y, point[s, k, 2] - z
                 square = px * px + py * py + pz * pz
                 if square < least:
                     least, found = square, member[s, k]
         if found >= 0:
             break
-    for j in range(3 * LANES):
-        rays[ORG_X * LANES + j] = saved[j]
-    number_rays(caster.tint, words, np.uint32(0))
+    for j in range(3 * PACKET_WIDTH):
+        rays[ORG_X * PACKET_WIDTH + j] = saved[j]
+    set_blend_rule(buffers.blend, words, np.uint32(0))
     return found

@@ -27,9 +27,9 @@ from baker.trace.packets import (
     DIR_Y,
     DIR_Z,
     GEOM_ID,
-    LANES,
     NO_HIT,
     ORG_X,
+    PACKET_WIDTH,
     PRIM_ID,
     TFAR,
     trace_lanes,
@@ -44,12 +44,12 @@ _REACH = 0.55
 # Corners of a texel's surface are examined at this share of their distance from its middle.
 _CORNER = 0.998
 # Memory of the kernels.
-_points, _heights = scratch((1, LANES, 3), np.float32), scratch((1, LANES), np.float32)
-_frame = scratch((12 * LANES,), np.float32)
+_points, _heights = scratch((1, PACKET_WIDTH, 3), np.float32), scratch((1, PACKET_WIDTH), np.float32)
+_frame = scratch((12 * PACKET_WIDTH,), np.float32)
 
 
 @kernel
-def crossed_texels(surface, begin, end, caster, crossed, side):
+def crossed_texels(surface, begin, end, buffers, crossed, side):
     """Find texels that some surface may pass through: a line just above their square is blocked.
 
     Entries begin to end are examined.
@@ -61,14 +61,14 @@ def crossed_texels(surface, begin, end, caster, crossed, side):
     position, uv, triangle, face = surface.position, surface.uv, surface.triangle, surface.face_normal
     pixels, fronts, back = surface.pixel, surface.front, surface.back
     starts, entry, entry_area, size = surface.first, surface.entry, surface.entry_area, surface.size
-    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
-    on, rays = caster.lane_valid, caster.lane_floats
-    spare_on, spare = caster.valid, caster.floats
+    scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
+    on, rays = buffers.lane_valid, buffers.lane_floats
+    spare_on, spare = buffers.valid, buffers.floats
     # By lane: centre, the two half diagonals, the normal times the texel's side.
     frame = _frame()
     cast = 0
-    for group in range(begin, end, LANES):
-        lanes = smaller(LANES, end - group)
+    for group in range(begin, end, PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, end - group)
         for lane in range(lanes):
             i = group + lane
             front = fronts[i]
@@ -87,30 +87,30 @@ def crossed_texels(surface, begin, end, caster, crossed, side):
                 p0 = float(position[i0, axis])
                 e1, e2 = position[i1, axis] - p0, position[i2, axis] - p0
                 right, down = a * e1 + d * e2, b * e1 + g * e2
-                frame[axis * LANES + lane] = p0 + b1 * e1 + b2 * e2
-                frame[(3 + axis) * LANES + lane] = _REACH * (right + down)
-                frame[(6 + axis) * LANES + lane] = _REACH * (right - down)
+                frame[axis * PACKET_WIDTH + lane] = p0 + b1 * e1 + b2 * e2
+                frame[(3 + axis) * PACKET_WIDTH + lane] = _REACH * (right + down)
+                frame[(6 + axis) * PACKET_WIDTH + lane] = _REACH * (right - down)
                 across += right * right + down * down
             side[i] = math.sqrt(0.5 * across)
             sign = -side[i] if back[i] else side[i]
             for axis in range(3):
-                frame[(9 + axis) * LANES + lane] = sign * face[t, axis]
+                frame[(9 + axis) * PACKET_WIDTH + lane] = sign * face[t, axis]
             crossed[group + lane] = 0
         for turn in range(8):
             # Two diagonals high and low, then four edges.
             height = _f(LOW if turn == 2 or turn == 3 else HIGH)
             row = 3 + 3 * (turn % 2)
-            for lane in range(LANES):
+            for lane in range(PACKET_WIDTH):
                 on[lane] = 0
             for lane in range(lanes):
                 if crossed[group + lane] != 0:
                     continue
-                x = frame[lane] + height * frame[9 * LANES + lane]
-                y = frame[LANES + lane] + height * frame[10 * LANES + lane]
-                z = frame[2 * LANES + lane] + height * frame[11 * LANES + lane]
+                x = frame[lane] + height * frame[9 * PACKET_WIDTH + lane]
+                y = frame[PACKET_WIDTH + lane] + height * frame[10 * PACKET_WIDTH + lane]
+                z = frame[2 * PACKET_WIDTH + lane] + height * frame[11 * PACKET_WIDTH + lane]
                 ex, ey, ez = (
-                    frame[row * LANES + lane], frame[(row + 1) * LANES + lane],
-                    frame[(row + 2) * LANES + lane],
+                    frame[row * PACKET_WIDTH + lane], frame[(row + 1) * PACKET_WIDTH + lane],
+                    frame[(row + 2) * PACKET_WIDTH + lane],
                 )  # fmt: skip
                 cast += 1
                 if turn < 4:
@@ -119,8 +119,10 @@ def crossed_texels(surface, begin, end, caster, crossed, side):
                 # From one end of a diagonal to one of the other.
                 to = 9 - row
                 fx, fy, fz = (
-                    frame[to * LANES + lane], frame[(to + 1) * LANES + lane], frame[(to + 2) * LANES + lane]
-                )  # fmt: skip
+                    frame[to * PACKET_WIDTH + lane],
+                    frame[(to + 1) * PACKET_WIDTH + lane],
+                    frame[(to + 2) * PACKET_WIDTH + lane],
+                )
                 way = _f(1.0) if turn < 6 else _f(-1.0)
                 back_way = way if row == 3 else -way
                 on[lane] = segment(
@@ -129,7 +131,7 @@ def crossed_texels(surface, begin, end, caster, crossed, side):
                 )  # fmt: skip
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
-                if on[lane] != 0 and rays[TFAR * LANES + lane] < _f(0.0):
+                if on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] < _f(0.0):
                     crossed[group + lane] = 1
     return cast
 
@@ -148,32 +150,32 @@ def _between(rays, lane, origin, normal, height, m, i, k):
 
 
 @kernel
-def point_heights(origin, normal, side, caster, height):
+def point_heights(origin, normal, side, buffers, height):
     """Write the height at which segments from points run, (n,) float32: see the module.
 
     origin, normal : (n, 3) float32; side : (n,) float32, metres, of the texel of each
     """
-    scene, intersect, width, query = caster.scene, caster.intersect, caster.width, caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
-    for group in range(0, len(origin), LANES):
-        lanes = smaller(LANES, len(origin) - group)
-        for lane in range(LANES):
+    scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin) - group)
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
         for lane in range(lanes):
             i = group + lane
             for axis in range(3):
-                rays[(ORG_X + axis) * LANES + lane] = origin[i, axis]
-                rays[(DIR_X + axis) * LANES + lane] = normal[i, axis]
-            rays[TFAR * LANES + lane] = _f(2.0 * HIGH) * side[i]
-            words[GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
+                rays[(ORG_X + axis) * PACKET_WIDTH + lane] = origin[i, axis]
+                rays[(DIR_X + axis) * PACKET_WIDTH + lane] = normal[i, axis]
+            rays[TFAR * PACKET_WIDTH + lane] = _f(2.0 * HIGH) * side[i]
+            words[GEOM_ID * PACKET_WIDTH + lane] = np.uint32(0xFFFFFFFF)
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
         for lane in range(lanes):
-            height[group + lane] = _f(0.5) * rays[TFAR * LANES + lane]
+            height[group + lane] = _f(0.5) * rays[TFAR * PACKET_WIDTH + lane]
 
 
 @kernel
-def group_points(origin, normal, height, mask, caster, label):
+def group_points(origin, normal, height, mask, buffers, label):
     """Group the points of texels by mutual visibility.
 
     origin, normal : (m, 16, 3) float32; height : (m, 16) float32, from `point_heights`
@@ -181,9 +183,9 @@ def group_points(origin, normal, height, mask, caster, label):
     label : (m, 16) int8 output, group of each point from 0, -1 for points inside geometry
     Returns the number of rays cast.
     """
-    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
-    on, rays = caster.lane_valid, caster.lane_floats
-    spare_on, spare = caster.valid, caster.floats
+    scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
+    on, rays = buffers.lane_valid, buffers.lane_floats
+    spare_on, spare = buffers.valid, buffers.floats
     cast = 0
     for m in range(len(origin)):
         bits = np.int64(mask[m])
@@ -209,7 +211,7 @@ def group_points(origin, normal, height, mask, caster, label):
             cast += asked
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for k in range(N_POINTS):
-                if on[k] == 0 or rays[TFAR * LANES + k] < _f(0.0):
+                if on[k] == 0 or rays[TFAR * PACKET_WIDTH + k] < _f(0.0):
                     continue
                 other = label[m, k]
                 if other == own:
@@ -233,7 +235,7 @@ def group_points(origin, normal, height, mask, caster, label):
 
 
 @kernel
-def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, hidden):
+def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers, hidden):
     """Find texels with a corner of their surface that none of their points sees, or with a blocked outline.
 
     A surface that cuts off a corner leaves no point behind itself, but rays may hit what lies there. An edge
@@ -244,7 +246,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
     Returns the number of rays cast.
     """
     position, shading, face = surface.position, surface.normal, surface.face_normal
-    uv, triangle, least = surface.uv, surface.triangle, surface.least
+    uv, triangle, min_offset_scale = surface.uv, surface.triangle, surface.min_offset_scale
     pixels, fronts, back = surface.pixel, surface.front, surface.back
     starts, entry, size = surface.first, surface.entry, surface.size
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
@@ -273,11 +275,22 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, caster, 
                 x = x0 + cx + _CORNER * (cut[j, 0] - cx)
                 y = y0 + cy + _CORNER * (cut[j, 1] - cy)
                 place(
-                    position, shading, face, triangle, least, t, a * x + b * y + c, d * x + g * y + h,
-                    back[i], point, facing, 0, j,
-                )  # fmt: skip
+                    position,
+                    shading,
+                    face,
+                    triangle,
+                    min_offset_scale,
+                    t,
+                    a * x + b * y + c,
+                    d * x + g * y + h,
+                    back[i],
+                    point,
+                    facing,
+                    0,
+                    j,
+                )
             cast += _look_for_corners(
-                point, facing, headroom, n, m, origin, normal, height, mask, side, caster, hidden
+                point, facing, headroom, n, m, origin, normal, height, mask, side, buffers, hidden
             )
             if hidden[m] != 0:
                 break
@@ -298,27 +311,34 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 
 
 @inner
-def _look_for_corners(point, facing, headroom, found, m, origin, normal, height, mask, side, caster, hidden):
+def _look_for_corners(point, facing, headroom, found, m, origin, normal, height, mask, side, buffers, hidden):
     """Set hidden[m] if no point of item m sees one of `found` corners (1, 16, 3), or one not the next.
 
     Returns the number of rays cast.
     """
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     high = _f(HIGH) * side[m]
-    for k in range(LANES):
+    for k in range(PACKET_WIDTH):
         on[k] = -1 if k < found else 0
     for k in range(found):
         for axis in range(3):
-            rays[(ORG_X + axis) * LANES + k] = point[0, k, axis]
-            rays[(DIR_X + axis) * LANES + k] = facing[0, k, axis]
-        rays[TFAR * LANES + k] = _f(2.0) * high
-        words[GEOM_ID * LANES + k] = np.uint32(0xFFFFFFFF)
+            rays[(ORG_X + axis) * PACKET_WIDTH + k] = point[0, k, axis]
+            rays[(DIR_X + axis) * PACKET_WIDTH + k] = facing[0, k, axis]
+        rays[TFAR * PACKET_WIDTH + k] = _f(2.0) * high
+        words[GEOM_ID * PACKET_WIDTH + k] = np.uint32(0xFFFFFFFF)
     trace_lanes(
-        caster.intersect, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+        buffers.intersect,
+        buffers.scene,
+        buffers.width,
+        buffers.query,
+        on,
+        rays,
+        buffers.valid,
+        buffers.floats,
     )
     for j in range(found):
-        headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * LANES + j])
-    for j in range(LANES):
+        headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * PACKET_WIDTH + j])
+    for j in range(PACKET_WIDTH):
         on[j] = 0
     for j in range(found):
         to = j + 1 if j + 1 < found else 0
@@ -331,10 +351,10 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
             point[0, to, 2] + h * facing[0, to, 2],
         )  # fmt: skip
     trace_lanes(
-        caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+        buffers.occluded, buffers.scene, buffers.width, buffers.query, on, rays, buffers.valid, buffers.floats
     )
     for j in range(found):
-        if on[j] != 0 and rays[TFAR * LANES + j] < _f(0.0):
+        if on[j] != 0 and rays[TFAR * PACKET_WIDTH + j] < _f(0.0):
             hidden[m] = 1
     if hidden[m] != 0:
         return 2 * found
@@ -346,11 +366,11 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
     for j in range(found):
         on[j] = _to_point(rays, j, point, facing, headroom, j, origin, normal, height, m, first)
     trace_lanes(
-        caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+        buffers.occluded, buffers.scene, buffers.width, buffers.query, on, rays, buffers.valid, buffers.floats
     )
     left = np.int64(0)
     for j in range(found):
-        if on[j] == 0 or rays[TFAR * LANES + j] < _f(0.0):
+        if on[j] == 0 or rays[TFAR * PACKET_WIDTH + j] < _f(0.0):
             left |= np.int64(1) << j
     cast = 3 * found
     for j in range(found):
@@ -362,11 +382,18 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
                 on[k] = _to_point(rays, k, point, facing, headroom, j, origin, normal, height, m, k)
                 cast += 1
         trace_lanes(
-            caster.occluded, caster.scene, caster.width, caster.query, on, rays, caster.valid, caster.floats
+            buffers.occluded,
+            buffers.scene,
+            buffers.width,
+            buffers.query,
+            on,
+            rays,
+            buffers.valid,
+            buffers.floats,
         )
         seen = False
         for k in range(N_POINTS):
-            seen = seen or (on[k] != 0 and rays[TFAR * LANES + k] >= _f(0.0))
+            seen = seen or (on[k] != 0 and rays[TFAR * PACKET_WIDTH + k] >= _f(0.0))
         if not seen:
             hidden[m] = 1
             break
@@ -374,17 +401,17 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
 
 
 @kernel
-def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, caster, free):
+def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, buffers, free):
     """Find out which pairs of points see each other.
 
     origin_*, normal_* : (n, 3) float32; height_* : (n,) float32; free : (n,) uint8 output
     """
-    scene, occluded, width, query = caster.scene, caster.occluded, caster.width, caster.query
-    on, rays = caster.lane_valid, caster.lane_floats
-    spare_on, spare = caster.valid, caster.floats
-    for group in range(0, len(origin_a), LANES):
-        lanes = smaller(LANES, len(origin_a) - group)
-        for lane in range(LANES):
+    scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
+    on, rays = buffers.lane_valid, buffers.lane_floats
+    spare_on, spare = buffers.valid, buffers.floats
+    for group in range(0, len(origin_a), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin_a) - group)
+        for lane in range(PACKET_WIDTH):
             on[lane] = 0
         for lane in range(lanes):
             i = group + lane
@@ -398,36 +425,38 @@ def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, ca
             )  # fmt: skip
         trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
         for lane in range(lanes):
-            free[group + lane] = 1 if on[lane] == 0 or rays[TFAR * LANES + lane] >= _f(0.0) else 0
+            free[group + lane] = 1 if on[lane] == 0 or rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0) else 0
 
 
 @kernel
-def count_backs(origin, normal, table, caster, net, shared, count):
+def count_backs(origin, normal, table, buffers, sobol_points, shared, count):
     """Count how many rays, one from each point of a texel, meet the back of a one-sided surface first.
 
-    origin, normal : (m, 16, 3) float32; net : (16, 2) uint32; shared : uint32, see `sampling`
+    origin, normal : (m, 16, 3) float32; sobol_points : (16, 2) uint32; shared : uint32, see `sampling`
     count : (m,) int32 output
     """
-    scene, intersect, width, query = caster.scene, caster.intersect, caster.width, caster.query
-    on, rays, words = caster.lane_valid, caster.lane_floats, caster.lane_words
-    spare_on, spare = caster.valid, caster.floats
+    scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
+    on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
+    spare_on, spare = buffers.valid, buffers.floats
     row = table.row
     seeds, frame = new_seeds(), new_frame()
-    for group in range(0, len(origin), LANES):
-        lanes = smaller(LANES, len(origin) - group)
+    for group in range(0, len(origin), PACKET_WIDTH):
+        lanes = smaller(PACKET_WIDTH, len(origin) - group)
         lane_seeds(group, lanes, 12, seeds)
-        for lane in range(LANES):
+        for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
         for k in range(N_POINTS):
             load_frames(rays, frame, origin, normal, group, lanes, k)
-            aim_lanes(rays, words, frame, seeds, net[k, 0], net[k, 1], shared, FAR)
+            aim_lanes(rays, words, frame, seeds, sobol_points[k, 0], sobol_points[k, 1], shared, FAR)
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
-                if words[GEOM_ID * LANES + lane] == NO_HIT:
+                if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
                     continue
-                prim = np.int64(words[PRIM_ID * LANES + lane])
+                prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                 dx, dy, dz = (
-                    rays[DIR_X * LANES + lane], rays[DIR_Y * LANES + lane], rays[DIR_Z * LANES + lane]
-                )  # fmt: skip
+                    rays[DIR_X * PACKET_WIDTH + lane],
+                    rays[DIR_Y * PACKET_WIDTH + lane],
+                    rays[DIR_Z * PACKET_WIDTH + lane],
+                )
                 if row[prim, 7] == _f(0.0) and not front_facing(row, prim, dx, dy, dz):
                     count[group + lane] += 1

@@ -3,8 +3,8 @@
 A MASK hit counts where alpha reaches the cutoff. For a BLEND hit it depends on the ray (its ID row):
 
 - Shadow rays (ID 1 to 16, the ray's number): the transmittance T = (1 - a) lerp(1, c, a) is multiplied into
-  `packets.Tint.colour`, and the hit does not count. Their ends are fixed, so every crossing on the way is
-  asked for, in whatever order.
+  `packets.BlendBuffers.transmittance`, and the hit does not count. The ends of these rays are fixed, so Embree
+  reports every crossing on the way, in any order.
 - Rays that pass BLEND surfaces unaware (ID `packets.UNAWARE`): the hit counts where alpha is 1.
 - Rays that ask what lies on which side (ID `packets.SOLID`): the hit counts where alpha is above 0.
 - Other rays (ID 0): the hit counts with probability alpha. The number that decides is a hash of the bits of
@@ -23,23 +23,23 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 from baker.kernels.alpha import SURFACE, AlphaTable, opacity
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, no_tint, tint_at
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, filter_colour_at, no_transmittance
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
 from baker.trace.embree import HitFilter
 from baker.trace.jit import inner, larger, scratch
 from baker.trace.packets import (
+    BLEND_TRANSMITTANCE,
     CONTEXT_WORDS,
     DIR_X,
     HIT_U,
     HIT_V,
     ID,
-    LANES,
     NG_X,
     ORG_X,
+    PACKET_WIDTH,
     PRIM_ID,
     SOLID,
     TFAR,
-    TINT_COLOUR,
 )  # fmt: skip
 from baker.trace.pointers import pointer
 
@@ -50,12 +50,12 @@ _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
-def filter_of(alpha: AlphaTable, tint: TransmittanceTable | None, pack: TexturePack) -> HitFilter:
+def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: TexturePack) -> HitFilter:
     """Return what the ray tree has to know of the triangles that let light through."""
-    tint = no_tint() if tint is None else tint
+    blend = no_transmittance() if blend is None else blend
     arrays = (
         *(alpha.slot, alpha.row, pack.pixels, pack.level, pack.n_levels, pack.wrap),
-        *(tint.slot, tint.row),
+        *(blend.slot, blend.row),
     )
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
     return HitFilter(alpha.slot >= 0, _let_through.address or 0, data.ctypes.data, (arrays, data))
@@ -105,8 +105,8 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
         carray(pointer(data[8]), (data[9],), np.int64),
         carray(pointer(data[10]), (data[11], 2), np.int64),
     )
-    tint_slot = carray(pointer(data[12]), (data[13],), np.int32)
-    tint_row = carray(pointer(data[14]), (data[15], ROW_LENGTH), np.float32)
+    blend_slot = carray(pointer(data[12]), (data[13],), np.int32)
+    blend_row = carray(pointer(data[14]), (data[15], ROW_LENGTH), np.float32)
     rgba, rgb = _rgba(), _rgb()
     for lane in range(n):
         if valid[lane] != -1:
@@ -131,17 +131,19 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
                 valid[lane] = 0
             continue
         valid[lane] = 0
-        if number >= LANES:
+        if number >= PACKET_WIDTH:
             continue
         if on_edge(b1, b2) and crossed_before(
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        tint_at(tint_row, np.int64(tint_slot[prim]), pack, b1, b2, rgba, rgb)
+        filter_colour_at(blend_row, np.int64(blend_slot[prim]), pack, b1, b2, rgba, rgb)
         most = np.float32(0.0)
         for c in range(3):
-            kept = context[TINT_COLOUR + c * LANES + number] * np.float32((1.0 - share) * rgb[c])
-            context[TINT_COLOUR + c * LANES + number] = kept
+            kept = context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] * np.float32(
+                (1.0 - share) * rgb[c]
+            )
+            context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] = kept
             most = larger(most, kept)
         if most < _DARK:
             valid[lane] = -1

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from baker.trace.jit import inner
-from baker.trace.packets import EDGE_HITS, TINT_EDGE_HITS, TINT_EDGES
+from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
 # A hit lies on an edge if a barycentric coordinate is at most this. Embree accepts coordinates down to minus
 # 1.2e-7, and two triangles of one edge are both met only within that.
@@ -36,13 +36,13 @@ def crossed_before(context, words, number, surface, distance):
     context, words : what the filter function finds behind the query's context, as float32 and uint32
     surface : float32, `alpha.SURFACE`; distance : float32, in units of the ray's direction
     """
-    first = TINT_EDGE_HITS + number * (2 * EDGE_HITS)
-    count = np.int64(words[TINT_EDGES + number])
+    first = BLEND_EDGE_HITS + number * (2 * EDGE_HITS)
+    count = np.int64(words[BLEND_EDGES + number])
     for k in range(count if count < EDGE_HITS else EDGE_HITS):
         near = abs(context[first + 2 * k] - distance) <= SAME * distance
         if near and context[first + 2 * k + 1] == surface:
             return True
     place = first + 2 * (count % EDGE_HITS)
     context[place], context[place + 1] = distance, surface
-    words[TINT_EDGES + number] = np.uint32(count + 1)
+    words[BLEND_EDGES + number] = np.uint32(count + 1)
     return False

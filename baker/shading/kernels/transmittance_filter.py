@@ -1,7 +1,7 @@
 """The function that Embree tells hits of BLEND surfaces: it multiplies colours, and lets no hit count.
 
 It finds the ray's number in the ray (`packets.PASSES`), and what to write behind the query's context
-(`packets.Tint`).
+(`packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
 """
@@ -13,22 +13,22 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
 from baker.kernels.alpha import SURFACE
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, tint_at
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, filter_colour_at
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
 from baker.trace.embree import HitFilter
 from baker.trace.jit import scratch
 from baker.trace.packets import (
+    BLEND_STOP,
+    BLEND_TRANSMITTANCE,
     CONTEXT_WORDS,
     HIT_U,
     HIT_V,
     ID,
-    LANES,
     NG_X,
+    PACKET_WIDTH,
     PASSES,
     PRIM_ID,
     TFAR,
-    TINT_COLOUR,
-    TINT_STOP,
 )  # fmt: skip
 from baker.trace.pointers import pointer
 
@@ -36,12 +36,12 @@ _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
-def filter_of(tint: TransmittanceTable, pack: TexturePack) -> HitFilter:
+def filter_of(table: TransmittanceTable, pack: TexturePack) -> HitFilter:
     """Return what the ray tree has to know of the triangles that let a share of light through."""
-    arrays = (tint.slot, tint.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
+    arrays = (table.slot, table.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
     address = _multiply_colour.address or 0
-    return HitFilter(tint.slot >= 0, address, data.ctypes.data, (arrays, data), tint.coloured)
+    return HitFilter(table.slot >= 0, address, data.ctypes.data, (arrays, data), table.coloured)
 
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
@@ -75,7 +75,7 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
         number = np.int64(ray_words[ID * n + lane]) - 1
         whole = number >= PASSES
         number -= PASSES if whole else 0
-        if not whole and prim == context_words[TINT_STOP + number]:
+        if not whole and prim == context_words[BLEND_STOP + number]:
             continue
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
@@ -83,7 +83,7 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        alpha = tint_at(row, k, pack, b1, b2, rgba, rgb)
+        alpha = filter_colour_at(row, k, pack, b1, b2, rgba, rgb)
         share = 1.0 - alpha if whole else 1.0
         for c in range(3):
-            context[TINT_COLOUR + c * LANES + number] *= np.float32(share * rgb[c])
+            context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] *= np.float32(share * rgb[c])

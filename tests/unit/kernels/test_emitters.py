@@ -15,8 +15,8 @@ from baker.kernels.emitters import (
     cluster_chances,
     emitted_radiance,
     emitter_density,
-    lamps_for,
     sample_emitter,
+    tile_emitters,
 )
 from baker.kernels.shading import Shading
 from baker.kernels.textures import pack_textures
@@ -187,11 +187,11 @@ def test_nothing_to_choose():
     geometry, shading, emitters = lamps(5, 6)
     dark = build_emitters(geometry, shading._replace(emission=np.zeros((5, 3), np.float32)))
     assert len(dark.triangle) == len(dark.power) == 0
-    assert lamps_for(dark, np.zeros((1, 16, 3), np.float32)).chance.shape == (0,)
+    assert tile_emitters(dark, np.zeros((1, 16, 3), np.float32)).chance.shape == (0,)
     # A lamp that faces down cannot be seen from above.
     one_sided = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 0, 1), grey(0.5, 1.0))]).emitters
-    assert not lamps_for(one_sided, np.full((1, 16, 3), [0, 50, 0], np.float32)).chance.any()
-    below = lamps_for(one_sided, np.full((1, 16, 3), [0, -50, 0], np.float32))
+    assert not tile_emitters(one_sided, np.full((1, 16, 3), [0, 50, 0], np.float32)).chance.any()
+    below = tile_emitters(one_sided, np.full((1, 16, 3), [0, -50, 0], np.float32))
     assert (below.chance > 0).all()
     np.testing.assert_array_equal(below.chance, chances(one_sided, (0, -50, 0), 0)[0])
     zero = np.zeros(len(emitters.power), np.float32)

@@ -18,13 +18,13 @@ from baker.kernels.surface import (
     N_POINTS,
     OFFSET,
     ROUNDING,
-    free_point,
     place,
     place_points,
+    valid_point,
 )
 from baker.radiosity.texels import build_texels
 
-free_point, place = compiled(free_point, place)
+valid_point, place = compiled(valid_point, place)
 
 EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
@@ -84,7 +84,7 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     far, edges = np.abs(flat).max(axis=2), corner[..., 1:, :] - corner[..., :1, :]
     size = np.abs(edges).max(axis=(2, 3))
     away = np.maximum(
-        ROUNDING * np.maximum(far, size), OFFSET * np.minimum(np.maximum(far, surface.least), size)
+        ROUNDING * np.maximum(far, size), OFFSET * np.minimum(np.maximum(far, surface.min_offset_scale), size)
     )[..., None]
     # Near the border also along the face: no rounding puts a point of it behind the wall beside it.
     clipped = np.clip(np.concatenate([1 - b1 - b2, b1, b2], axis=2), 0, 1)
@@ -106,7 +106,7 @@ def test_points_are_uniform_in_what_is_covered(slanted):
     chance = []
     where = {i: [] for i in chosen}
     for seed in range(120):
-        other = surface._replace(net=sobol_reversed(N_POINTS, seed, 7))
+        other = surface._replace(sobol_points=sobol_reversed(N_POINTS, seed, 7))
         _, _, hit, bary = points(other, chosen)
         for n, i in enumerate(chosen):
             where[i].append(in_page(geometry, hit[n], bary[n]) * 16)
@@ -229,10 +229,10 @@ def test_a_buried_point_is_replaced_by_a_free_one(slanted):
         for w, k in enumerate(wanted[n]):
             # Bad points take good ones in turn, so that each serves about equally often.
             truth = int(k) if k in good else good[k % len(good)]
-            assert free_point(mask[i], k) == truth
+            assert valid_point(mask[i], k) == truth
             for mine, every in zip(ours, free, strict=True):
                 np.testing.assert_array_equal(mine[n, w], every[n, truth])
         np.testing.assert_array_equal(same[0][n], points(surface, [i], mask, wanted[:1])[0][0])
-    used = np.bincount([free_point(0b0101_0001_0000_0100, k) for k in range(16)], minlength=16)
+    used = np.bincount([valid_point(0b0101_0001_0000_0100, k) for k in range(16)], minlength=16)
     assert used[[2, 8, 12, 14]].sum() == 16
     assert used.max() <= 5

@@ -92,11 +92,11 @@ def test_pixels_beside_a_chart_know_its_texels():
 
 def test_two_sides_without_a_texel_are_looked_up_nowhere():
     """A two-sided sliver that owns no texel must not make hits reach behind the image of the fronts."""
-    from baker.radiosity.triangle_lookup import build_hit_table
+    from baker.radiosity.triangle_lookup import build_triangle_lookup
 
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((2, 0, 0), (1, 0, 0), (0, 1, 0))], 16)
     world.geometry.double_sided[2] = True
-    table = build_hit_table(world.geometry, world.texels, world.emitters)
+    table = build_triangle_lookup(world.geometry, world.texels, world.emitters)
     assert (table.row[:, 7] == 0).all()
     assert len(world.texels.hit_image(np.zeros(world.texels.n))) == 256
 

@@ -16,10 +16,10 @@ from baker.kernels.emitters import (
     emitted_radiance,
     emitter_at,
     emitter_density,
-    lamps_for,
     needed_shading,
     on_triangle,
     sample_emitter,
+    tile_emitters,
 )
 from baker.lights.emissive import MOST_PARTS, build_emitters
 
@@ -112,7 +112,7 @@ def test_parts_do_not_overlap_and_leave_out_what_is_black():
 
 def test_sampled_points_lie_where_their_density_says():
     world = plate(glowing(blobs()), 300.0)
-    lamps = lamps_for(world.emitters, np.full((1, 16, 3), [0.5, -1, 0.5], np.float32))
+    lamps = tile_emitters(world.emitters, np.full((1, 16, 3), [0.5, -1, 0.5], np.float32))
     rng, point, out = np.random.default_rng(0), np.zeros(3, np.float32), np.zeros(4)
     found = np.zeros(3)
     n, choice = 20000, (lamps.row, lamps.first, lamps.chance, lamps.cumulative)

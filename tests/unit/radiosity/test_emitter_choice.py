@@ -10,7 +10,7 @@ from scenes import SceneBuilder, prepared
 
 from baker.radiosity.emitter_choice import LampChooser, only
 from baker.radiosity.point_cache import points_of
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 
 def world_of(radiance, wall=True, texels=16):
@@ -30,7 +30,7 @@ def choices(world, chosen, n_light=64):
     begin, end = int(chosen[0]), int(chosen[-1]) + 1
     origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
     chooser = LampChooser.build(world.emitters, n_light, world.texels.chart)
-    return chooser, chooser.choose(begin, origin, normal, new_caster(world.rays.tracer))
+    return chooser, chooser.choose(begin, origin, normal, new_packet_buffers(world.rays.tracer))
 
 
 def side(world, left):
@@ -57,7 +57,7 @@ def test_hidden_clusters_are_set_apart_and_the_rest_is_as_if_alone(bright):
         assert (choice.found.cumulative == 1.0).all()
     begin = int(side(world, True)[0])
     points = points_of(world.surface, world.mask, np.arange(begin, begin + 64))
-    (single,) = alone.choose(begin, *points, new_caster(world.rays.tracer))
+    (single,) = alone.choose(begin, *points, new_packet_buffers(world.rays.tracer))
     if len(made) == 1:
         np.testing.assert_allclose(made[0].seen.chance, single.seen.chance, rtol=1e-6)
 

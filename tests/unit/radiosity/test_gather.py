@@ -10,16 +10,24 @@ from tiny_scenes import Quad, box_quads, grey, quad_world, seen_light
 
 from baker.core.progress import silent
 from baker.core.scene import PunctualLight
-from baker.kernels.emitters import emitter_density, lamps_for
+from baker.kernels.emitters import emitter_density, tile_emitters
 from baker.kernels.rays import lane_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble
 from baker.kernels.surface import N_POINTS
 from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import ambient_occlusion, final_gather
-from baker.radiosity.kernels.gather import DIRECT, INDIRECT, N_COLUMNS, OPEN, SQUARE, gather, open_share
+from baker.radiosity.kernels.gather import (
+    DIRECT,
+    INDIRECT,
+    N_COLUMNS,
+    OPEN,
+    SQUARE,
+    estimate_occlusion,
+    gather,
+)
 from baker.radiosity.kernels.shadow import add_visible
 from baker.radiosity.point_cache import points_of
-from baker.trace.packets import new_caster
+from baker.trace.packets import new_packet_buffers
 
 emitter_density, lane_seeds, texel_scramble = compiled(emitter_density, lane_seeds, texel_scramble)
 
@@ -48,7 +56,7 @@ def rays_of(room):
     origin, normal = points_of(room.surface, room.free, np.arange(begin, end))
     exitance = np.random.default_rng(0).random((room.texels.n, 4), np.float32)
     truth = np.zeros((end - begin, N_COLUMNS))
-    lamps = lamps_for(room.emitters, origin)
+    lamps = tile_emitters(room.emitters, origin)
     corner = room.geometry.uv[room.geometry.triangle]
     entry_at = room.texels.hit_image(np.arange(room.texels.n), -1)
     seeds = np.zeros(32, np.uint32)
@@ -104,7 +112,7 @@ def test_gather_is_the_sum_over_its_rays(room, rays_of):
         exitance,
         lamps,
         room.shading,
-        new_caster(room.rays.tracer),
+        new_packet_buffers(room.rays.tracer),
         begin,
         net,
         shared,
@@ -121,7 +129,9 @@ def test_gather_is_the_sum_over_its_rays(room, rays_of):
     assert differs[:, SQUARE].sum() <= 2
     assert (truth[:, [DIRECT, INDIRECT, OPEN]].std(axis=0) > 0.01).all()
     share = np.full(room.texels.n, -1, np.float32)
-    open_share(origin, normal, new_caster(room.rays.tracer), begin, net, shared, np.float32(REACH), 0, share)
+    estimate_occlusion(
+        origin, normal, new_packet_buffers(room.rays.tracer), begin, net, shared, np.float32(REACH), 0, share
+    )
     np.testing.assert_allclose(share[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
 
 
@@ -180,7 +190,7 @@ def test_shadow_rays_add_what_they_reach(room):
     colour = np.float32([1, 2, 0.5])
     out = rng.random((n, 6), np.float32)
     before = out.copy()
-    add_visible(new_caster(room.rays.tracer), origin, ray, weight.astype(np.float32), colour, out)
+    add_visible(new_packet_buffers(room.rays.tracer), origin, ray, weight.astype(np.float32), colour, out)
     mesh = room.geometry.position, room.geometry.triangle
     hit = [
         [naive.intersect(*mesh, o, d, 0, 0.999)[1] for o, d in zip(a, b, strict=True)]

@@ -8,7 +8,7 @@ from inner import compiled
 
 from baker.kernels.emitters import AREA, NORMAL, RADIANCE, ROW_LENGTH, TWO_SIDED
 from baker.radiosity.kernels.polygon_light import angle_over_sine, unoccluded_irradiance
-from baker.trace.packets import LANES
+from baker.trace.packets import PACKET_WIDTH
 
 angle_over_sine, unoccluded_irradiance = compiled(angle_over_sine, unoccluded_irradiance)
 
@@ -25,10 +25,10 @@ def emitter(corners, radiance=(1.0, 1.0, 1.0), two_sided=False):
     return row
 
 
-def clear(origin, normal, rows, lanes=LANES):
-    found = np.full(3 * LANES, np.nan, np.float32)
+def clear(origin, normal, rows, lanes=PACKET_WIDTH):
+    found = np.full(3 * PACKET_WIDTH, np.nan, np.float32)
     unoccluded_irradiance(np.float32(origin), np.float32(normal), 0, lanes, np.stack(rows), found)
-    return found.reshape(3, LANES).T[:lanes]
+    return found.reshape(3, PACKET_WIDTH).T[:lanes]
 
 
 def by_pieces(corners, origin, normal, side=300):
@@ -64,9 +64,9 @@ def by_angles(corners, origin, normal):
 
 
 def points_below(rng, depth, tilt=0.3):
-    origin = np.float32(rng.normal(size=(LANES, 16, 3)) * 0.5)
+    origin = np.float32(rng.normal(size=(PACKET_WIDTH, 16, 3)) * 0.5)
     origin[..., 2] = -np.abs(origin[..., 2]) - depth
-    normal = rng.normal(size=(LANES, 16, 3)) * tilt + [0, 0, 1]
+    normal = rng.normal(size=(PACKET_WIDTH, 16, 3)) * tilt + [0, 0, 1]
     return origin, np.float32(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
 
@@ -81,8 +81,8 @@ def test_close_to_a_lamp_s_edge_the_light_is_that_of_a_half_plane():
     """A hair's breadth from the edge of a lamp at a right angle, half of the hemisphere's light comes."""
     lamp = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
     for distance in (1e-2, 1e-3, 1e-4, 1e-5):
-        origin = np.tile(np.float32([distance, -1e-7, 0.37]), (LANES, 16, 1))
-        normal = np.tile(np.float32([0, 1, 0]), (LANES, 16, 1))
+        origin = np.tile(np.float32([distance, -1e-7, 0.37]), (PACKET_WIDTH, 16, 1))
+        normal = np.tile(np.float32([0, 1, 0]), (PACKET_WIDTH, 16, 1))
         square = np.array([(0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0)], float)
         truth = by_angles(square, origin[:1, :1].astype(float), normal[:1, :1])[0, 0]
         assert truth == pytest.approx(np.pi / 2, rel=5 * distance + 2e-4)

@@ -18,7 +18,7 @@ from baker.kernels.alpha import SURFACE
 from baker.radiosity.kernels.shadow import add_visible
 from baker.shading.materials import resolve_materials
 from baker.shading.ray_tree import build_ray_tree
-from baker.trace.packets import LANES, new_caster
+from baker.trace.packets import PACKET_WIDTH, new_packet_buffers
 
 
 def passed(colour, alpha):
@@ -68,7 +68,7 @@ def visible(world, origin, direction, far=1e30):
     for k in range(16):
         only, out = weight * (np.arange(16) == k), np.zeros((count, 6), np.float32)
         origins, ways = row[0].reshape(count, 16, 3), row[1].reshape(count, 16, 4)
-        add_visible(new_caster(rays.tracer), origins, ways, only, np.ones(3, np.float32), out)
+        add_visible(new_packet_buffers(rays.tracer), origins, ways, only, np.ones(3, np.float32), out)
         np.testing.assert_array_equal(out[:, :3], out[:, 3:])
         found.append(out[:, :3] * 16)
     return np.stack(found, axis=1).reshape(-1, 3)[:n]
@@ -205,7 +205,7 @@ def test_a_pane_seen_edge_on_is_crossed_by_nothing():
 
 def test_fifty_cards_are_a_product_and_not_a_chance():
     cards = [pane(0.05 * k, (0.9, 1.0, 0.8), 0.1) for k in range(50)]
-    found = visible(shaded(cards), *down(LANES * 16))
+    found = visible(shaded(cards), *down(PACKET_WIDTH * 16))
     np.testing.assert_allclose(found[0], passed((0.9, 1.0, 0.8), 0.1) ** 50, rtol=1e-4)
     assert np.ptp(found, axis=0).max() == 0
     # What lets next to nothing through blocks.

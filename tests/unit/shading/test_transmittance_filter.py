@@ -10,11 +10,20 @@ from test_alpha import shaded
 from tiny_scenes import Quad, grey
 
 from baker.core.scene import Texture
-from baker.kernels.transmittance import follow, light_kept
+from baker.kernels.transmittance import trace_transmittance, transmittance
 from baker.shading.ray_tree import build_ray_tree
-from baker.shading.transmittance import build_tint
+from baker.shading.transmittance import build_transmittance_table
 from baker.trace.jit import kernel
-from baker.trace.packets import DIR_X, GEOM_ID, LANES, NO_HIT, ORG_X, TFAR, new_caster, trace_lanes
+from baker.trace.packets import (
+    DIR_X,
+    GEOM_ID,
+    NO_HIT,
+    ORG_X,
+    PACKET_WIDTH,
+    TFAR,
+    new_packet_buffers,
+    trace_lanes,
+)
 
 COLOUR = (1.0, 0.5, 0.0)
 
@@ -31,31 +40,35 @@ def tree(quads):
 
 
 @kernel
-def _cast(caster, origin, direction, far, any_hit, end, kept):
+def _cast(buffers, origin, direction, far, any_hit, end, kept):
     """Trace rays by sixteens; write where they end and what light along them keeps."""
-    on, rays, words, width = caster.lane_valid, caster.lane_floats, caster.lane_words, caster.width
-    function = caster.occluded if any_hit else caster.intersect
-    for group in range(0, len(origin), LANES):
-        for lane in range(LANES):
+    on, rays, words, width = buffers.lane_valid, buffers.lane_floats, buffers.lane_words, buffers.width
+    function = buffers.occluded if any_hit else buffers.intersect
+    for group in range(0, len(origin), PACKET_WIDTH):
+        for lane in range(PACKET_WIDTH):
             i = min(group + lane, len(origin) - 1)
             # Every third ray is left out.
             on[lane] = -1 if group + lane < len(origin) and i % 3 < 2 else 0
             for a in range(3):
-                rays[(ORG_X + a) * LANES + lane] = origin[i, a]
-                rays[(DIR_X + a) * LANES + lane] = direction[i, a]
-            rays[TFAR * LANES + lane] = far
-            words[GEOM_ID * LANES + lane] = NO_HIT
-        trace_lanes(function, caster.scene, width, caster.query, on, rays, caster.valid, caster.floats)
+                rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, a]
+                rays[(DIR_X + a) * PACKET_WIDTH + lane] = direction[i, a]
+            rays[TFAR * PACKET_WIDTH + lane] = far
+            words[GEOM_ID * PACKET_WIDTH + lane] = NO_HIT
+        trace_lanes(function, buffers.scene, width, buffers.query, on, rays, buffers.valid, buffers.floats)
         # A query for any hit leaves the rows of hits as they were: they must not be looked at.
         if any_hit:
-            follow(caster.tint, caster.occluded, width, on, rays, None, caster.valid, caster.floats)
+            trace_transmittance(
+                buffers.blend, buffers.occluded, width, on, rays, None, buffers.valid, buffers.floats
+            )
         else:
-            follow(caster.tint, caster.occluded, width, on, rays, words, caster.valid, caster.floats)
-        for lane in range(LANES):
+            trace_transmittance(
+                buffers.blend, buffers.occluded, width, on, rays, words, buffers.valid, buffers.floats
+            )
+        for lane in range(PACKET_WIDTH):
             if on[lane]:
-                end[group + lane] = rays[TFAR * LANES + lane]
+                end[group + lane] = rays[TFAR * PACKET_WIDTH + lane]
                 for c in range(3):
-                    kept[group + lane, c] = light_kept(caster.tint, c, lane)
+                    kept[group + lane, c] = transmittance(buffers.blend, c, lane)
 
 
 def cast(rays, n=500, far=100.0, any_hit=False):
@@ -64,7 +77,7 @@ def cast(rays, n=500, far=100.0, any_hit=False):
     origin = np.float32(np.column_stack([rng.uniform(0.01, 0.99, (n, 2)), np.full(n, 5.0)]))
     end, kept = np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
     down = np.float32(np.tile([0, 0, -1], (n, 1)))
-    _cast(new_caster(rays.tracer), origin, down, np.float32(far), any_hit, end, kept)
+    _cast(new_packet_buffers(rays.tracer), origin, down, np.float32(far), any_hit, end, kept)
     chosen = np.arange(n) % 3 < 2
     return origin[chosen, :2], end[chosen], kept[chosen]
 
@@ -84,18 +97,18 @@ def test_blend_surfaces_are_chosen_and_told_from_white_ones():
         pane(colour=(1, 1, 1), rgba=red),
         pane(colour=(1, 1, 1), vertex=np.ones((4, 4)) * [0.5, 1, 1, 1]),
     ]
-    table = build_tint(shaded(quads)[1])
+    table = build_transmittance_table(shaded(quads)[1])
     assert (table.slot >= 0).tolist() == [k in (4, 5, 7, 8, 9) for k in range(10) for _ in range(2)]
     for k in (7, 8, 9):
-        assert build_tint(shaded(quads[k : k + 1])[1]).coloured
+        assert build_transmittance_table(shaded(quads[k : k + 1])[1]).coloured
         assert tree(quads[k : k + 1]).tracer.coloured
     # White panes colour nothing; without any BLEND triangle kernels do without transmittance.
     white = tree(quads[:7])
-    assert white.tracer.tint is not None
+    assert white.tracer.blend_scene is not None
     assert not white.tracer.coloured
-    assert build_tint(shaded(quads[:4])[1]) is None
-    assert tree(quads[:4]).tracer.tint is None
-    assert new_caster(tree(quads[:3]).tracer).tint is None
+    assert build_transmittance_table(shaded(quads[:4])[1]) is None
+    assert tree(quads[:4]).tracer.blend_scene is None
+    assert new_packet_buffers(tree(quads[:3]).tracer).blend is None
 
 
 @pytest.mark.parametrize("any_hit", [False, True])
