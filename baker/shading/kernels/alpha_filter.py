@@ -3,8 +3,8 @@
 A MASK hit counts where alpha reaches the cutoff. For a BLEND hit it depends on the ray (its ID row):
 
 - Shadow rays (ID 1 to 16, the ray's number): the transmittance T = (1 - a) lerp(1, c, a) is multiplied into
-  `packets.BlendBuffers.transmittance`, and the hit does not count. The ends of these rays are fixed, so Embree
-  reports every crossing on the way, in any order.
+  `packets.BlendBuffers.transmittance`, and the hit does not count. The ends of these rays are fixed, so
+  Embree reports every crossing on the way, in any order.
 - Rays that pass BLEND surfaces unaware (ID `packets.UNAWARE`): the hit counts where alpha is 1.
 - Rays that ask what lies on which side (ID `packets.SOLID`): the hit counts where alpha is above 0.
 - Other rays (ID 0): the hit counts with probability alpha. The number that decides is a hash of the bits of
