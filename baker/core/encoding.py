@@ -1,24 +1,30 @@
-"""What an image encoding is: one file of `baker.encodings` that writes and reads one format.
+"""The interface of image encodings: one file of `baker.encodings` writes and reads one format.
 
-Callers find an encoding by its name in `ENCODINGS` and never import it, so a new format is one new file.
+Callers find an encoding by its name in `ENCODINGS` and never import it. A new format is one new file, its
+settings included: each field of its options is a setting of a bake, with a flag, a key of the configuration
+file and a row of the settings page.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.options import BaseModel, ConfigDict
 from baker.core.registry import Registry
 
-# A code that misses its value by more than this share shows as a step: the eye tells 1 to 2 % apart.
+# A code that misses its value by more than this share is visible as a step: the eye separates 1 to 2 %.
 VISIBLE_STEP = 0.01
 # Texels darker than this share of the page's mean are black on a screen exposed for the page.
 BLACK = 0.01
+# The encoding of the files that every bake has.
+ALWAYS_WRITTEN = "exr"
 # Rows measured at once, so that a page of 16384 texels a side needs no second page of memory.
 _ROWS = 256
 
@@ -30,10 +36,12 @@ class DecodedImage:
     Attributes
     ----------
     pixels : (H, W, C) float32, row 0 is v = 0
-    header : dict of str to str, what the file says of itself
+    header : dict of str to str
+        Attributes or text chunks of the file.
     dtype : str
         Number format in the file: "half", "float" or "uint".
-    channels : tuple of str, names in the order of the last axis
+    channels : tuple of str
+        Names of the components in the order of the last axis.
     """
 
     pixels: NDArray[np.float32]
@@ -42,56 +50,86 @@ class DecodedImage:
     channels: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class EncodeOptions:
-    """What a format may be told.
+class EncodingOptions(BaseModel):
+    """Settings of one encoding; a subclass has a field with default, range and description for each.
+
+    The names are settings of a bake and must differ from all other settings. The types are those that a flag
+    can have: str, int, float, bool, Literal.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+
+Options = TypeVar("Options", bound=EncodingOptions)
+
+
+class Encoding(ABC, Generic[Options]):
+    """Writes and reads one image format.
 
     Attributes
     ----------
-    half : bool
-        EXR: 16 bit numbers, otherwise 32 bit.
-    compression : str
-        EXR: "zip" or "piz".
-    top : float
-        RGBM: the value stored as all ones.
-    """
-
-    half: bool = True
-    compression: str = "zip"
-    top: float = 1.0
-
-
-class Encoding(Protocol):
-    """Writes and reads one image format.
-
-    `suffix` ends the names of its files and no other encoding's; `components` lists how many channels an
-    image of it may have.
+    suffix : str
+        Ends the names of its files and those of no other encoding.
+    components : tuple of int
+        Numbers of components that an image of it may have.
+    signed : bool
+        Whether it holds negative numbers.
+    options_type : type of `EncodingOptions`
+    when_clipped, when_banded : str
+        What to do if a page exceeds the limits, or shows steps; the end of the warning's sentence.
     """
 
     suffix: str
     components: tuple[int, ...]
+    signed: bool = False
+    options_type: type[Options]
+    when_clipped: str = "use the EXR"
+    when_banded: str = "use the EXR"
 
-    def limits(self, options: EncodeOptions) -> tuple[float, float]:
-        """Return the lowest and highest value it can hold; what is beyond is stored there."""
+    def options_of(self, settings: BaseModel) -> Options:
+        """Return the options of this encoding among the settings of a bake."""
+        return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 
-    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
-        """Return what a reader of the file will get for these pixels."""
+    def fitted(self, options: Options, brightest: float) -> Options:
+        """Return the options for one map, with whatever depends on its largest value filled in."""
+        return options
 
-    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
-        """Return how far `stored` may be from pixels within the limits, element by element."""
+    def options_of_image(self, image: DecodedImage) -> Options:
+        """Return options that write an image in the number format it was read in."""
+        return self.options_type()
 
+    @abstractmethod
+    def limits(self, options: Options) -> tuple[float, float]:
+        """Return the lowest and highest value it can hold; values beyond are stored as these."""
+
+    @abstractmethod
+    def stored(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
+        """Return (..., C) float32: what a reader of the file gets for pixels (..., C)."""
+
+    @abstractmethod
+    def tolerance(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float64]:
+        """Return (..., C) float64: how far `stored` may be from pixels within the limits."""
+
+    @abstractmethod
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+        self,
+        path: Path,
+        pixels: NDArray[np.float32],
+        *,
+        options: Options,
+        header: Mapping[str, str],
+        names: tuple[str, ...] | None = None,
     ) -> None:
-        """Write pixels (H, W, C) to `path`."""
+        """Write pixels (H, W, C) to `path`; `names` are those of the components, where a format has names."""
 
+    @abstractmethod
     def decode(self, path: Path) -> DecodedImage:
         """Read a file of this format."""
 
 
 @dataclass(frozen=True)
 class Loss:
-    """What a format costs a page.
+    """Texels of a page that a format cannot hold well.
 
     Attributes
     ----------
@@ -109,7 +147,7 @@ class Loss:
 
 
 def measure_loss(
-    encoding: Encoding, pixels: NDArray[np.float32], surface: NDArray[np.bool_], options: EncodeOptions
+    encoding: Encoding[Options], pixels: NDArray[np.float32], surface: NDArray[np.bool_], options: Options
 ) -> Loss:
     """Count the texels that a format clips, and those where its steps can be seen.
 
@@ -119,7 +157,8 @@ def measure_loss(
     pixels : (H, W, C) float32
     surface : (H, W) bool
         Texels that are shown.
-    options : EncodeOptions
+    options : EncodingOptions
+        Of this encoding.
 
     Returns
     -------
@@ -146,7 +185,15 @@ def measure_loss(
 
 
 def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name: str) -> None:
-    """Refuse what is no image of so many channels, or holds what is no number.
+    """Refuse pixels of another shape than (H, W, C) with C in `components`, and NaN.
+
+    Parameters
+    ----------
+    pixels : ndarray of float32
+    components : tuple of int
+        Numbers of components that the format holds.
+    name : str
+        Of the file, for the message.
 
     Raises
     ------
@@ -155,18 +202,53 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     if pixels.ndim != 3 or pixels.shape[2] not in components or 0 in pixels.shape:
         shapes = " nor ".join(f"(H, W, {count})" for count in components)
         word = "neither " if len(components) > 1 else "not "
+        if len(components) > 3:
+            word, shapes = "not ", f"(H, W, {min(components)} to {max(components)})"
         raise ValueError(f"pixels of shape {pixels.shape} are {word}{shapes}")
-    # One look at the extremes (NaN shows in them) is all that most pages need.
+    # The minimum and maximum are NaN if any pixel is: no mask is needed for most pages.
     if np.isnan(pixels.min()) or np.isnan(pixels.max()):
         count = int(np.isnan(pixels).any(axis=2).sum())
         raise ValueError(f"{count} texels are not a number; {name} is not written")
 
 
-ENCODINGS: Registry[Encoding] = Registry("baker.encodings")
+ENCODINGS: Registry[Encoding[Any]] = Registry("baker.encodings")
 
 
-def encoding_of(name: str) -> Encoding | None:
+def encoding_of(name: str) -> Encoding[Any] | None:
     """Return the encoding whose suffix ends a file's name (the longest one that does), or None."""
     plugins = [ENCODINGS.require(key, "encoding") for key in ENCODINGS.names()]
     fitting = [plugin for plugin in plugins if name.lower().endswith(plugin.suffix)]
     return max(fitting, key=lambda plugin: len(plugin.suffix), default=None)
+
+
+def encodings_in_words() -> str:
+    """Return the names of the encodings beside the EXR, by the number of components that they hold."""
+    names: dict[tuple[int, ...], list[str]] = {}
+    for name in ENCODINGS.names():
+        if name != ALWAYS_WRITTEN:
+            names.setdefault(ENCODINGS.require(name, "encoding").components, []).append(f"`{name}`")
+    words: dict[tuple[int, ...], str] = {(3,): "colours", (1,): "one value"}
+    return "; ".join(
+        f"{', '.join(some)} ({words.get(count, 'any')})"
+        for count, some in sorted(names.items(), reverse=True)
+    )
+
+
+def encoding_options() -> dict[str, type[EncodingOptions]]:
+    """Return the options model of each encoding that has options, by the name of the encoding.
+
+    Raises
+    ------
+    ValueError
+        If two encodings have an option of the same name.
+    """
+    models = {name: ENCODINGS.require(name, "encoding").options_type for name in ENCODINGS.names()}
+    found: dict[str, type[EncodingOptions]] = {}
+    owner: dict[str, str] = {}
+    for name, model in models.items():
+        for field in model.model_fields if model not in found.values() else ():
+            if field in owner:
+                raise ValueError(f"the encodings {owner[field]} and {name} both have an option '{field}'")
+            owner[field] = name
+            found[name] = model
+    return found

@@ -5,13 +5,13 @@ The command line, the configuration file and the settings page of the docs are m
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
+from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
 from baker.core.names import unknown_name
+from baker.core.options import BaseModel, ConfigDict, Field, ValidationError
 
 # Hemisphere rays per texel for each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
@@ -22,8 +22,8 @@ _LISTS = {"channels", "encode", "exclude", "export", "include"}
 REPEATED = frozenset({"exclude", "include"})
 
 
-class BakeSettings(BaseModel):
-    """Holds all settings of a bake, checked."""
+class CommonSettings(BaseModel):
+    """The settings of a bake that no plugin brings."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -53,14 +53,7 @@ class BakeSettings(BaseModel):
         None, ge=0, le=1000, description="Reflections of light; default: until converged."
     )
     denoise: bool = Field(True, description="Denoise with Open Image Denoise.")
-    dtype: Literal["half", "float"] = Field("half", description="Number format of the EXR files.")
-    exr_compression: Literal["zip", "piz"] = Field("zip", description="Compression of the EXR files.")
-    encode: tuple[str, ...] = Field(
-        (), description="Further files of each page: `hdr`, `rgbm` (colours); `png8`, `png16` (AO)."
-    )
-    rgbm_range: str = Field(
-        "auto", description="Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel."
-    )
+    encode: tuple[str, ...] = Field((), description=f"Further files of each page: {encodings_in_words()}.")
     export: tuple[str, ...] = Field(
         (), description="Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
     )
@@ -101,18 +94,16 @@ class BakeSettings(BaseModel):
             )
         return reach
 
-    def rgbm_top(self, brightest: float) -> float:
-        """Return the irradiance that RGBM stores as all ones, for a map with this brightest value."""
-        text = self.rgbm_range.strip()
-        if text == "auto":
-            return brightest if brightest > 0 else 1.0
-        try:
-            top = float(text)
-        except ValueError:
-            top = -1.0
-        if not 0 < top < float("inf"):
-            raise SettingsError(f"rgbm_range '{self.rgbm_range}' is neither auto nor a number of lx above 0")
-        return top
+
+if TYPE_CHECKING:
+
+    class BakeSettings(CommonSettings):
+        """All settings of a bake, checked; a type checker sees those of no plugin."""
+
+else:
+
+    class BakeSettings(*reversed(encoding_options().values()), CommonSettings):
+        """All settings of a bake, checked: common ones, and the options of each encoding."""
 
 
 def parse_sky(text: str) -> tuple[float, float, float]:
@@ -147,7 +138,7 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
         name = key.replace("-", "_")
         if name not in known:
             raise unknown_name("setting", key, known, object=key)
-        if name in {"ao_distance", "sky", "rgbm_range"} and isinstance(value, int | float):
+        if name in {"ao_distance", "sky"} and isinstance(value, int | float):
             value = str(value)
         if name == "sky" and isinstance(value, list | tuple):
             value = ",".join(str(v) for v in value)
@@ -165,7 +156,6 @@ def make_settings(values: dict[str, Any]) -> BakeSettings:
     if max(settings.sky_radiance) > BRIGHTEST:
         raise SettingsError(f"sky: {settings.sky} is above {BRIGHTEST:.0e} cd/m2", object="sky")
     settings.ao_reach(1.0)
-    settings.rgbm_top(1.0)
     if not settings.channels:
         raise SettingsError("channels names nothing to bake", object="channels")
     return settings

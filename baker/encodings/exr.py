@@ -10,19 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, EncodeOptions, check_pixels
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
+from baker.core.options import Field
 
 # The largest finite half.
 HALF_MAX = 65504.0
 
 # Rec.709 primaries and the D65 white point as CIE xy: red, green, blue, white.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+# Components of one image; a spherical harmonic of order 1 in three colours has 12.
+MAX_COMPONENTS = 16
 
 _NAMES = {1: ("Y",), 3: ("R", "G", "B")}
 
@@ -34,19 +38,23 @@ def encode_exr(
     half: bool = True,
     compression: str = "zip",
     header: Mapping[str, str] | None = None,
+    names: tuple[str, ...] | None = None,
 ) -> int:
     """Write one image and read it back to be sure that all of it reached the disk.
 
     Parameters
     ----------
     path : Path
-    pixels : (H, W, C) float32, linear Rec.709 for C = 3, C is 1 or 3, row 0 on top
+    pixels : (H, W, C) float32, row 0 on top, 1 to 16 components
     half : bool
         16 bit numbers; otherwise 32 bit.
     compression : str
         "zip" or "piz"; neither loses anything.
     header : mapping of str to str
         Further attributes, like quantity and unit.
+    names : tuple of str, optional
+        Channel of each component: "R", "G", "B", or "layer.R" for one of a named layer. By default Y for one
+        component and R G B, linear Rec.709, for three; other numbers of components need names.
 
     Returns
     -------
@@ -56,18 +64,20 @@ def encode_exr(
     Raises
     ------
     ValueError
-        If a pixel is not a number, or the shape is not (H, W, 1) or (H, W, 3).
+        If a pixel is not a number, or the shape and `names` do not belong together.
     ResourceError
         If the file cannot be written.
     """
-    check_pixels(pixels, (1, 3), path.name)
+    check_pixels(pixels, ExrEncoding.components, path.name)
+    names = names or _NAMES.get(pixels.shape[2], ())
+    if len(set(names)) != pixels.shape[2]:
+        raise ValueError(f"pixels of shape {pixels.shape} need a name for each component, not {names}")
     top = _top(half)
     clipped = 0
     if pixels.min() < -top or pixels.max() > top:
         clipped = int((np.abs(pixels) > top).any(axis=2).sum())
         pixels = np.clip(pixels, -top, top)
     stored = pixels.astype(np.float16 if half else np.float32)
-    names = _NAMES[stored.shape[2]]
     planes = {name: np.ascontiguousarray(stored[:, :, index]) for index, name in enumerate(names)}
     _write(path, planes, dict(header or {}), compression)
     return clipped
@@ -130,31 +140,53 @@ def decode_exr(path: Path) -> DecodedImage:
     return DecodedImage(pixels, header, dtype, tuple(names))
 
 
-class ExrEncoding:
-    """Files `encode_exr` and `decode_exr` under the name `exr`."""
+class ExrOptions(EncodingOptions):
+    """Number format and compression."""
+
+    dtype: Literal["half", "float"] = Field(default="half", description="Number format of the EXR files.")
+    exr_compression: Literal["zip", "piz"] = Field(default="zip", description="Compression of the EXR files.")
+
+
+class ExrEncoding(Encoding[ExrOptions]):
+    """OpenEXR files, written by `encode_exr` and read by `decode_exr`."""
 
     suffix = ".exr"
-    components: tuple[int, ...] = (1, 3)
+    components: tuple[int, ...] = tuple(range(1, MAX_COMPONENTS + 1))
+    signed = True
+    options_type = ExrOptions
+    when_clipped = "use --dtype float"
+    when_banded = "use --dtype float"
 
-    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+    def options_of_image(self, image: DecodedImage) -> ExrOptions:
+        """Return the number format of the image."""
+        return ExrOptions(dtype="half" if image.dtype == "half" else "float")
+
+    def limits(self, options: ExrOptions) -> tuple[float, float]:
         """Return the ends of the number format."""
-        return -_top(options.half), _top(options.half)
+        return -_top(options.dtype == "half"), _top(options.dtype == "half")
 
-    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+    def stored(self, pixels: NDArray[np.float32], options: ExrOptions) -> NDArray[np.float32]:
         """Return pixels rounded to the number format."""
         clipped = np.clip(pixels, *self.limits(options))
-        return clipped.astype(np.float16).astype(np.float32) if options.half else clipped
+        return clipped.astype(np.float16).astype(np.float32) if options.dtype == "half" else clipped
 
-    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
-        """Half the step of a half: 2^-11 of the value, 2^-25 near zero; nothing for 32 bit."""
+    def tolerance(self, pixels: NDArray[np.float32], options: ExrOptions) -> NDArray[np.float64]:
+        """Return half the step of a half: 2^-11 of the value, 2^-25 near zero; 0 for 32 bit."""
         size = np.abs(pixels.astype(np.float64))
-        return np.maximum(size * 2.0**-11, 2.0**-25) if options.half else np.zeros_like(size)
+        return np.maximum(size * 2.0**-11, 2.0**-25) if options.dtype == "half" else np.zeros_like(size)
 
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+        self,
+        path: Path,
+        pixels: NDArray[np.float32],
+        *,
+        options: ExrOptions,
+        header: Mapping[str, str],
+        names: tuple[str, ...] | None = None,
     ) -> None:
         """Write pixels; see `encode_exr`."""
-        encode_exr(path, pixels, half=options.half, compression=options.compression, header=header)
+        half = options.dtype == "half"
+        encode_exr(path, pixels, half=half, compression=options.exr_compression, header=header, names=names)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read pixels; see `decode_exr`."""

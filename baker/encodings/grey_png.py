@@ -12,41 +12,51 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import DecodedImage, EncodeOptions, check_pixels
+from baker.core.encoding import DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
 from baker.io.png import decode_png, encode_png
 
 
-class GreyPng:
-    """Writes and reads grey PNG files with so many bits a texel.
+class GreyPng(Encoding[EncodingOptions]):
+    """Writes and reads grey PNG files of 8 or 16 bits a texel.
 
     Parameters
     ----------
     bits : int
         8 or 16.
+    remedy : str
+        What to do about texels that are clipped or show steps.
     """
 
     components: tuple[int, ...] = (1,)
+    options_type = EncodingOptions
 
-    def __init__(self, bits: int) -> None:
+    def __init__(self, bits: int, remedy: str = "use the EXR") -> None:
+        self.when_clipped = self.when_banded = remedy
         self.suffix = f".{bits}bit.png"
         self._dtype = np.dtype(f"uint{bits}")
         self._steps = 2**bits - 1
 
-    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+    def limits(self, options: EncodingOptions) -> tuple[float, float]:
         """Return 0 and 1."""
         return 0.0, 1.0
 
-    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+    def stored(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float32]:
         """Return pixels rounded to the nearest step."""
         return self._value(self._code(pixels))
 
-    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
-        """Half a step, and what single precision adds."""
+    def tolerance(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float64]:
+        """Return half a step and the rounding of single precision."""
         return np.full(pixels.shape, 0.5 / self._steps + 1e-7)
 
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+        self,
+        path: Path,
+        pixels: NDArray[np.float32],
+        *,
+        options: EncodingOptions,
+        header: Mapping[str, str],
+        names: tuple[str, ...] | None = None,
     ) -> None:
         """Write pixels (H, W, 1).
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, EncodeOptions, check_pixels
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
 
 # The largest mantissa with the largest exponent.
@@ -25,27 +25,34 @@ _CODED = range(8, 32768)
 _SHORTEST = 4
 
 
-class HdrEncoding:
+class HdrEncoding(Encoding[EncodingOptions]):
     """Files Radiance HDR under the name `hdr`."""
 
     suffix = ".hdr"
     components: tuple[int, ...] = (3,)
+    options_type = EncodingOptions
 
-    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+    def limits(self, options: EncodingOptions) -> tuple[float, float]:
         """Return the range: no negative light, and 2^127 at the top."""
         return 0.0, HDR_MAX
 
-    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+    def stored(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float32]:
         """Return pixels as their shared exponent lets them be."""
         return _from_rgbe(_to_rgbe(pixels))
 
-    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
+    def tolerance(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float64]:
         """Half a step: 1/256 of the brightest channel; everything below 2^-127 is zero."""
         brightest = pixels.max(axis=-1, keepdims=True).astype(np.float64)
         return np.broadcast_to(np.maximum(brightest / 256.0, 2.0**-127), pixels.shape)
 
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+        self,
+        path: Path,
+        pixels: NDArray[np.float32],
+        *,
+        options: EncodingOptions,
+        header: Mapping[str, str],
+        names: tuple[str, ...] | None = None,
     ) -> None:
         """Write pixels (H, W, 3).
 

@@ -5,4 +5,4 @@ from __future__ import annotations
 from baker.core.encoding import ENCODINGS
 from baker.encodings.grey_png import GreyPng
 
-ENCODINGS.register("png8")(GreyPng(8))
+ENCODINGS.register("png8")(GreyPng(8, remedy="use png16 or the EXR"))

@@ -14,28 +14,64 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, EncodeOptions, check_pixels
-from baker.core.errors import InputError, ResourceError
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
+from baker.core.errors import InputError, ResourceError, SettingsError
+from baker.core.options import Field, field_validator
 from baker.io.png import decode_png, encode_png
 
 GAMMA = 2.2
 
 
-class RgbmEncoding:
+class RgbmOptions(EncodingOptions):
+    """The value stored as all ones."""
+
+    rgbm_range: str = Field(
+        "auto", description="Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel."
+    )
+
+    @field_validator("rgbm_range", mode="before")
+    @classmethod
+    def _check(cls, value: object) -> str:
+        text = str(value).strip()
+        try:
+            fits = text == "auto" or 0 < float(text) < float("inf")
+        except ValueError:
+            fits = False
+        if not fits:
+            why = f"rgbm_range '{value}' is neither auto nor a number of lx above 0"
+            raise SettingsError(why, object="rgbm_range")
+        return text
+
+    @property
+    def top(self) -> float:
+        """Return the value stored as all ones."""
+        return float(self.rgbm_range)
+
+
+class RgbmEncoding(Encoding[RgbmOptions]):
     """Files RGBM under the name `rgbm`."""
 
     suffix = ".rgbm.png"
     components: tuple[int, ...] = (3,)
+    options_type = RgbmOptions
+    when_clipped = "raise --rgbm-range or set it to auto"
+    when_banded = "lower --rgbm-range or use the EXR"
 
-    def limits(self, options: EncodeOptions) -> tuple[float, float]:
+    def fitted(self, options: RgbmOptions, brightest: float) -> RgbmOptions:
+        """Replace `auto` by the map's largest value, or by 1 for a black map."""
+        if options.rgbm_range != "auto":
+            return options
+        return RgbmOptions(rgbm_range=repr(brightest if brightest > 0 else 1.0))
+
+    def limits(self, options: RgbmOptions) -> tuple[float, float]:
         """Return 0 and the top."""
         return 0.0, options.top
 
-    def stored(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float32]:
+    def stored(self, pixels: NDArray[np.float32], options: RgbmOptions) -> NDArray[np.float32]:
         """Return pixels after rounding multiplier and colour to 8 bits."""
         return _from_rgbm(_to_rgbm(pixels, options.top), options.top)
 
-    def tolerance(self, pixels: NDArray[np.float32], options: EncodeOptions) -> NDArray[np.float64]:
+    def tolerance(self, pixels: NDArray[np.float32], options: RgbmOptions) -> NDArray[np.float64]:
         """Half a step of the colour at the multiplier chosen, through the power."""
         root = _root(pixels, options.top)
         multiplier = root.max(axis=-1, keepdims=True) + 1.0 / 255.0
@@ -45,7 +81,13 @@ class RgbmEncoding:
         return bound
 
     def encode(
-        self, path: Path, pixels: NDArray[np.float32], *, options: EncodeOptions, header: Mapping[str, str]
+        self,
+        path: Path,
+        pixels: NDArray[np.float32],
+        *,
+        options: RgbmOptions,
+        header: Mapping[str, str],
+        names: tuple[str, ...] | None = None,
     ) -> None:
         """Write pixels (H, W, 3).
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from baker.core.encoding import EncodeOptions, encoding_of
+from baker.core.encoding import encoding_of
 from baker.core.export import EXPORTS
 from baker.exporters.common import (
     DESCRIPTION_NAME,
@@ -94,4 +94,4 @@ def _write_page(source: Path, target: Path) -> None:
     header: dict[str, str] = {key: image.header[key] for key in _KEPT if key in image.header}
     header |= {"quantity": "irradiance E / pi, without the receiver's albedo", "unit": "cd/m2"}
     pixels = (image.pixels.astype(np.float64) / math.pi).astype(np.float32)
-    encoding.encode(target, pixels, options=EncodeOptions(half=image.dtype == "half"), header=header)
+    encoding.encode(target, pixels, options=encoding.options_of_image(image), header=header)

@@ -8,20 +8,35 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baker.core.encoding import ENCODINGS, EncodeOptions, encoding_of, measure_loss
+from baker.core.encoding import ENCODINGS, encoding_of, measure_loss
 from baker.core.errors import InputError, ResourceError
 
 HEADER = {"quantity": "irradiance", "unit": "lx"}
+# Options to test with, where the defaults are not enough.
 OPTIONS = {
-    "exr": [EncodeOptions(half, method) for half in (True, False) for method in ("zip", "piz")],
-    "rgbm": [EncodeOptions(top=top) for top in (0.5, 34.49, 20000.0)],
+    "exr": [
+        {"dtype": dtype, "exr_compression": method}
+        for dtype in ("half", "float")
+        for method in ("zip", "piz")
+    ],
+    "rgbm": [{"rgbm_range": top} for top in (0.5, 34.49, 20000.0)],
 }
 CASES = [
     pytest.param(name, number, options, id=f"{name}-{number}")
     for name in ENCODINGS.names()
     for number in ENCODINGS.get(name).components
-    for options in OPTIONS.get(name, [EncodeOptions()])
+    for options in (ENCODINGS.get(name).options_type(**values) for values in OPTIONS.get(name, [{}]))
 ]
+
+
+def names_of(number):
+    """Return names for so many components."""
+    return {1: ("Y",), 3: ("R", "G", "B")}.get(number, tuple(f"layer.{k:02}" for k in range(number)))
+
+
+def fitted(encoding, **values):
+    """Return options of an encoding for maps of values up to 1."""
+    return encoding.fitted(encoding.options_type(**values), 1.0)
 
 
 def image(encoding, options, number, height=23, width=70, seed=5):
@@ -47,11 +62,11 @@ def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, nu
     encoding = ENCODINGS.get(name)
     pixels = image(encoding, options, number)
     path = tmp_path / f"a{encoding.suffix}"
-    encoding.encode(path, pixels, options=options, header=HEADER)
+    encoding.encode(path, pixels, options=options, header=HEADER, names=names_of(number))
     assert encoding_of(path.name) is encoding
     read = encoding.decode(path)
     assert read.pixels.dtype == np.float32
-    assert read.channels == (("Y",) if number == 1 else ("R", "G", "B"))
+    assert read.channels == names_of(number)
     assert read.header["unit"] == "lx"
     assert read.header["quantity"] == "irradiance"
     miss = np.abs(read.pixels.astype(np.float64) - pixels)
@@ -86,7 +101,9 @@ def test_what_does_not_fit_is_counted_and_stored_at_the_end(tmp_path, name, numb
         pixels[2, 2, 0] = -1.0
     loss = measure_loss(encoding, pixels, np.ones((12, 12), bool), options)
     assert loss.clipped == (3 if low == 0 else 2)
-    encoding.encode(tmp_path / f"a{encoding.suffix}", pixels, options=options, header={})
+    encoding.encode(
+        tmp_path / f"a{encoding.suffix}", pixels, options=options, header={}, names=names_of(number)
+    )
     read = encoding.decode(tmp_path / f"a{encoding.suffix}").pixels
     assert np.isfinite(read).all()
     assert read.min() >= low
@@ -99,7 +116,9 @@ def test_the_same_pixels_give_the_same_bytes(tmp_path, name, number, options):
     digests = set()
     for file in ("a", "b"):
         path = tmp_path / f"{file}{encoding.suffix}"
-        encoding.encode(path, image(encoding, options, number), options=options, header=HEADER)
+        encoding.encode(
+            path, image(encoding, options, number), options=options, header=HEADER, names=names_of(number)
+        )
         digests.add(hashlib.sha256(path.read_bytes()).hexdigest())
     assert len(digests) == 1
 
@@ -108,11 +127,13 @@ def test_the_same_pixels_give_the_same_bytes(tmp_path, name, number, options):
 def test_odd_sizes(tmp_path, name):
     encoding = ENCODINGS.get(name)
     for shape in ((1, 1), (1, 7), (3, 8), (2, 129), (2, 300)):
-        pixels = np.random.default_rng(1).random((*shape, encoding.components[-1]), np.float32)
+        number = encoding.components[-1]
+        pixels = np.random.default_rng(1).random((*shape, number), np.float32)
         pixels[0] = pixels[0, :1]
         path = tmp_path / f"{shape[1]}{encoding.suffix}"
-        encoding.encode(path, pixels, options=EncodeOptions(), header={})
-        assert np.array_equal(encoding.decode(path).pixels, encoding.stored(pixels, EncodeOptions()))
+        options = fitted(encoding)
+        encoding.encode(path, pixels, options=options, header={}, names=names_of(number))
+        assert np.array_equal(encoding.decode(path).pixels, encoding.stored(pixels, options))
 
 
 @pytest.mark.parametrize("name", ENCODINGS.names())
@@ -123,15 +144,15 @@ def test_errors_are_sentences(tmp_path, name):
     bad = np.ones((4, 5, number), np.float32)
     bad[2, 2] = np.nan
     with pytest.raises(ValueError, match="1 texels are not a number"):
-        encoding.encode(path, bad, options=EncodeOptions(), header={})
+        encoding.encode(path, bad, options=fitted(encoding), header={})
     with pytest.raises(ValueError, match="pixels of shape"):
-        encoding.encode(path, np.ones((4, 5, 2), np.float32), options=EncodeOptions(), header={})
+        encoding.encode(path, np.ones((4, 5, 2), np.float32), options=fitted(encoding), header={})
     assert not path.exists()
     with pytest.raises(ResourceError, match="could not be written"):
         encoding.encode(
             tmp_path / "absent" / path.name,
             np.ones((4, 5, number), np.float32),
-            options=EncodeOptions(),
+            options=fitted(encoding),
             header={},
         )
     with pytest.raises(InputError, match=r"no such file|cannot be read"):
@@ -140,7 +161,7 @@ def test_errors_are_sentences(tmp_path, name):
     with pytest.raises(InputError, match="not a readable"):
         encoding.decode(path)
     pixels = np.random.default_rng(2).random((64, 64, number), np.float32)
-    encoding.encode(path, pixels, options=EncodeOptions(), header={})
+    encoding.encode(path, pixels, options=fitted(encoding), header={})
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="not a readable"):
@@ -159,7 +180,10 @@ def test_rgbm_by_hand(tmp_path):
     """a = ceil(255 m), rgb = root / a, where root = (value / top)^(1 / 2.2) and m is the largest root."""
     encoding = ENCODINGS.get("rgbm")
     encoding.encode(
-        tmp_path / "a.rgbm.png", np.float32([[[8, 2, 0]]]), options=EncodeOptions(top=34.49), header={}
+        tmp_path / "a.rgbm.png",
+        np.float32([[[8, 2, 0]]]),
+        options=fitted(encoding, rgbm_range=34.49),
+        header={},
     )
     with Image.open(tmp_path / "a.rgbm.png") as picture:
         red, green, blue, alpha = np.asarray(picture)[0, 0].tolist()
@@ -174,9 +198,8 @@ def test_rgbm_by_hand(tmp_path):
 
 def test_radiance_hdr_by_hand(tmp_path):
     """1.0 is mantissa 128 at exponent 129, and a line is its four planes run-length coded."""
-    ENCODINGS.get("hdr").encode(
-        tmp_path / "a.hdr", np.ones((1, 10, 3), np.float32), options=EncodeOptions(), header={}
-    )
+    encoding = ENCODINGS.get("hdr")
+    encoding.encode(tmp_path / "a.hdr", np.ones((1, 10, 3), np.float32), options=fitted(encoding), header={})
     head, _, body = (tmp_path / "a.hdr").read_bytes().partition(b"-Y 1 +X 10\n")
     assert head.startswith(b"#?RADIANCE\n")
     assert b"FORMAT=32-bit_rle_rgbe\n" in head
@@ -188,16 +211,16 @@ def test_banding_is_where_steps_show():
     ramp = np.linspace(0.02, 1.0, 64 * 64, dtype=np.float32).reshape(64, 64, 1)
     eight, sixteen = ENCODINGS.get("png8"), ENCODINGS.get("png16")
     # Half a step of 1/255 is more than 1 % of what is below 0.196.
-    loss = measure_loss(eight, ramp, surface, EncodeOptions())
+    loss = measure_loss(eight, ramp, surface, fitted(eight))
     wrong = np.abs(np.rint(ramp * 255) / 255 - ramp) > 0.01 * ramp
     assert loss.banded == int(wrong.sum()) > 300
-    assert measure_loss(sixteen, ramp, surface, EncodeOptions()).banded == 0
+    assert measure_loss(sixteen, ramp, surface, fitted(sixteen)).banded == 0
     # A range that is far too wide for the page shows as steps; the right one does not.
     light = np.repeat(ramp, 3, axis=2)
     rgbm = ENCODINGS.get("rgbm")
-    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1e6)).banded > 500
-    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1.0)).banded < 41
+    assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1e6)).banded > 500
+    assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1.0)).banded < 41
     # What is not shown, or as good as black, does not count.
-    assert measure_loss(rgbm, light, ~surface, EncodeOptions(top=1e6)).banded == 0
+    assert measure_loss(rgbm, light, ~surface, fitted(rgbm, rgbm_range=1e6)).banded == 0
     light[:32] *= 1e-4
-    assert measure_loss(rgbm, light, surface, EncodeOptions(top=1.0)).banded < 41
+    assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1.0)).banded < 41

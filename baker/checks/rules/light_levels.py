@@ -13,10 +13,10 @@ from baker.checks.context import CheckContext
 from baker.checks.direct_light import cosine_ways, points_inside
 from baker.checks.finding import Place, RawFinding
 from baker.checks.rule import check
+from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
 
 # Rays from emissive surfaces that look for anything to light.
 FACING_RAYS = 64
-HALF_MAX = 65504.0
 
 
 @check(
@@ -44,15 +44,17 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     The map stores that number instead. With `--dtype float` nothing is clipped.
     """
     levels = context.levels
-    if levels is None or context.settings.dtype == "float":
+    if levels is None:
         return
-    over = np.flatnonzero(levels.irradiance > HALF_MAX)
+    encoding = ENCODINGS.require(ALWAYS_WRITTEN, "encoding")
+    highest = encoding.limits(encoding.options_of(context.settings))[1]
+    over = np.flatnonzero(levels.irradiance > highest)
     if len(over):
         worst = over[levels.irradiance[over].argmax()]
         share = 100.0 * len(over) / len(levels.irradiance)
         x, y, z = (float(v) for v in levels.position[worst] + context.scene.origin)
         most = levels.irradiance[worst]
-        text = f"about {share:.3g}% of the surface gets more than 65504 lx, up to {most:.3g}"
+        text = f"about {share:.3g}% of the surface gets more than {highest:.5g} lx, up to {most:.3g}"
         at = context.source.instances[context.world.instance[levels.triangle[worst]]]
         yield RawFinding(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
 

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from baker.core.encoding import ENCODINGS, EncodeOptions, Encoding, Loss, measure_loss
+from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS, Encoding, Loss, measure_loss
 from baker.core.errors import ResourceError, SettingsError
 from baker.core.export import EXPORTS
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
@@ -171,18 +171,17 @@ def _write_page(
     surface = result.status[page] != TexelStatus.EMPTY
     entries: list[dict[str, Any]] = []
     warnings: list[SceneWarning] = []
-    for name in ("exr", *settings.encode):
+    for name in (ALWAYS_WRITTEN, *settings.encode):
         encoding = encoding_named(name)
         if components not in encoding.components:
             continue
-        top = settings.rgbm_top(float(lightmap.value.max(initial=0.0)))
-        options = EncodeOptions(settings.dtype == "half", settings.exr_compression, top)
+        options = encoding.fitted(encoding.options_of(settings), float(lightmap.value.max(initial=0.0)))
         file = f"{lightmap.channel}_{page}{encoding.suffix}"
         encoding.encode(folder / file, value, options=options, header=header)
         with (folder / file).open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
         loss = measure_loss(encoding, value, surface, options)
-        warnings += _told(loss, file, lightmap.channel, name)
+        warnings += _loss_warnings(loss, file, lightmap.channel, encoding)
         low, high = encoding.limits(options)
         entry: dict[str, Any] = {"encoding": name, "file": file, "sha256": digest}
         entries.append({**entry, "min": low, "max": high, "clipped": loss.clipped, "banded": loss.banded})
@@ -195,7 +194,7 @@ def _write_page(
     return page_entry, warnings
 
 
-def encoding_named(name: str) -> Encoding:
+def encoding_named(name: str) -> Encoding[Any]:
     """Return the encoding of that name.
 
     Raises
@@ -204,7 +203,7 @@ def encoding_named(name: str) -> Encoding:
         If there is none.
     """
     # The EXR is always written, so `encode` does not take it.
-    return ENCODINGS.require(name, "encoding", setting="encode", hidden=("exr",))
+    return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 
 def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
@@ -221,7 +220,7 @@ def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
     """
     for name in names:
         encoding = encoding_named(name)
-        if name == "exr":
+        if name == ALWAYS_WRITTEN:
             raise SettingsError("exr is written in any case; name further formats only", object="encode")
         if not set(encoding.components) & set(components.values()):
             number = "three" if encoding.components == (3,) else "one"
@@ -229,25 +228,16 @@ def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
             raise SettingsError(message, object="encode")
 
 
-_REMEDY = {
-    "exr": "use --dtype float",
-    "rgbm": "raise --rgbm-range or set it to auto",
-    "png8": "use png16 or the EXR",
-}
-
-
-def _told(loss: Loss, file: str, channel: str, encoding: str) -> list[SceneWarning]:
-    """Return the warnings that a page's loss deserves."""
+def _loss_warnings(loss: Loss, file: str, channel: str, encoding: Encoding[Any]) -> list[SceneWarning]:
+    """Return a warning for clipped texels, and one if more than `BANDED_SHARE` of the texels are banded."""
     warnings = []
-    remedy = _REMEDY.get(encoding, "use the EXR")
     if loss.clipped:
         message = f"{file}: {loss.clipped} texels are outside the range of the format and were clipped"
-        warnings.append(SceneWarning("clipped", f"{message}; {remedy}", channel))
+        warnings.append(SceneWarning("clipped", f"{message}; {encoding.when_clipped}", channel))
     if loss.banded > BANDED_SHARE * loss.surface:
         share = 100.0 * loss.banded / loss.surface
         message = f"{file}: steps of the format show in {share:.1f} % of the texels"
-        remedy = "lower --rgbm-range or use the EXR" if encoding == "rgbm" else remedy
-        warnings.append(SceneWarning("banding", f"{message}; {remedy}", channel))
+        warnings.append(SceneWarning("banding", f"{message}; {encoding.when_banded}", channel))
     return warnings
 
 

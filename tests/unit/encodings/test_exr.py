@@ -107,7 +107,7 @@ def test_not_a_number_never_gets_in(tmp_path: Path) -> None:
 
 def test_a_shape_that_is_no_image_is_refused(tmp_path: Path) -> None:
     for shape in [(4, 4), (4, 4, 2), (0, 4, 3)]:
-        with pytest.raises(ValueError, match="neither"):
+        with pytest.raises(ValueError, match="pixels of shape"):
             encode_exr(tmp_path / "a.exr", np.zeros(shape, np.float32))
 
 

@@ -15,7 +15,7 @@ from glb_reader import Glb
 from io_scenes import quad_result
 from PIL import Image
 
-from baker.core.encoding import ENCODINGS, EncodeOptions
+from baker.core.encoding import ENCODINGS
 from baker.core.errors import Cancelled, ResourceError, SettingsError
 from baker.core.lightmap import TexelStatus
 from baker.encodings.exr import decode_exr
@@ -326,8 +326,9 @@ def test_further_encodings_lie_beside_the_exr(tmp_path: Path) -> None:
             encoding = ENCODINGS.get(entry["encoding"])
             assert encoding is not None
             assert listed[entry["file"]] == entry["sha256"]
-            options = EncodeOptions(top=entry["max"])
             value = result.lightmaps[page["channel"]].value[0]
+            options = encoding.fitted(encoding.options_of(result.settings), float(value.max()))
+            assert encoding.limits(options)[1] == entry["max"]
             assert np.array_equal(
                 encoding.decode(out / entry["file"]).pixels, encoding.stored(value, options)
             )
