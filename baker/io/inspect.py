@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from pathlib import Path
@@ -14,7 +13,8 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
-from baker.io.bake.output_folder import MANIFEST_NAME, file_state, own_files
+from baker.io.bake.output_folder import MANIFEST_NAME, file_state
+from baker.io.bake.read_manifest import read_manifest
 from baker.io.png import decode_palette_png
 
 
@@ -54,9 +54,7 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
 
 def _bake(folder: Path) -> dict[str, Any]:
     """Sum a manifest up and compare every file with its hash."""
-    if own_files(folder) is None:
-        raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
-    manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+    manifest = read_manifest(folder)
     files = [
         {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
     ]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +21,8 @@ from baker.io.temporary import Temporary, old_path, temporary_path
 
 MANIFEST_NAME = "bake.json"
 AS_BAKED = "as baked"
+# Components without separators and drive letters, none of them "." or "..".
+_FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
@@ -66,13 +69,25 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
 
 
 def own_files(folder: Path) -> set[str] | None:
-    """List the files of a bake, as paths relative to its folder; None if it is not baker's."""
+    """List the files of a bake, as paths relative to its folder; None if it is not baker's.
+
+    A manifest that names a file outside of the folder, by its path or through a link, is not baker's.
+    """
     try:
         manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
-        manifest["versions"]["baker"]
-        return {MANIFEST_NAME, *(str(entry["file"]) for entry in manifest["files"])}
-    except (OSError, ValueError, KeyError, TypeError):
+        names = {MANIFEST_NAME, *(entry["file"] for entry in manifest["files"])}
+        known = isinstance(manifest["versions"]["baker"], str)
+        return names if known and all(_lies_inside(folder, name) for name in names) else None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+
+
+def _lies_inside(folder: Path, name: object) -> bool:
+    """Say whether a name with forward slashes is that of a file below `folder`, with no link on the way to it."""
+    if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
+        return False
+    parents = name.split("/")[:-1]
+    return not any(folder.joinpath(*parents[: n + 1]).is_symlink() for n in range(len(parents)))
 
 
 def file_state(path: Path, sha256: str) -> str:
@@ -217,7 +232,9 @@ def _put_back(aside: Path, target: Path) -> None:
     elif not (target / MANIFEST_NAME).exists():
         # The manifest is exchanged last: without it the new files are not all there.
         for path in sorted(path for path in aside.rglob("*") if path.is_file()):
-            path.replace(target / path.relative_to(aside))
+            name = path.relative_to(aside).as_posix()
+            if _lies_inside(target, name):
+                path.replace(target / name)
 
 
 def _cannot_move(folder: Path) -> bool:

@@ -5,7 +5,6 @@ Whatever judges or shows a bake starts here; it sees the files as they are, not 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,11 @@ from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.encoding import encoding_of
-from baker.core.errors import InputError
+from baker.core.errors import InputError, SettingsError
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import make_settings
-from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state, own_files
+from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
+from baker.io.bake.read_manifest import read_manifest
 from baker.io.choose import choose_objects
 from baker.io.load import load_scene
 from baker.io.png import decode_palette_png
@@ -81,30 +81,27 @@ def read_bake(folder: Path | str) -> StoredBake:
     folder = Path(folder)
     if folder.name == MANIFEST_NAME:
         folder = folder.parent
-    if not folder.exists():
-        raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
-    if own_files(folder) is None:
-        raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
-    manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+    manifest = read_manifest(folder)
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
     scene = load_scene(_present(folder, SCENE_NAME))
     told = manifest.get("settings", {})
     scene = choose_objects(scene, told.get("include", ()), told.get("exclude", ()))
-    try:
-        pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
-        maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
-        resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
-        layouts = tuple(
-            _layout(folder, scene, index, rows.get(instance.node))
-            for index, instance in enumerate(scene.instances)
-        )
-    except (KeyError, IndexError, TypeError) as error:
-        message = f"the manifest lacks {error}; bake the scene again"
-        raise InputError(message, file=str(folder / MANIFEST_NAME)) from None
+    pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
+    maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
+    resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
+    layouts = tuple(
+        _layout(folder, scene, index, rows.get(instance.node)) for index, instance in enumerate(scene.instances)
+    )
     padding = int(manifest.get("settings", {}).get("padding", 0))
     atlas = Atlas(resolution, n_pages, layouts, len(layouts), padding)
     status = np.stack([_status(folder, page, resolution) for page in range(n_pages)])
-    return StoredBake(folder, manifest, scene, atlas, maps, status, warnings)
+    bake = StoredBake(folder, manifest, scene, atlas, maps, status, warnings)
+    try:
+        bake.sky  # noqa: B018
+    except SettingsError as error:
+        message = f"the manifest is damaged: {error.message}; bake the scene again"
+        raise InputError(message, file=str(folder / MANIFEST_NAME)) from None
+    return bake
 
 
 def _present(folder: Path, name: str) -> Path:

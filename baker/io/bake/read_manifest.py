@@ -1,0 +1,120 @@
+"""Reads `bake.json` of a finished folder, and refuses what could not have been written there.
+
+A manifest is a file like any other: its numbers become sizes and indices, its names become paths. So it is compared with
+the schema, and then with itself, before anything else reads it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NoReturn
+
+from baker.core.errors import InputError
+from baker.io.bake.manifest import manifest_schema
+from baker.io.bake.output_folder import MANIFEST_NAME, own_files
+
+# Far above the manifest of a million instances; a longer file is not read.
+_LONGEST = 1 << 30
+# Larger than any page that can be baked.
+_WIDEST = 1 << 16
+_SHORT = 60
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a bake.
+
+    Parameters
+    ----------
+    folder : Path
+        The output folder.
+
+    Returns
+    -------
+    dict
+        It obeys the schema; page numbers of instances and channels exist, nodes and names are unique, every
+        file name is a path inside the folder, numbers are finite.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, it holds no bake, or the manifest is damaged.
+    """
+    if not folder.exists():
+        raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
+    path = folder / MANIFEST_NAME
+    if own_files(folder) is None or path.stat().st_size > _LONGEST:
+        raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
+    try:
+        manifest: dict[str, Any] = json.loads(path.read_text("utf-8"), parse_constant=_no_number)
+        _obey_schema(manifest)
+        _fit_together(manifest)
+    except (ValueError, OverflowError, RecursionError) as error:
+        what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"the manifest is damaged: {what}; bake the scene again", file=str(path)) from None
+    return manifest
+
+
+def _no_number(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a JSON number")
+
+
+def _obey_schema(manifest: dict[str, Any]) -> None:
+    # Slow to import, and only needed where a bake is read back.
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(manifest_schema()).iter_errors(manifest))
+    if error is not None:
+        raise ValueError(f"{_where(error.absolute_path)}{_short(error.message)}")
+
+
+def _where(path: Any) -> str:
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+    return f"{_short(text)}: " if text else ""
+
+
+def _short(text: str) -> str:
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= 2 * _SHORT else f"{text[:_SHORT]} ... {text[-_SHORT:]}"
+
+
+def _fit_together(manifest: dict[str, Any]) -> None:
+    """Raise ValueError if parts of a manifest that obeys the schema contradict each other."""
+    _finite(manifest["pages"], "pages")
+    _finite(manifest["instances"], "instances")
+    by_channel: dict[str, list[int]] = {}
+    sizes = set()
+    for page in manifest["pages"]:
+        by_channel.setdefault(page["channel"], []).append(page["page"])
+        sizes.add((page["width"], page["height"]))
+    if not by_channel:
+        raise ValueError("it has no pages")
+    numbers = list(by_channel.values())
+    n_pages = len(numbers[0])
+    if any(sorted(own) != list(range(n_pages)) for own in numbers):
+        raise ValueError(f"the pages of each channel are not 0 to {n_pages - 1}, each once")
+    if len(sizes) != 1 or (size := sizes.pop())[0] != size[1] or size[0] > _WIDEST:
+        raise ValueError("its pages are not squares of one size")
+    nodes = [row["node"] for row in manifest["instances"]]
+    if len(set(nodes)) != len(nodes):
+        raise ValueError("a node is named by two instances")
+    for number, row in enumerate(manifest["instances"]):
+        if row["page"] >= n_pages:
+            raise ValueError(f"instances[{number}].page is {row['page']}, and there are {n_pages} pages")
+    files = [entry["file"] for entry in manifest["files"]]
+    if len(set(files)) != len(files):
+        raise ValueError("a file is named twice")
+
+
+def _finite(value: Any, where: str) -> None:
+    """Raise ValueError if a number is larger than float32 can hold."""
+    queue = [value]
+    while queue:
+        part = queue.pop()
+        if isinstance(part, dict):
+            queue.extend(part.values())
+        elif isinstance(part, list):
+            queue.extend(part)
+        elif isinstance(part, float | int) and not abs(part) < 1e38:
+            raise ValueError(f"a number in its {where} is not finite")
