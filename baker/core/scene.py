@@ -23,6 +23,11 @@ from baker.core.source_mesh import SourceScene
 _SHORTEST_RANGE = 1e-12
 
 
+# Image uv beyond this many repeats: the step of float32 is coarser than 1/64 of the image there, and areas of
+# triangles overflow soon after.
+LARGEST_UV = 2.0**18
+
+
 @dataclass(frozen=True)
 class Texture:
     """An image and the sampler with which a material reads it.

@@ -126,7 +126,8 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
     width = larger(pack.level[k, 0, 1], pack.level[k, 0, 2])
     n = 0
     if footprint * width > 1.0:
-        n = smaller(int(math.log2(footprint * width) + 0.5), pack.n_levels[k] - 1)
+        # The smaller of two floats: an infinite footprint has no integer level.
+        n = int(smaller(math.log2(footprint * width) + 0.5, float(pack.n_levels[k] - 1)))
     offset, w, h = pack.level[k, n, 0], pack.level[k, n, 1], pack.level[k, n, 2]
     # A uv of many repeats keeps its fraction only.
     x = (u - math.floor(u / 2.0) * 2.0 if pack.wrap[k, 0] != 2 else smaller(larger(u, -1.0), 2.0)) * w - 0.5

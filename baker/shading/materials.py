@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
-from baker.core.scene import Scene, Texture
+from baker.core.scene import LARGEST_UV, Scene, Texture
 from baker.kernels.shading import Shading
 from baker.kernels.textures import pack_textures
 from baker.shading.alpha import build_alpha
@@ -66,7 +66,10 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
 
 
 def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) -> NDArray[np.float32]:
-    """Return (V, 2) float32: image uv of each lightmap vertex; (0, 0) rows where nothing is textured."""
+    """Return (V, 2) float32: image uv of each lightmap vertex; (0, 0) rows where nothing is textured.
+
+    Coordinates beyond `LARGEST_UV` are moved to it.
+    """
     if all(texture is None for texture in textures):
         return np.zeros((1, 2), np.float32)
     uv = np.zeros((len(geometry.position), 2), np.float32)
@@ -83,7 +86,9 @@ def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) 
                 continue
             vertex = np.unique(geometry.triangle[span][geometry.material[span] == material])
             source = coordinate[geometry.vertex_source[vertex]].astype(np.float64)
-            uv[vertex] = source @ texture.transform[:, :2].T + texture.transform[:, 2]
+            with np.errstate(over="ignore", invalid="ignore"):
+                image_uv = source @ texture.transform[:, :2].T + texture.transform[:, 2]
+            uv[vertex] = np.clip(np.nan_to_num(image_uv), -LARGEST_UV, LARGEST_UV)
     return uv
 
 

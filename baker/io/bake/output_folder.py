@@ -83,7 +83,7 @@ def own_files(folder: Path) -> set[str] | None:
 
 
 def _lies_inside(folder: Path, name: object) -> bool:
-    """Say whether a name with forward slashes is that of a file below `folder`, with no link on the way to it."""
+    """Return whether a name with forward slashes is of a file below `folder`, no parent of it a link."""
     if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
         return False
     parents = name.split("/")[:-1]

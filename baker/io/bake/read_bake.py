@@ -90,7 +90,8 @@ def read_bake(folder: Path | str) -> StoredBake:
     maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
     resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
     layouts = tuple(
-        _layout(folder, scene, index, rows.get(instance.node)) for index, instance in enumerate(scene.instances)
+        _layout(folder, scene, index, rows.get(instance.node))
+        for index, instance in enumerate(scene.instances)
     )
     padding = int(manifest.get("settings", {}).get("padding", 0))
     atlas = Atlas(resolution, n_pages, layouts, len(layouts), padding)

@@ -1,7 +1,7 @@
 """Reads `bake.json` of a finished folder, and refuses what could not have been written there.
 
-A manifest is a file like any other: its numbers become sizes and indices, its names become paths. So it is compared with
-the schema, and then with itself, before anything else reads it.
+Numbers of a manifest become sizes and indices, and its names become paths. So it is compared with the
+schema, and its parts with each other, before anything else reads it.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.scene import Material, Mesh, SceneWarning
+from baker.core.scene import LARGEST_UV, Material, Mesh, SceneWarning
 from baker.core.source_mesh import SourcePrimitive
 from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
 
@@ -187,6 +187,11 @@ def _texcoord_sets(
         values = [part.source.texcoord[number] for part in parts if number in part.source.texcoord]
         if not all(np.isfinite(value).all() for value in values):
             message = f"TEXCOORD_{number} holds NaN or infinite values, read as 0"
+            warnings.append(SceneWarning("bad-texcoord", message, name))
+        largest = max((float(np.abs(np.nan_to_num(value)).max(initial=0.0)) for value in values), default=0.0)
+        if largest > LARGEST_UV:
+            limit = f"beyond {LARGEST_UV:.0f} repeats no texel of a texture has a place of its own"
+            message = f"TEXCOORD_{number} reaches {largest:.3g}; {limit}, so map the texture again"
             warnings.append(SceneWarning("bad-texcoord", message, name))
     return sets
 

@@ -163,3 +163,15 @@ def test_footprint_of_a_uv_without_area(painted):
     u, v = uv_at(world.geometry.uv, world.geometry.triangle, 1, 0.25, 0.5)
     corner = world.geometry.uv[world.geometry.triangle[1]]
     np.testing.assert_allclose([u, v], [0.25, 0.25, 0.5] @ corner, rtol=1e-6)
+
+
+@pytest.mark.parametrize("footprint", [1e20, 3e38, np.inf, np.nan])
+def test_a_footprint_without_bounds_reads_the_coarsest_image(footprint):
+    image = np.random.default_rng(3).random((8, 8, 4)).astype(np.float32)
+    pack = pack_textures([(image, ("repeat", "repeat"))])
+    out = np.zeros(4, np.float32)
+    sample_texture(pack, 0, 0.3, 0.6, footprint, out)
+    if np.isnan(footprint):
+        assert np.isfinite(out).all()
+    else:
+        np.testing.assert_allclose(out, image.mean((0, 1)), rtol=1e-5)

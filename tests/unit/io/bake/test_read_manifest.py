@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from io_scenes import quad_result
 
-from baker.core.errors import BakerError, InputError, SettingsError
+from baker.core.errors import InputError, SettingsError
 from baker.io.bake.output_folder import OutputFolder, check_out, own_files
 from baker.io.bake.read_bake import read_bake
 from baker.io.bake.read_manifest import read_manifest
@@ -36,10 +37,22 @@ def damage(out: Path, path: tuple[str | int, ...], value: Any) -> None:
     (out / "bake.json").write_text(json.dumps(manifest))
 
 
+def refusal(function: Callable[[Path], object], out: Path) -> str | None:
+    """Return the message with which a function refuses a folder; None if it does not."""
+    try:
+        function(out)
+    except InputError as error:
+        return error.message
+    return None
+
+
 def paths_in(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
     """Return the path of every value in a manifest."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    return [*([path] if path else []), *(found for key, part in items for found in paths_in(part, (*path, key)))]
+    return [
+        *([path] if path else []),
+        *(found for key, part in items for found in paths_in(part, (*path, key))),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -85,24 +98,25 @@ def test_any_value_of_any_other_type_is_refused_or_read(out: Path) -> None:
             set_at(manifest, path, value)
             (out / "bake.json").write_text(json.dumps(manifest))
             for function in (read_bake, inspect_path):
-                try:
-                    function(out)
-                    read += 1
-                except BakerError as error:
-                    assert isinstance(error, InputError)
-                    assert error.message.isprintable()
-                    refused += 1
+                message = refusal(function, out)
+                assert message is None or message.isprintable()
+                refused += message is not None
+                read += message is None
     assert min(refused, read) > 50
 
 
-@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 900 + "1" + "}" * 900, "NaN", "[1]", '"bake"', "\x00"])
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, '{"a":' * 900 + "1" + "}" * 900, "NaN", "[1]", '"bake"', "\x00"]
+)
 def test_a_text_that_is_no_manifest_is_refused(out: Path, text: str) -> None:
     (out / "bake.json").write_text(text)
     with pytest.raises(InputError, match="holds no bake"):
         read_manifest(out)
 
 
-@pytest.mark.parametrize("name", ["../victim.txt", "/etc/passwd", "a/../../victim.txt", "C:victim", "link/victim.txt", ""])
+@pytest.mark.parametrize(
+    "name", ["../victim.txt", "/etc/passwd", "a/../../victim.txt", "C:victim", "link/victim.txt", ""]
+)
 def test_a_manifest_that_names_a_file_outside_is_not_bakers(out: Path, tmp_path: Path, name: str) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
