@@ -51,7 +51,7 @@ class GlbBuilder:
         alpha: float = 1.0,
         mode: str = "OPAQUE",
         double_sided: bool = False,
-        glow: NDArray[np.uint8] | None = None,
+        emission_texture: NDArray[np.uint8] | None = None,
     ) -> str:
         """Add a material and return its name.
 
@@ -66,9 +66,9 @@ class GlbBuilder:
             sRGB and alpha, multiplied with `colour` and `alpha`.
         roughness : float
         alpha : float
-        mode : "OPAQUE", "MASK" (what has an alpha of half or more is there) or "BLEND"
+        mode : "OPAQUE", "MASK" (opaque where alpha is at least 0.5) or "BLEND"
         double_sided : bool
-        glow : (H, W, 3) uint8 or None
+        emission_texture : (H, W, 3) uint8 or None
             sRGB, multiplied with `emission`.
         """
         surface: dict[str, Any] = {
@@ -84,8 +84,8 @@ class GlbBuilder:
             entry["emissiveFactor"] = [part / strength for part in emission]
             entry["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self._use("KHR_materials_emissive_strength")
-        if glow is not None:
-            entry["emissiveTexture"] = {"index": self._texture(f"{name} glow", glow)}
+        if emission_texture is not None:
+            entry["emissiveTexture"] = {"index": self._texture(f"{name} glow", emission_texture)}
         if mode != "OPAQUE":
             entry["alphaMode"] = mode
         if double_sided:

@@ -95,7 +95,7 @@ def _living_room(glb: GlbBuilder) -> None:
     fruit = glb.mesh("fruit", [(ball(0.042, 2), "book_ochre")])
     for k, (x, z) in enumerate(((-0.05, 0.01), (0.046, 0.035), (0.02, -0.055))):
         glb.place(f"fruit_{k}", fruit, (2.42 + x, 0.4895, 2.05 + z))
-    _floor_lamp(glb, (4.5, REST, 0.5))
+    _standing_light(glb, (4.5, REST, 0.5))
     _plant(glb, (0.55, REST, 3.5))
     _bookcase(glb, (4.78, REST, 3.2))
 
@@ -157,7 +157,7 @@ def _chair() -> Surface:
     return join(seat, rail, *legs, *posts)
 
 
-def _floor_lamp(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
+def _standing_light(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
     stand = [(0.0, 0.0), (0.14, 0.0), (0.14, 0.015), (0.03, 0.03), (0.011, 0.05), (0.011, 1.42), (0.0, 1.425)]
     # The shade is a thin closed shell, open at both ends.
     shade = [(0.205, 1.3), (0.12, 1.62), (0.117, 1.62), (0.202, 1.3), (0.205, 1.3)]

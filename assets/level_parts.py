@@ -27,7 +27,7 @@ class Level:
 
     sky: tuple[float, float, float] = (0.0, 0.0, 0.0)
     glb: GlbBuilder = field(default_factory=GlbBuilder)
-    lamps: list[str] = field(default_factory=list)
+    emitters: list[str] = field(default_factory=list)
 
     def put(
         self, name: str, surface: Surface, material: str, at: Point = (0.0, 0.0, 0.0), **how: float

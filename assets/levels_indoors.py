@@ -31,9 +31,9 @@ def _indoors(sky: float = 0.0) -> Level:
     return level
 
 
-def _lamp(level: Level, name: str, at: Point, size: float = 0.6, radiance: float = 3000.0) -> None:
-    if "lamp" not in level.lamps:
-        level.lamps.append("lamp")
+def _panel_light(level: Level, name: str, at: Point, size: float = 0.6, radiance: float = 3000.0) -> None:
+    if "lamp" not in level.emitters:
+        level.emitters.append("lamp")
         level.glb.material("lamp", BLACK, emission=(radiance, radiance, radiance))
     level.put(name, sheet((at[0] - size / 2, at[1], at[2] - size / 2), (size, 0, 0), (0, 0, size)), "lamp")
 
@@ -86,7 +86,7 @@ def make_corridors() -> Level:
     for name, (low, high) in walls.items():
         level.put(f"wall {name}", slab(low, high), "plaster, both sides")
     for k, (x, z) in enumerate(((-4.0, 0.0), (0.0, 0.2), (4.0, 0.0), (0.0, 5.0))):
-        _lamp(level, f"lamp {k}", (x, 2.44, z), 0.5)
+        _panel_light(level, f"lamp {k}", (x, 2.44, z), 0.5)
     return level
 
 
@@ -123,14 +123,14 @@ def make_decals(apart: float = 0.001) -> Level:
         level.put(f"{name} -z", sheet((x, 0.9, -2 + apart), (1.2, 0, 0), (0, 0.9, 0)), name)
         level.put(f"{name} floor", sheet((x, apart, -0.4), (0, 0, 0.8), (1.2, 0, 0)), name)
     level.put("corner poster", sheet((-3 + apart, 0.4, 2.0), (0, 0, -1), (0, 1.4, 0)), "wood")
-    _lamp(level, "lamp", (0, 2.49, 0), 0.8)
+    _panel_light(level, "lamp", (0, 2.49, 0), 0.8)
     return level
 
 
 def make_tunnel() -> Level:
     """A dark tunnel lit by signs of which one pixel in 256 shines."""
     level = _indoors()
-    level.glb.material("sign", BLACK, emission=(20_000.0, 6000.0, 1000.0), glow=led_picture())
+    level.glb.material("sign", BLACK, emission=(20_000.0, 6000.0, 1000.0), emission_texture=led_picture())
     level.put("tunnel", inside((-2, 0, -15), (2, 3, 15)), "concrete")
     for k in range(5):
         z = -12.0 + 6 * k
@@ -161,7 +161,7 @@ def make_kitchen() -> Level:
     level.put("table", slab((-0.6, 0.7, -0.1), (0.6, 0.74, 0.7)), "wood, both sides")
     legs = [slab((x, -0.02, z), (x + 0.05, 0.72, z + 0.05)) for x in (-0.55, 0.5) for z in (-0.05, 0.6)]
     level.put("legs", join(*legs), "wood, both sides")
-    _lamp(level, "lamp", (0.0, 1.9, 0.3), 0.25)
+    _panel_light(level, "lamp", (0.0, 1.9, 0.3), 0.25)
     return level
 
 
@@ -190,7 +190,7 @@ def make_church() -> Level:
 
 
 def make_warehouse() -> Level:
-    """A hall with a hundred lamps without size and a few racks."""
+    """A hall with a hundred point lights and a few racks."""
     level = _indoors()
     level.put("hall", inside((-15, 0, -20), (15, 8, 20)), "concrete")
     for k in range(100):

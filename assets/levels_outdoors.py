@@ -45,7 +45,7 @@ def ground(low: tuple[float, float], high: tuple[float, float], cells: tuple[int
 
 
 def make_street() -> Level:
-    """A sunlit street; one house is shut, one has a window, one a lamp of its own behind a closed door."""
+    """A sunlit street; one house is shut, one has a window, one an emitter behind a closed door."""
     level = _outdoors(2000.0, 50_000.0)
     level.put("street", ground((-13, -7), (13, 7), (13, 7)), "concrete")
     house(level, "shut", (-8, -3), (4, 2.6, 4), "plaster")

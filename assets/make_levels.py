@@ -1,9 +1,9 @@
-"""Makes levels as designers build them, to see whether their light is right.
+"""Makes levels as designers build them, to test whether their light is correct.
 
     python assets/make_levels.py            writes those with known answers to assets/levels
     python assets/make_levels.py FOLDER     writes all of them to FOLDER, with the sky of each in levels.json
 
-The same bytes every time; tests make them anew and compare. Metres, +Y up, cd/m2, cd and lx.
+The output is deterministic; tests make the levels again and compare. Metres, +Y up, cd/m2, cd and lx.
 """
 
 from __future__ import annotations

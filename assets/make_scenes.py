@@ -3,7 +3,7 @@
     python assets/make_scenes.py            writes beside this file
     python assets/make_scenes.py FOLDER     writes there
 
-The same bytes every time; a test makes them anew and compares. Metres, +Y up, cd/m2, cd and lx.
+The output is deterministic; a test makes the scenes again and compares. Metres, +Y up, cd/m2, cd and lx.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Puts `baker` beside Blender Cycles' bake: same scene, uv and page, in turn in one run, at equal error.
+"""Compares `baker` with Blender Cycles: same scene, uv and page, alternating in one run, at equal error.
 
     python -m venv elsewhere && elsewhere/bin/pip install 'bpy==4.5.*' mitsuba
     python benchmarks/against_cycles.py --python elsewhere/bin/python --markdown
@@ -6,9 +6,9 @@
 Optional: it needs Blender as a Python module (Python 3.11) and Mitsuba 3, which needs LLVM 17 or newer
 (DRJIT_LIBLLVM_PATH names the library if it is not found). Neither may share an environment with `baker`.
 
-Both bakes are judged at the same random texels by Mitsuba's path tracer, which knows neither of them. The
-error of a texel is |value / truth - 1| of the mean of R, G, B; buried texels (truth under 1 % of the
-median) are left out.
+Mitsuba's path tracer, which is independent of both, computes the truth at the same random texels. The
+error of a texel is |value / truth - 1| of the mean of R, G, B; texels inside geometry (truth under 1 % of
+the median) are left out.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Row:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Bake with both in turn, judge both, print the tables."""
+    """Bake with both alternately, compute the errors of both, print the tables."""
     options = _options(argv)
     if options.source:
         result = json.loads(options.source.read_text(encoding="utf-8"))
@@ -79,7 +79,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--samples", default="4,16,64,256", help="of baker: gather and shadow rays per texel")
     parser.add_argument("--cycles-samples", default="4,16,64,256")
     parser.add_argument("--repeat", type=int, default=2, help="turns; the least of each is shown")
-    parser.add_argument("--texels", type=int, default=1000, help="texels judged")
+    parser.add_argument("--texels", type=int, default=1000, help="texels compared")
     parser.add_argument("--spp", type=int, default=32768, help="paths per texel of the truth")
     parser.add_argument("--truth", type=Path, help="keep the truth here, and use it again if it is there")
     parser.add_argument("--json", type=Path, help="write all numbers to this file")
@@ -105,7 +105,7 @@ def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         versions = _trace_truth(options, folder, surface, mask, truth)
     else:
         versions = {}
-    judge = _Judge(truth)
+    reference = _Truth(truth)
     rows = [
         Row("baker", n, denoise, [], [], {}) for n in _numbers(options.samples) for denoise in (False, True)
     ] + [
@@ -135,17 +135,17 @@ def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 row.bake_seconds.append(float(found["seconds"]))
                 versions |= told
                 value = found["irradiance"]
-            row.error = judge.error(value)
+            row.error = reference.error(value)
     return {
         "machine": {**machine.describe(), **versions, "load after": machine.load()},
         "scene": options.scene.stem,
         "resolution": size,
-        "truth": judge.quality,
+        "truth": reference.quality,
         "rows": [vars(row) | {"label": row.label} for row in rows],
     }
 
 
-class _Judge:
+class _Truth:
     """Holds path-traced irradiance of some texels."""
 
     def __init__(self, path: Path) -> None:

@@ -3,7 +3,7 @@
     pip install -e '.[mitsuba]'        llvm_ad_rgb needs LLVM 17 or newer, Debian: libllvm19
     python benchmarks/against_mitsuba.py --into docs/PERFORMANCE.md
 
-Both trace the same flat Lambertian triangles from the same camera, with one ray to a lamp at every vertex and
+Both trace the same flat Lambertian triangles from the same camera, with one shadow ray at every vertex and
 MIS. Paths end after `SEGMENTS` closest-hit rays without roulette, so both cast as many: ours are counted, and
 Mitsuba's, which does not count, are taken to be the same for each path. Occlusion rays start at what the
 camera sees, cosine-weighted, within a tenth of the scene's diagonal. Compiling is not timed.
@@ -98,7 +98,7 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
             openness_pass(reference, one, *where, distance=reach, seed=turn)
             own_open = perf_counter() - start
             start = perf_counter()
-            share = _openness(other, where[0][:, 0], where[2][:, 0], reach, turn)
+            share = _mitsuba_ao(other, where[0][:, 0], where[2][:, 0], reach, turn)
             theirs_open = perf_counter() - start
             if turn == 0:
                 # The first turn compiles.
@@ -118,8 +118,8 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _openness(scene: Any, position: Any, normal: Any, reach: float, seed: int) -> float:
-    """Return the open share of cosine-weighted rays, `OPEN_SAMPLES` a point."""
+def _mitsuba_ao(scene: Any, position: Any, normal: Any, reach: float, seed: int) -> float:
+    """Return the unoccluded share of cosine-weighted rays, `OPEN_SAMPLES` a point."""
     n = len(position)
     point, up = mi.Point3f(position.T.astype(np.float32)), mi.Normal3f(normal.T.astype(np.float32))
     index = dr.arange(mi.UInt32, n * OPEN_SAMPLES) % n
@@ -148,7 +148,7 @@ def tables(found: dict[str, Any], *, markdown: bool) -> str:
     words = (
         f"{found['scene']}, {found['triangles']} triangles, {found['threads']} threads, million rays"
         f" a second; mean of the picture {found['mean'][0]:.4g} (ours), {found['mean'][1]:.4g} (Mitsuba),"
-        f" open share {found['open'][0]:.4f} and {found['open'][1]:.4f}"
+        f" ambient occlusion {found['open'][0]:.4f} and {found['open'][1]:.4f}"
     )
     facts = table(("what", "which"), [(k, str(v)) for k, v in found["machine"].items()], markdown=markdown)
     return f"{words}\n\n{table(head, rows, markdown=markdown)}\n\n{facts}\n"

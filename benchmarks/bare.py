@@ -49,7 +49,7 @@ def _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seed
 
 
 @njit(cache=True, nogil=True)
-def _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative):  # type: ignore[no-untyped-def]
+def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative):  # type: ignore[no-untyped-def]
     """Aim at points uniform on the emitters' area; lanes that cannot be lit take no part, as in a bake."""
     k = s * N_POINTS // len(net)
     d = np.zeros(3, np.float32)
@@ -110,7 +110,9 @@ def _store(buffers, origin, normal, begin, net, shared, far, corner, cumulative,
             on[lane] = -1 if lane < lanes else 0
         for s in range(len(net)):
             if len(corner):
-                _aim_lamp(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative)
+                _aim_emitter(
+                    rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative
+                )
             else:
                 _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seeds, frame, s, far)
             for first in range(0, PACKET_WIDTH, width):
@@ -171,7 +173,7 @@ class BareRays:
         Ask only whether something is in the way.
     distance : float
         Reach in metres, inf for no end.
-    to_lamps : bool
+    to_emitters : bool
         Aim at emissive triangles instead of over the hemisphere.
     """
 
@@ -184,7 +186,7 @@ class BareRays:
         threads: int,
         occlusion: bool,
         distance: float = np.inf,
-        to_lamps: bool = False,
+        to_emitters: bool = False,
     ) -> None:
         self._tracer = world.rays.tracer
         self._function = self._tracer.occluded if occlusion else self._tracer.intersect
@@ -192,8 +194,8 @@ class BareRays:
         self._net = sobol_reversed(n_samples, seed, 6)
         self._shared = shared_bits_mask(n_samples)
         self._far = np.float32(min(distance, float(FAR)))
-        self._made_too = not to_lamps
-        corner, cumulative = _lamp_corners(world.emitters, wanted=to_lamps)
+        self._made_too = not to_emitters
+        corner, cumulative = _emitter_corners(world.emitters, wanted=to_emitters)
         n = world.texels.n_front
         tiles = -(-n // TILE)
         every = max(1, -(-n * n_samples // MOST_READY))
@@ -227,7 +229,7 @@ class BareRays:
             Use the stored packets; else make the rays inside the clock (hemisphere rays only).
         """
         if not ready and not self._made_too:
-            raise ValueError("rays to lamps are only measured ready-made")
+            raise ValueError("rays to emitters are only measured ready-made")
         local = threading.local()
 
         def work(begin: int, end: int) -> None:
@@ -255,7 +257,7 @@ class BareRays:
         self._tiles = first
 
 
-def _lamp_corners(emitters: Emitters, *, wanted: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _emitter_corners(emitters: Emitters, *, wanted: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return (M, 12) corners and normal of the emissive triangles, and (M,) running share of area."""
     if not wanted or not len(emitters.row):
         return np.zeros((0, 12), np.float32), np.zeros(0, np.float32)

@@ -44,7 +44,7 @@ def main() -> None:
         # The importer keeps the order of texture coordinates: the last one is TEXCOORD_1.
         item.data.uv_layers.active = item.data.uv_layers[-1]
     bpy.context.view_layer.objects.active = meshes[0]
-    # One object, one bake: Cycles would build its tree anew for each object.
+    # One object, one bake: Cycles would build its tree again for each object.
     bpy.ops.object.join()
     if job.get("surface"):
         _write_surface(bpy.context.view_layer.objects.active, colours, job["surface"])

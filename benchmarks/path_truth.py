@@ -1,4 +1,4 @@
-"""Path-traced irradiance of single texels by Mitsuba 3, the judge of both bakes; see `against_cycles.py`.
+"""Path-traced irradiance of single texels by Mitsuba 3, the reference of both bakes; see `against_cycles.py`.
 
     python path_truth.py JOB.json
 
@@ -7,7 +7,7 @@ JOB.json: {"surface": FILE.npz from cycles_bake, "texels": FILE.npz, "resolution
 
     E = integral of L cos = direct (emitter sampled) + pi x mean of L over cosine rays that see no emitter
 
-Rays start from points spread over what the texel's square has of the surface.
+Rays start from points distributed over the part of the surface inside the texel's square.
 """
 
 from __future__ import annotations

@@ -20,20 +20,21 @@ from baker.io.load import load_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import trace_transport
 from baker.pipeline.world import World, prepare
+from baker.radiosity.inside_geometry import STAGE as INSIDE_GEOMETRY
 from baker.uv.unwrap import unwrap_scene
 
-# Stage of the bake -> kind of bare rays it is put beside.
+# Stage of the bake -> kind of bare rays that it is compared with.
 BESIDE = {
     "final gather": "closest hit",
     "form factors": "closest hit",
-    "buried texels": "closest hit",
-    "direct light": "towards lamps",
+    INSIDE_GEOMETRY: "closest hit",
+    "direct light": "towards emitters",
     "ambient occlusion": "occlusion within the AO distance",
 }
 
 
 def measure_apart(**what: Any) -> dict[str, Any]:
-    """Call `measure` in a process of its own: what it keeps in memory weighs on nothing else."""
+    """Call `measure` in a separate process, so that its memory does not affect other measurements."""
     words = json.dumps(what, default=str)
     done = subprocess.run([sys.executable, __file__, words], stdout=subprocess.PIPE, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout)
@@ -43,7 +44,7 @@ def measure_apart(**what: Any) -> dict[str, Any]:
 def measure(
     scene_path: Path, *, resolution: int, samples: int, repeat: int, sky: str | None
 ) -> dict[str, Any]:
-    """Trace a scene's transport and the bare loops `repeat` times in turn.
+    """Trace a scene's transport and the bare loops alternately, `repeat` times.
 
     Returns
     -------
@@ -72,7 +73,7 @@ def measure(
         turns.append(_turn(scene, world, settings))
         for kind, rays in kinds.items():
             bare[kind]["ready"].append(rays.rate(ready=True))
-            if kind != "towards lamps":
+            if kind != "towards emitters":
                 bare[kind]["made"].append(rays.rate(ready=False))
     stages = {}
     for name in turns[0]:
@@ -113,7 +114,7 @@ def _kinds(world: World, settings: BakeSettings) -> dict[str, BareRays]:
         "occlusion, unlimited": BareRays(world, occlusion=True, **same),
     }
     if len(world.emitters.row):
-        kinds["towards lamps"] = BareRays(world, occlusion=True, to_lamps=True, **same)
+        kinds["towards emitters"] = BareRays(world, occlusion=True, to_emitters=True, **same)
     return kinds
 
 
@@ -122,7 +123,7 @@ def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[f
     record = Record(silent)
     trace_transport(scene, world, {"irradiance": CHANNELS.get("irradiance")}, settings, record)
     trace_transport(scene, world, {"ao": CHANNELS.get("ao")}, settings, record)
-    # Whatever `prepare` does to find buried points is timed there, once; here its rays are cast again.
+    # `prepare` finds points inside geometry once, outside these turns; cast its rays again to time them.
     from baker.radiosity.inside_geometry import find_buried
 
     start = perf_counter()
@@ -130,7 +131,7 @@ def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[f
         world.texels, world.surface, world.table, world.tells, world.rays.tracer,
         seed=settings.seed, threads=thread_count(settings.threads), progress=silent,
     )  # fmt: skip
-    record.timings["buried texels"], record.rays["buried texels"] = perf_counter() - start, cast
+    record.timings[INSIDE_GEOMETRY], record.rays[INSIDE_GEOMETRY] = perf_counter() - start, cast
     return {name: (record.timings[name], cast) for name, cast in record.rays.items() if cast}
 
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from baker.radiosity.inside_geometry import STAGE as INSIDE_GEOMETRY
+
 STAGES = (
-    "load", "unwrap", "texels", "ray tree", "buried texels", "direct light", "form factors", "solve",
+    "load", "unwrap", "texels", "ray tree", INSIDE_GEOMETRY, "direct light", "form factors", "solve",
     "final gather", "finish", "write",
 )  # fmt: skip
-# From here to there the issue counts "stages from texels to gather".
+# The stages from texels to gather.
 TRANSPORT = STAGES[2:9]
 Row = Sequence[str | float | int]
 

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 # Blobs stand in a square of this many on a side; each is a cube's six faces blown up to a ball.
 ROWS = 3
 HALF, HEIGHT = 5.0, 5.0
-# Lightmap cells on a side: 54 blob faces, 6 walls, 1 lamp.
+# Lightmap cells on a side: 54 blob faces, 6 walls, 1 ceiling light.
 CELLS = 8
 GUTTER = 0.06
 # Height of the bumps, metres on a ball of 0.9.
 BUMP = 0.08
-LAMP = (60.0, 55.0, 48.0)
+EMISSION = (60.0, 55.0, 48.0)
 Patch = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]
 
 
@@ -41,9 +41,9 @@ def write_blobs(triangles: int, path: Path) -> int:
         for sign in (-1.0, 1.0)
     ]
     walls = [_wall(axis, sign, next(cell)) for axis in range(3) for sign in (-1.0, 1.0)]
-    lamp = [_lamp(next(cell))]
-    _write(path, {"blobs": blobs, "walls": walls, "lamp": lamp})
-    return sum(len(patch[3]) for patch in (*blobs, *walls, *lamp))
+    light = [_ceiling_light(next(cell))]
+    _write(path, {"blobs": blobs, "walls": walls, "lamp": light})
+    return sum(len(patch[3]) for patch in (*blobs, *walls, *light))
 
 
 def _sheet(position: NDArray[np.float64], normal: NDArray[np.float64], cell: int, *, flip: bool) -> Patch:
@@ -102,7 +102,7 @@ def _wall(axis: int, sign: float, cell: int) -> Patch:
     return _sheet(point * scale + [0.0, HEIGHT / 2, 0.0], normal, cell, flip=sign > 0)
 
 
-def _lamp(cell: int) -> Patch:
+def _ceiling_light(cell: int) -> Patch:
     point = _grid(1, 1.0, 2) * [1.5, 0.0, 1.5] + [0.0, HEIGHT - 0.02, 0.0]
     normal = np.zeros_like(point)
     normal[..., 1] = -1.0
@@ -145,7 +145,7 @@ def _write(path: Path, parts: dict[str, list[Patch]]) -> None:
         index = store(triangle.astype("<u4").reshape(-1), "SCALAR", 5125)
         primitive = {"attributes": attributes, "indices": index, "material": number}
         meshes.append({"name": name, "primitives": [primitive]})
-    strength = max(LAMP)
+    strength = max(EMISSION)
     materials: list[dict[str, object]] = [
         {"name": name, "pbrMetallicRoughness": {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0}}
         for name, colour in (
@@ -154,7 +154,7 @@ def _write(path: Path, parts: dict[str, list[Patch]]) -> None:
             ("lamp", (0.8, 0.8, 0.8)),
         )
     ]
-    materials[2]["emissiveFactor"] = [part / strength for part in LAMP]
+    materials[2]["emissiveFactor"] = [part / strength for part in EMISSION]
     materials[2]["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
     document = {
         "asset": {"version": "2.0", "generator": "baker benchmarks/scenes.py"},

@@ -23,14 +23,14 @@ NAMES = {
 HEAD = """\
 # Checks
 
-`baker check SCENE...` finds what would spoil a bake. It takes files, folders and patterns, traces no light
-beyond a few hundred shadow rays, and never changes a file unless `--fix` is given. This page is made from
-the code by `docs/make_checks_page.py`.
+`baker check SCENE...` lints a scene before it is baked. It takes files, folders and patterns, traces only
+a few hundred shadow rays, and writes no file unless `--fix` or `--repair` is given. The program
+`docs/make_checks_page.py` generates this page from the code.
 
 ```sh
-baker check level.glb                            # errors and warnings; -v shows infos and face numbers, too
+baker check level.glb                            # errors and warnings; -v adds infos and face numbers
 baker check kit/ --fail-on warning --ignore no-light --ignore 'open-edges@Fence*'
-baker check level.glb --resolution 2048 --padding 8 --sky 1,1,1   # judged for the bake it is for
+baker check level.glb --resolution 2048 --padding 8 --sky 1,1,1   # checked for the settings of this bake
 baker check level.glb --cost --resolution 4096   # texels, pages, rays, memory, time, each object's share
 baker check level.glb --json                     # {"passed", "findings": [...], "scenes": [...]}
 baker check level.glb --sarif check.sarif --junit check.xml
@@ -55,13 +55,13 @@ In the file of `--config`, beside the settings of a bake:
 fail-on = "warning"
 ignore = ["no-light", "open-edges@Fence*"]
 mip = 3                  # charts must not mix down to this mip level
-rates = "out/level"      # reckon time with the speed of this bake
+rates = "out/level"      # estimate time with the speed of this bake
 ```
 
 In the scene itself, as glTF `extras`. On the document: `{"baker": {"check": {"fail_on": "warning", "ignore":
 ["no-light"]}}}`. On a node: `{"baker": {"check": {"ignore": ["open-edges"]}}}`, or `"ignore": true` for
-all of its findings. The command line wins over the file, the file over the scene; what is to be ignored
-adds up.
+all of its findings. The command line overrides the file, and the file overrides the scene; the `ignore` lists
+are merged.
 
 ## On every commit
 
@@ -78,8 +78,8 @@ repos:
 
 ## In a bake
 
-`baker bake` puts what it leaves out or unwraps anew into the `warnings` of `bake.json` under the same
-codes, and runs the checks marked *in a bake* below.
+`baker bake` reports objects that it leaves out or unwraps again in the `warnings` of `bake.json`, under the
+same codes, and runs the checks marked *in a bake* below.
 
 ## How long it takes
 

@@ -49,7 +49,7 @@ def surface(base: float | Point, metallic: float = 0.0, roughness: float = 1.0, 
     return Material(base_colour=(*colour, 1.0), metallic=metallic, roughness=roughness, **more)
 
 
-def lamp(radiance: float) -> Material:
+def emitter(radiance: float) -> Material:
     """Return a black material that emits."""
     return surface(0.0, emission=(radiance,) * 3)
 
@@ -109,18 +109,18 @@ def scene_of(*parts: tuple[tuple[Any, Any], Material]) -> Scene:
 
 
 def plates() -> View:
-    """Return four lamps of equal power over four plates, after Veach and Guibas 1995."""
+    """Return four lights of equal power over four plates, after Veach and Guibas 1995."""
     eye, middle = np.array([0.0, -8.0, 2.2]), np.array([0.0, 1.6, 3.0])
     parts = [
         (quad((-8, -5, -1.2), (16, 0, 0), (0, 9, 0)), surface(0.3)),
         (quad((-8, 3.5, -1.2), (16, 0, 0), (0, 0, 9)), surface(0.3)),
     ]
     for x, radius in zip((-3.2, -1.3, 0.6, 2.9), (0.04, 0.13, 0.35, 0.9), strict=True):
-        parts.append((ball((x, 1.6, 3.0), radius), lamp(6.0 / radius**2)))
+        parts.append((ball((x, 1.6, 3.0), radius), emitter(6.0 / radius**2)))
     for k, roughness in enumerate((0.08, 0.16, 0.26, 0.4)):
         centre = np.array([0.0, 0.9 - 1.1 * k, 0.75 - 0.42 * k])
-        to_eye, to_lamp = eye - centre, middle - centre
-        normal = to_eye / np.linalg.norm(to_eye) + to_lamp / np.linalg.norm(to_lamp)
+        to_eye, to_light = eye - centre, middle - centre
+        normal = to_eye / np.linalg.norm(to_eye) + to_light / np.linalg.norm(to_light)
         across = np.cross(normal / np.linalg.norm(normal), (1.0, 0.0, 0.0)) * 0.9
         corner = centre - (3.6, 0, 0) - 0.5 * across
         parts.append((quad(tuple(corner), (7.2, 0, 0), tuple(across)), surface(0.9, 1.0, roughness)))
@@ -129,7 +129,7 @@ def plates() -> View:
 
 
 def gap() -> View:
-    """Return a dark room beside one in which a lamp shines at the ceiling; a gap is between them."""
+    """Return a dark room beside one in which a light shines at the ceiling; a gap is between them."""
     wall, both = surface(0.7), surface(0.7, double_sided=True)
     parts = [
         (quad((0, 0, 0), (4, 0, 0), (0, 2, 0)), surface((0.7, 0.5, 0.3))),
@@ -140,7 +140,7 @@ def gap() -> View:
         (quad((0, 2, 0), (4, 0, 0), (0, 0, 2)), wall),
         (quad((2, 0, 0), (0, 0.9, 0), (0, 0, 2)), both),
         (quad((2, 1.1, 0), (0, 0.9, 0), (0, 0, 2)), both),
-        (quad((1.3, 0.8, 1.9), (0.3, 0, 0), (0, 0.3, 0)), lamp(60.0)),
+        (quad((1.3, 0.8, 1.9), (0.3, 0, 0), (0, 0.3, 0)), emitter(60.0)),
         (ball((2.9, 1.3, 0.3), 0.3), surface(0.8, 1.0, 0.25)),
     ]
     eye = np.array([3.9, 0.25, 1.2])
@@ -150,12 +150,12 @@ def gap() -> View:
 
 
 def caustic() -> View:
-    """Return a metal ring on a table under a small lamp."""
+    """Return a metal ring on a table under a small light."""
     parts = [
         (quad((-3, -3, 0), (6, 0, 0), (0, 6, 0)), surface(0.7)),
         (turned(1.0, 0.0, 0.7, 96, inward=True), surface((0.95, 0.85, 0.6), 1.0, 0.0)),
         (turned(1.03, 0.0, 0.7, 96, inward=False), surface((0.95, 0.85, 0.6), 1.0, 0.3)),
-        (quad((1.5, -0.06, 1.6), (0, 0.12, 0), (0.07, 0, -0.1)), lamp(300.0)),
+        (quad((1.5, -0.06, 1.6), (0, 0.12, 0), (0.07, 0, -0.1)), emitter(300.0)),
     ]
     eye = np.array([-0.4, -2.6, 3.0])
     return View(
