@@ -62,9 +62,9 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
-        from baker.cli.failures import tell
+        from baker.cli.failures import report
 
-        return tell(error, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
+        return report(error, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
 
 
 def _dispatch(argv: list[str], session: Any) -> int:
@@ -72,7 +72,7 @@ def _dispatch(argv: list[str], session: Any) -> int:
 
     code = make_app().main(args=argv, prog_name="baker", standalone_mode=False, obj=session)
     if code == INTERRUPTED:
-        # typer made an exit code of it; the message and the JSON are still owed.
+        # typer made an exit code of it; the message and the JSON are still to be written.
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
 
@@ -108,5 +108,5 @@ def _leave(code: int) -> None:
         try:
             stream.flush()
         except OSError:
-            continue  # nobody is left to tell
+            continue  # the reader is gone
     os._exit(code)

@@ -3,73 +3,33 @@
 from __future__ import annotations
 
 import gc
-import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from baker.cli.commands import COMMANDS
-from baker.cli.options import build, cluster_flag, common_flags, flag, given, setting_flags
+from baker.cli.command import Cluster, Run, command
+from baker.core.settings import BakeSettings
 
 if TYPE_CHECKING:
-    from baker.cli.session import Session
-    from baker.distributed.tile_executor import DistributedTileExecutor
+    from baker.core.executor import TileExecutor
+
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="glb, gltf, obj, ply, stl or off file.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace OUT even if baker did not write it.")]
 
 
-def command() -> Any:
-    """Return the subcommand."""
-    return build("bake", COMMANDS["bake"], work, [*job_flags(), *setting_flags(), *common_flags()])
-
-
-def job_flags() -> list[inspect.Parameter]:
-    """Return the arguments of a bake that are no settings."""
-    return [
-        inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context),
-        inspect.Parameter(
-            "scene",
-            inspect.Parameter.KEYWORD_ONLY,
-            annotation=Annotated[
-                Path, typer.Argument(metavar="SCENE", help="glb, gltf, obj, ply, stl or off file.")
-            ],
-        ),
-        inspect.Parameter(
-            "out",
-            inspect.Parameter.KEYWORD_ONLY,
-            annotation=Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")],
-        ),
-        flag("config", Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")),
-        flag(
-            "force", bool, typer.Option("--force", help="Replace OUT even if baker did not write it."), False
-        ),
-        cluster_flag(),
-    ]
-
-
-def work(
-    *,
-    ctx: typer.Context,
-    scene: Path,
-    out: Path,
-    config: Path | None,
-    force: bool,
-    cluster: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: int,
-    **settings: Any,
+def bake_command(
+    ctx: typer.Context, scene: Scene, out: Out, force: Force = False, cluster: Cluster = None
 ) -> None:
-    """Bake, show progress, and tell what was made."""
-    from baker.cli.config import resolve
+    """Bake, show progress, and report what was written."""
     from baker.cli.report import bake_json, write_summary
 
-    session: Session = ctx.obj
-    as_json = as_json or session.as_json
-    resolved = resolve(given(settings), config)
-    session.will_write(str(out))
-    with session.reporter(quiet=quiet) as progress:
-        # Inside: importing the kernels takes a moment, and the bar is there meanwhile.
-        progress("start", 0.0)
+    run: Run = ctx.obj
+    settings = run.of(BakeSettings)
+    run.session.will_write(str(out))
+    with run.progress() as progress:
+        # Imported here: the kernels take a moment, and the progress is shown meanwhile.
         from baker.trace.numba_start import skip_blas
 
         skip_blas()
@@ -78,18 +38,23 @@ def work(
 
         # What is loaded by now stays: looking for cycles in it takes 4 % of a first bake, which compiles.
         gc.freeze()
-        spread = {} if cluster is None else {"executor": _executor(cluster, resolved.threads)}
+        spread: dict[str, Any] = (
+            {} if cluster is None else {"executor": _tile_executor(cluster, settings.threads)}
+        )
         with held(out):
-            result = bake(scene, out=out, settings=resolved, progress=progress, force=force, **spread)
-    if not quiet:
-        write_summary(result, session.text_stream(as_json=as_json), verbose=verbose)
-    if as_json:
-        session.write_json(bake_json(result))
+            result = bake(scene, out=out, settings=settings, progress=progress, force=force, **spread)
+    if not run.quiet:
+        write_summary(result, run.text, verbose=run.verbose)
+    if run.as_json:
+        run.session.write_json(bake_json(result))
 
 
-def _executor(address: str, threads: int | None) -> DistributedTileExecutor:
+def _tile_executor(address: str, threads: int | None) -> TileExecutor:
     from baker.core.parallel import thread_count
-    from baker.distributed.connection import Cluster
+    from baker.distributed.connection import Cluster as Connection
     from baker.distributed.tile_executor import DistributedTileExecutor
 
-    return DistributedTileExecutor(Cluster(address, threads=thread_count(threads)))
+    return DistributedTileExecutor(Connection(address, threads=thread_count(threads)))
+
+
+bake = command("bake", BakeSettings)(bake_command)

@@ -2,60 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from baker.cli.flags import in_keys
 from baker.core.errors import SettingsError
+from baker.core.settings_model import Settings
 
-if TYPE_CHECKING:
-    from baker.core.settings import BakeSettings
+# Its keys may also stand at the top of the file.
+TOP_TABLE = "bake"
+# Tables of a configuration file, one for each model of settings that has one.
+TABLES = ("bake", "check", "verify", "render", "diff", "repair")
+# Lists of a file to which the command line adds.
+_ADDED = {"ignore"}
 
-TABLE = "bake"
-# Tables of other commands in the same file.
-CHECK_TABLE = "check"
 
-
-def read_config(path: Path) -> dict[str, Any]:
-    """Return the keys of a configuration file.
+def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
+    """Return the keys of one table of a configuration file, none if it is not there.
 
     Parameters
     ----------
     path : Path
-        TOML file; its keys stand at the top or in a table `[bake]`. A table `[check]` is passed by.
+        TOML file with a table for each kind of settings. Those of a bake may stand at the top instead.
+    name : str
+        Of the table.
+
+    Returns
+    -------
+    dict
+        Values by key, as they are written.
 
     Raises
     ------
     SettingsError
-        If the file cannot be read, is not TOML, or mixes both places.
+        If the file cannot be read, is not TOML, has something else in place of the table, or mixes settings
+        at the top with a table `[bake]`.
     """
     document = _read_toml(path)
-    document.pop(CHECK_TABLE, None)
-    if TABLE not in document:
-        return document
-    table = document.pop(TABLE)
+    table = document.get(name, {})
     if not isinstance(table, dict):
         raise SettingsError(
-            f"'{TABLE}' must be a table of settings, written [{TABLE}]", file=str(path), object=TABLE
+            f"'{name}' must be a table of settings, written [{name}]", file=str(path), object=name
         )
-    if document:
-        stray = next(iter(document))
-        why = f"'{stray}' stands outside [{TABLE}]; move every setting into it, or drop the table"
+    if name != TOP_TABLE:
+        return table
+    top = {
+        key: value
+        for key, value in document.items()
+        if key != name and not (key in TABLES and isinstance(value, dict))
+    }
+    if name not in document:
+        return top
+    if top:
+        stray = next(iter(top))
+        why = f"'{stray}' stands outside [{name}]; move every setting into it, or drop the table"
         raise SettingsError(why, file=str(path), object=stray)
-    return table
-
-
-def read_check_config(path: Path) -> dict[str, Any]:
-    """Return the keys of the table `[check]` of a configuration file, none if it is not there.
-
-    Raises
-    ------
-    SettingsError
-        If the file cannot be read or is not TOML, or `check` is no table.
-    """
-    table = _read_toml(path).get(CHECK_TABLE, {})
-    if not isinstance(table, dict):
-        why = f"'{CHECK_TABLE}' must be a table of settings, written [{CHECK_TABLE}]"
-        raise SettingsError(why, file=str(path), object=CHECK_TABLE)
     return table
 
 
@@ -72,27 +74,50 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise SettingsError(f"the configuration is not valid TOML: {error}", file=str(path)) from None
 
 
-def resolve(command_line: dict[str, Any], config: Path | None) -> BakeSettings:
+def resolve(
+    models: Sequence[type[Settings]], command_line: Mapping[str, Any], config: Path | None
+) -> dict[type[Settings], Settings]:
     """Return the settings of a run: defaults, then the file, then the command line.
+
+    Parameters
+    ----------
+    models : sequence of type of Settings
+        Where one has a field of an earlier one, that one's value is its default.
+    command_line : mapping of str to object
+        Settings that were given as flags.
+    config : Path or None
+        A TOML file.
+
+    Returns
+    -------
+    dict
+        One object for each model.
 
     Raises
     ------
     SettingsError
         For an unknown key or a value out of range, naming the file it came from.
     """
-    from baker.core.settings import make_settings
+    found: dict[type[Settings], Settings] = {}
+    shared: dict[str, Any] = {}
+    for model in models:
+        fields = model.model_fields
+        table = _table(model, config) if config is not None and model.table else {}
+        given = {name: value for name, value in command_line.items() if name in fields}
+        for name in _ADDED & given.keys() & table.keys():
+            given[name] = [*table[name], *given[name]]
+        default = {name: value for name, value in shared.items() if name in fields}
+        found[model] = model.make({**default, **table, **given})
+        shared |= {name: getattr(found[model], name) for name in fields}
+    return found
 
-    values: dict[str, Any] = {}
-    if config is not None:
-        table = read_config(config)
-        for key, value in table.items():
-            name = key.replace("-", "_")
-            if name in values:
-                raise SettingsError(f"'{key}' is given twice", file=str(config), object=key)
-            values[name] = value
-        try:
-            # By itself first, so that a mistake in the file is blamed on the file.
-            make_settings(table)
-        except SettingsError as error:
-            raise SettingsError(error.message, file=str(config), object=error.object) from None
-    return make_settings({**values, **command_line})
+
+def _table(model: type[Settings], config: Path) -> dict[str, Any]:
+    """Return the checked values of a model's table by field: a mistake in the file is blamed on the file."""
+    table = read_config(config, model.table)
+    try:
+        checked = model.make(table)
+    except SettingsError as error:
+        raise SettingsError(in_keys(error.message), file=str(config), object=error.object) from None
+    names = [key.replace("-", "_") for key in table]
+    return {name: getattr(checked, name) for name in names}

@@ -2,74 +2,36 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-from baker.cli.commands import COMMANDS
-from baker.cli.options import build, common_flags, flag, given, setting_flags
-from baker.cli.outcome import tell, write_failed, write_worst
+from baker.cli.command import Run, command
+from baker.cli.outcome import report_outcome, write_failed, write_worst
+from baker.comparison.settings import DiffSettings
 
 if TYPE_CHECKING:
-    from baker.cli.session import Session
-    from baker.comparison import Difference
+    from baker.comparison.compare import Difference
 
 _SHOWN = 3
 
 
-def command() -> Any:
-    """Return the subcommand."""
-    a = Annotated[Path, typer.Argument(metavar="A", help="Output folder of a bake.")]
-    b = Annotated[Path, typer.Argument(metavar="B", help="Output folder of the bake it is compared with.")]
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    flags = [
-        inspect.Parameter("ctx", keyword, annotation=typer.Context),
-        inspect.Parameter("a", keyword, annotation=a),
-        inspect.Parameter("b", keyword, annotation=b),
-        flag("texels", int, typer.Option("--texels", metavar="N", help="Texels of A to compare."), 20000),
-        flag("flip", bool, typer.Option("--flip/--no-flip", help="Compare pages as pictures, too."), True),
-        flag(
-            "fail_if",
-            str | None,
-            typer.Option(
-                "--fail-if", metavar="EXPR", help='Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".'
-            ),
-        ),
-        *setting_flags(only={"threads", "seed"}),
-        *common_flags(),
-    ]
-    return build("diff", COMMANDS["diff"], work, flags)
-
-
-def work(
-    *,
+@command("diff", DiffSettings)
+def diff(
     ctx: typer.Context,
-    a: Path,
-    b: Path,
-    texels: int,
-    flip: bool,
-    fail_if: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: int,
-    **settings: Any,
+    a: Annotated[Path, typer.Argument(metavar="A", help="Output folder of a bake.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Output folder of the bake it is compared with.")],
 ) -> None:
-    """Compare the bakes and tell."""
-    from baker.cli.config import resolve
+    """Compare the bakes and report the differences."""
+    run: Run = ctx.obj
+    with run.progress() as progress:
+        from baker.comparison.compare import compare
+        from baker.comparison.summary import difference_json
 
-    session: Session = ctx.obj
-    as_json = as_json or session.as_json
-    resolved = resolve(given(settings), None)
-    with session.reporter(quiet=quiet) as progress:
-        progress("start", 0.0)
-        from baker.comparison import DiffSettings, compare, difference_json
-
-        wanted = DiffSettings(texels=texels, flip=flip, fail_if=fail_if, seed=resolved.seed)
-        found = compare(a, b, wanted, progress)
-    tell(found, session, write_text, difference_json, quiet=quiet, as_json=as_json, verbose=verbose)
+        found = compare(a, b, run.of(DiffSettings), progress)
+    report_outcome(found, run, write_text, difference_json)
 
 
 def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:

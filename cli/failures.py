@@ -1,4 +1,4 @@
-"""Turns whatever went wrong into one sentence, an exit code, and JSON where it was asked for."""
+"""Turns an exception into one sentence, an exit code, and JSON if asked for."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import sys
 from typing import Any, TextIO
 
+from baker.cli.flags import in_flags
 from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
 
@@ -36,7 +37,7 @@ def explain(error: BaseException) -> BakerError | None:
     return None
 
 
-def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -> int:
+def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -> int:
     """Report a failure and return the exit code.
 
     Parameters
@@ -63,7 +64,7 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
     if as_json:
         body: dict[str, Any] = {
             "kind": kind,
-            "message": known.message,
+            "message": in_flags(known.message),
             "file": known.file,
             "object": known.object,
         }
@@ -74,10 +75,12 @@ def tell(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO) -
 
 
 def _line(error: BakerError) -> str:
-    text = _sentence(str(error))
-    # A setting's message may begin with its name, which is the object too: once is enough.
-    doubled = f"{error.object}: {error.object}: "
-    return text.replace(doubled, f"{error.object}: ", 1)
+    """Return file, object and message in one line; a message that begins with its object repeats nothing."""
+    if error.object and error.message.startswith((f"`{error.object}`", f"'{error.object}'")):
+        parts = [error.file, error.message]
+    else:
+        parts = [error.file, error.object, error.message]
+    return in_flags(_sentence(": ".join(part for part in parts if part)))
 
 
 def _sentence(text: str) -> str:

@@ -27,7 +27,7 @@ class LazyGroup(TyperGroup):
             return None
         if self._listing:
             return self.commands[cmd_name]
-        return importlib.import_module(f"baker.cli.{cmd_name}").command()
+        return getattr(importlib.import_module(f"baker.cli.{cmd_name}"), cmd_name)()
 
     _listing = False
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import inspect as signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
 
-from baker.cli.commands import COMMANDS
-from baker.cli.options import build, common_flags, setting_flags
-
-if TYPE_CHECKING:
-    from baker.cli.session import Session
+from baker.cli.command import Run, command
+from baker.core.settings_model import RunSettings
 
 # Longest list shown item by item; the rest is counted (all of it with -v and with --json).
 SHOWN = 20
@@ -20,39 +16,24 @@ SHOWN = 20
 LONGEST = 24
 
 
-def command() -> Any:
-    """Return the subcommand."""
-    path = Annotated[
+# No ray is traced here; the settings are taken so that scripts can pass the same flags to every command.
+@command("inspect", RunSettings)
+def inspect(
+    ctx: typer.Context,
+    path: Annotated[
         Path,
         typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json, image or status_0.png."),
-    ]
-    keyword = signature.Parameter.KEYWORD_ONLY
-    flags = [
-        signature.Parameter("ctx", keyword, annotation=typer.Context),
-        signature.Parameter("path", keyword, annotation=path),
-        # Nothing here traces rays; taken so that scripts can pass the same flags to every command.
-        *setting_flags(only={"threads", "seed"}),
-        *common_flags(),
-    ]
-    return build("inspect", COMMANDS["inspect"], work, flags)
-
-
-def work(
-    *, ctx: typer.Context, path: Path, as_json: bool, quiet: bool, verbose: int, **settings: Any
+    ],
 ) -> None:
-    """Look into `path` and tell."""
-    from baker.cli.config import resolve
-    from baker.cli.options import given
-
-    resolve(given(settings), None)
+    """Report what is in `path`."""
     from baker.io.inspect import inspect_path
 
-    session: Session = ctx.obj
+    run: Run = ctx.obj
     found = inspect_path(path)
-    if as_json or session.as_json:
-        session.write_json(found)
-    elif not quiet:
-        write_tree(found, session.out, limit=None if verbose else SHOWN)
+    if run.as_json:
+        run.session.write_json(found)
+    elif not run.quiet:
+        write_tree(found, run.session.out, limit=None if run.verbose else SHOWN)
 
 
 def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None = SHOWN) -> None:

@@ -1,4 +1,4 @@
-"""Notes of what was there before a command wrote, and the removal of what it left when it was ended hard."""
+"""Records what exists before a command writes, and removes what it leaves behind if it is killed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from baker.io.temporary import temporaries
 
 
 def survey(out: str) -> bytes:
-    """Return what there is before a command writes, for `restore` to know what is new.
+    """Return what exists before a command writes, from which `restore` finds what is new.
 
     Parameters
     ----------
@@ -51,4 +51,4 @@ def restore(note: bytes) -> None:
         try:
             parent.rmdir()
         except OSError:
-            return  # it holds something, or was never made
+            return  # it holds something, or was never created

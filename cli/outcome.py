@@ -1,4 +1,4 @@
-"""What the commands that judge a bake have in common: how they tell and end, lines on places and limits."""
+"""Shared by `verify` and `diff`: the report of an outcome, lines on worst places and limits."""
 
 from __future__ import annotations
 
@@ -11,28 +11,21 @@ import typer
 from baker.cli.failures import FAILED_CHECK
 
 if TYPE_CHECKING:
-    from baker.cli.session import Session
+    from baker.cli.command import Run
     from baker.metrics.limits import Verdict
 
 
-def tell(
-    found: Any,
-    session: Session,
-    as_text: Callable[..., None],
-    as_data: Callable[[Any], dict[str, Any]],
-    *,
-    quiet: bool,
-    as_json: bool,
-    verbose: int,
+def report_outcome(
+    found: Any, run: Run, as_text: Callable[..., None], as_data: Callable[[Any], dict[str, Any]]
 ) -> None:
-    """Write what was found as text and, if wanted, as JSON; end the program as failed if it did not pass.
+    """Write an outcome as text and, if wanted, as JSON; end the program as failed if it did not pass.
 
-    as_text : called with what was found, a stream and `verbose`; as_data : makes what `--json` writes
+    as_text : called with the outcome, a stream and `verbose`; as_data : makes what `--json` writes
     """
-    if not quiet:
-        as_text(found, session.text_stream(as_json=as_json), verbose=verbose)
-    if as_json:
-        session.write_json(as_data(found))
+    if not run.quiet:
+        as_text(found, run.text, verbose=run.verbose)
+    if run.as_json:
+        run.session.write_json(as_data(found))
     if not found.passed:
         raise typer.Exit(FAILED_CHECK)
 

@@ -1,4 +1,4 @@
-"""Shows how far the work is: a bar on a terminal, a line now and then elsewhere."""
+"""Shows progress: a bar on a terminal, plain lines every few seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ PLAIN_INTERVAL = 3.0
 
 
 class Reporter:
-    """Is the progress callback of a command, and its context.
+    """The progress callback of a command, and its context manager.
 
     Parameters
     ----------
     quiet : bool
         Show nothing.
     stopped : callable
-        Tells whether the work was asked to stop; its answer is what the callback answers.
+        Returns whether the work was asked to stop; the callback returns the same.
     stream : TextIO
-        Where to show; stderr unless a test says otherwise.
+        Where to show; default: stderr.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Reporter:
         self._lock = threading.Lock()
         self._stage = ""
         self._started = 0.0
-        self._told = clock()
+        self._last_line = clock()
         self._bar: RichProgress | None = None
         self._task: Any = None
 
@@ -62,7 +62,7 @@ class Reporter:
             self._bar = None
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> bool:
-        """Show that `fraction` of `stage` is done; answer whether to stop."""
+        """Show that `fraction` of `stage` is done; return whether to stop."""
         if not self._quiet:
             # Tiles may report from several threads.
             with self._lock:
@@ -80,8 +80,8 @@ class Reporter:
                     self._bar.remove_task(self._task)
                 self._task = self._bar.add_task(stage, total=1.0, detail=detail)
             self._bar.update(self._task, completed=fraction, detail=detail)
-        elif now - self._told >= PLAIN_INTERVAL:
-            self._told = now
+        elif now - self._last_line >= PLAIN_INTERVAL:
+            self._last_line = now
             spent = now - self._started
             left = f"{spent * (1 - fraction) / fraction:.0f} s left" if fraction > 0 and spent > 0 else ""
             words = [f"{stage}:", f"{100 * fraction:.0f} %", detail, left]

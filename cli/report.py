@@ -1,4 +1,4 @@
-"""Tells what a bake made: a short text for people, the manifest's parts for scripts."""
+"""The report of a bake: a short text for people, parts of the manifest for scripts."""
 
 from __future__ import annotations
 

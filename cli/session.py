@@ -1,4 +1,4 @@
-"""What every command of one run shares: where text and JSON go, and whether to stop."""
+"""Shared by all commands of one run: where text and JSON go, and whether to stop."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import sys
 from dataclasses import dataclass, field
 from typing import Any, TextIO
 
+from baker.cli.flags import values_in_flags
 from baker.cli.progress import Reporter
-from baker.cli.supervise import StopFlag, announce
+from baker.cli.supervise import StopFlag, note_output
 
 
 @dataclass
 class Session:
-    """Is made by `main` and handed to commands through the command line's context.
+    """The streams and the stop flag of one run; made by `app.run`, passed to commands in their context.
 
     Attributes
     ----------
@@ -21,7 +22,7 @@ class Session:
         Standard output: the JSON object, or the text of a command.
     stop : StopFlag
     notes : int or None
-        Where the supervising process listens for output folders.
+        Descriptor of the file that lists output folders for the parent process, see `supervise`.
     as_json : bool
         `--json` stood before the subcommand.
     """
@@ -36,13 +37,13 @@ class Session:
         return Reporter(quiet=quiet, stopped=lambda: self.stop.requested)
 
     def will_write(self, out: str) -> None:
-        """Say that `out` is about to be written, so that a hard end can tidy up."""
-        announce(self.notes, out)
+        """Note that `out` is about to be written, so that the parent can clean up after a kill."""
+        note_output(self.notes, out)
 
     def write_json(self, value: dict[str, Any]) -> None:
-        """Write the one object of `--json`."""
-        self.out.write(json.dumps(value, indent=2, allow_nan=False) + "\n")
+        """Write the one object of `--json`; settings in its texts are written as flags."""
+        self.out.write(json.dumps(values_in_flags(value), indent=2, allow_nan=False) + "\n")
 
     def text_stream(self, *, as_json: bool) -> TextIO:
-        """Return where a command's text goes."""
+        """Return the stream for a command's text."""
         return sys.stderr if as_json else self.out

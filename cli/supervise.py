@@ -57,14 +57,14 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     Parameters
     ----------
     argv : list of str
-        The command line, to know whether a failure must be told as JSON.
+        The command line, to know whether a failure must be reported as JSON.
 
     Returns
     -------
     stop : StopFlag
         Set by a stopping signal in the working process.
     notes : int or None
-        File for `announce`, shared with the parent; None where there is no `fork` and this process does
+        File for `note_output`, shared with the parent; None where there is no `fork` and this process does
         the work.
     """
     stop = StopFlag()
@@ -73,7 +73,7 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
         return stop, None
     sys.stdout.flush()
     sys.stderr.flush()
-    # Not a pipe: a batch announces more folders than one holds, and the parent reads at the end only.
+    # Not a pipe: a batch notes more folders than one holds, and the parent reads at the end only.
     with tempfile.TemporaryFile() as file:
         notes = os.dup(file.fileno())
     blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
@@ -92,8 +92,8 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     os._exit(watch.wait())
 
 
-def announce(notes: int | None, out: str) -> None:
-    """Tell the parent which output folder is about to be written."""
+def note_output(notes: int | None, out: str) -> None:
+    """Note for the parent process which output folder is about to be written."""
     if notes is not None:
         from baker.cli.leftovers import survey
 
@@ -168,13 +168,13 @@ class _Watch:
             return os.WEXITSTATUS(status)
         number = os.WTERMSIG(status)
         if self.stopping:
-            return self._tell("cancelled", "interrupted", INTERRUPTED)
+            return self._report("cancelled", "interrupted", INTERRUPTED)
         if number == signal.SIGKILL:
             why = "the work was killed from outside, most likely for want of memory"
         else:
             why = f"native code crashed ({signal.Signals(number).name})"
         hint = "try a smaller --resolution or fewer --threads; the output folder was left as it was"
-        return self._tell("resource", f"{why}; {hint}", RESOURCE)
+        return self._report("resource", f"{why}; {hint}", RESOURCE)
 
     def _tidy(self) -> None:
         from baker.cli.leftovers import restore
@@ -184,7 +184,7 @@ class _Watch:
             if line.endswith(b"\n"):
                 restore(line)
 
-    def _tell(self, kind: str, message: str, code: int) -> int:
+    def _report(self, kind: str, message: str, code: int) -> int:
         sys.stderr.write(f"baker: {message}\n")
         sys.stderr.flush()
         if self.as_json:

@@ -1,103 +1,36 @@
-"""`baker verify OUT`: how wrong a bake is, against path tracing."""
+"""`baker verify OUT`: the error of a bake, against path tracing."""
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-from baker.cli.commands import COMMANDS
-from baker.cli.options import build, common_flags, flag, given, setting_flags
-from baker.cli.outcome import tell, write_failed, write_limits, write_worst
+from baker.cli.command import Run, command
+from baker.cli.outcome import report_outcome, write_failed, write_limits, write_worst
+from baker.verification.settings import VerifySettings
 
 if TYPE_CHECKING:
-    from baker.cli.session import Session
-    from baker.verification import Verification
+    from baker.verification.verify import Verification
 
 
-def command() -> Any:
-    """Return the subcommand."""
-    out = Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a bake.")]
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    flags = [
-        inspect.Parameter("ctx", keyword, annotation=typer.Context),
-        inspect.Parameter("out", keyword, annotation=out),
-        flag("texels", int, typer.Option("--texels", metavar="N", help="Texels to judge."), 2000),
-        flag(
-            "spp",
-            int | None,
-            typer.Option("--spp", metavar="N", help="Paths for each texel, whatever its error."),
-        ),
-        flag(
-            "target_se",
-            float,
-            typer.Option(
-                "--target-se", metavar="X", help="Relative standard error at which a texel is good enough."
-            ),
-            0.005,
-        ),
-        flag(
-            "time_limit",
-            float | None,
-            typer.Option(
-                "--time-limit", metavar="SECONDS", help="Time for path tracing (40 without --spp, else none)."
-            ),
-        ),
-        flag(
-            "fail_if",
-            str | None,
-            typer.Option(
-                "--fail-if", metavar="EXPR", help='Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".'
-            ),
-        ),
-        flag("report", Path | None, typer.Option("--report", metavar="FILE", help="Write an HTML page.")),
-        flag("junit", Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")),
-        *setting_flags(only={"threads", "seed"}),
-        *common_flags(),
-    ]
-    return build("verify", COMMANDS["verify"], work, flags)
-
-
-def work(
-    *,
+@command("verify", VerifySettings)
+def verify(
     ctx: typer.Context,
-    out: Path,
-    texels: int,
-    spp: int | None,
-    target_se: float,
-    time_limit: float | None,
-    fail_if: str | None,
-    report: Path | None,
-    junit: Path | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: int,
-    **settings: Any,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a bake.")],
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write an HTML page.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
 ) -> None:
-    """Judge the bake and tell."""
-    from baker.cli.config import resolve
+    """Verify the bake and report the figures."""
+    run: Run = ctx.obj
+    with run.progress() as progress:
+        from baker.verification.summary import verification_json
+        from baker.verification.verify import verify
 
-    session: Session = ctx.obj
-    as_json = as_json or session.as_json
-    resolved = resolve(given(settings), None)
-    if time_limit is None and spp is None:
-        time_limit = 40.0
-    with session.reporter(quiet=quiet) as progress:
-        progress("start", 0.0)
-        from baker.verification import VerifySettings, verification_json, verify
-
-        wanted = VerifySettings(
-            texels=texels,
-            spp=spp,
-            target_se=target_se,
-            time_limit=time_limit,
-            fail_if=fail_if,
-            seed=resolved.seed,
-            threads=resolved.threads,
-        )
-        found = verify(out, wanted, progress)
+        found = verify(out, run.of(VerifySettings), progress)
         if report is not None:
             from baker.verification.report import write_report
 
@@ -106,7 +39,7 @@ def work(
             from baker.verification.junit import write_junit
 
             write_junit(junit, found)
-    tell(found, session, write_text, verification_json, quiet=quiet, as_json=as_json, verbose=verbose)
+    report_outcome(found, run, write_text, verification_json)
 
 
 def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:

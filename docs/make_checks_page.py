@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from baker.checks.rule import GROUPS, Check, all_checks
+from baker.cli.flags import in_flags
 
 PICTURES = Path(__file__).with_name("pictures") / "checks"
 NAMES = {
@@ -95,13 +96,18 @@ def page() -> str:
     """Return the text of the page."""
     entries = all_checks()
     parts = [HEAD, "| code | severity | what |\n|---|---|---|\n"]
-    parts += [f"| [`{e.code}`](#{_anchor(e.code)}) | {e.severity} | {e.title} |\n" for e in entries]
+    parts += [f"| [`{e.code}`](#{_anchor(e.code)}) | {e.severity} | {quoted(e.title)} |\n" for e in entries]
     for group in GROUPS:
         chosen = [entry for entry in entries if entry.group == group]
         if chosen:
             parts.append(f"\n## {NAMES[group]}\n")
             parts += [_section(entry) for entry in chosen]
     return "".join(parts)
+
+
+def quoted(text: str) -> str:
+    """Return a text of the library with its settings as flags."""
+    return in_flags(text, "`")
 
 
 def _section(entry: Check) -> str:
@@ -112,7 +118,7 @@ def _section(entry: Check) -> str:
         if picture.exists()
         else ""
     )
-    return f"\n### {entry.code}\n\n{notes}. {entry.docs}\n\nTo do: {entry.fix}.\n{shown}"
+    return f"\n### {entry.code}\n\n{notes}. {quoted(entry.docs)}\n\nTo do: {quoted(entry.fix)}.\n{shown}"
 
 
 def _anchor(code: str) -> str:

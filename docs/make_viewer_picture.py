@@ -12,7 +12,8 @@ from pathlib import Path
 
 import baker
 from baker.io.bake.read_bake import read_bake
-from baker.viewer import find_three, make_server
+from baker.viewer.script import find_three
+from baker.viewer.server import make_server
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "engines"))

@@ -14,15 +14,13 @@ from baker.checks.emission import Emission, find_emission
 from baker.checks.finding import Place
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.scene_rays import World
+from baker.checks.settings import DEFAULT_MIP
 from baker.checks.uv_facts import UvFacts
 from baker.core.light_kind import check_light_kinds
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
-
-# Mip level down to which charts must not bleed into each other, if none is asked for.
-DEFAULT_MIP = 2
 
 
 class CheckContext:

@@ -29,7 +29,7 @@ def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
         for f in invisible(context)
     ]
     found += [
-        SceneWarning("collision-hull", f"{f.message}; leave it out with --exclude", f.place.object)
+        SceneWarning("collision-hull", f"{f.message}; leave it out with `exclude`", f.place.object)
         for f in collision_hull(context)
     ]
     if context.wants_light:

@@ -99,7 +99,7 @@ def _run(
     progress: Progress,
     timings: dict[str, float],
 ) -> list[Finding]:
-    rates = rates_beside(path) if settings.rates is None else rates_of(Path(settings.rates))
+    rates = rates_beside(path) if settings.rates is None else rates_of(settings.rates)
     context = CheckContext(scene, bake_settings, mip=settings.mip, rates=rates, probe=settings.cost)
     found: list[Finding] = []
     entries = all_checks()

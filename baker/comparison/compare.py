@@ -18,7 +18,8 @@ from baker.comparison.manifests import manifest_differences
 from baker.comparison.match import Sides, SurfacePoints, make_sides, match
 from baker.comparison.pairs import pair_objects
 from baker.comparison.pictures import FlipMeans, page_flip, read
-from baker.core.errors import InputError, SettingsError
+from baker.comparison.settings import DiffSettings
+from baker.core.errors import InputError
 from baker.core.geometry import world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
@@ -32,31 +33,6 @@ from baker.metrics.worst_texels import worst_texels
 
 # A second bake has no noise that is known, so no limit can be set on it.
 LIMITED = (*(name for name in FIGURES if not name.startswith(("noise", "z_", "energy"))), "flip")
-
-
-@dataclass(frozen=True)
-class DiffSettings:
-    """How much is compared.
-
-    Attributes
-    ----------
-    texels : int
-        Points of the surface.
-    flip : bool
-        Compare pages as pictures, too.
-    fail_if : str or None
-    seed : int
-    """
-
-    texels: int = 20000
-    flip: bool = True
-    fail_if: str | None = None
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
-        if self.texels < 1:
-            raise SettingsError("--texels must be at least 1", object="texels")
 
 
 @dataclass(frozen=True)
@@ -117,11 +93,30 @@ def compare(
 ) -> Difference:
     """Compare the bake in folder a with that in folder b.
 
+    Parameters
+    ----------
+    a, b : Path or str
+        Output folders of bakes. b is the reference.
+    settings : DiffSettings, optional
+        How much is compared, and limits.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+
+    Returns
+    -------
+    Difference
+        Figures of each channel that both bakes have, and the points furthest apart.
+
     Raises
     ------
     InputError
         If one is no bake, or they have no channel or no surface in common.
-    SettingsError, ResourceError, Cancelled
+    SettingsError
+        For a limit that cannot be read.
+    ResourceError
+        If memory runs out.
+    Cancelled
+        If `progress` answers so.
     """
     settings = settings or DiffSettings()
     start = time.monotonic()

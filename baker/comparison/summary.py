@@ -8,7 +8,18 @@ from baker.comparison.compare import Difference
 
 
 def difference_json(found: Difference) -> dict[str, Any]:
-    """Return what `--json` prints."""
+    """Return a comparison as plain values, the object of `--json`.
+
+    Parameters
+    ----------
+    found : Difference
+        What `compare` returned.
+
+    Returns
+    -------
+    dict
+        Numbers, texts, lists and dicts only.
+    """
     return {
         "passed": found.passed,
         "channels": {name: check.figures for name, check in found.channels.items()},

@@ -16,8 +16,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.options import BaseModel, ConfigDict
 from baker.core.registry import Registry
+from baker.core.settings_model import Settings
 
 # A code that misses its value by more than this share is visible as a step: the eye separates 1 to 2 %.
 VISIBLE_STEP = 0.01
@@ -50,14 +50,12 @@ class DecodedImage:
     channels: tuple[str, ...]
 
 
-class EncodingOptions(BaseModel):
+class EncodingOptions(Settings):
     """Settings of one encoding; a subclass has a field with default, range and description for each.
 
     The names are settings of a bake and must differ from all other settings. The types are those that a flag
     can have: str, int, float, bool, Literal.
     """
-
-    model_config = ConfigDict(frozen=True)
 
 
 Options = TypeVar("Options", bound=EncodingOptions)
@@ -86,7 +84,7 @@ class Encoding(ABC, Generic[Options]):
     when_clipped: str = "use the EXR"
     when_banded: str = "use the EXR"
 
-    def options_of(self, settings: BaseModel) -> Options:
+    def options_of(self, settings: Settings) -> Options:
         """Return the options of this encoding among the settings of a bake."""
         return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 

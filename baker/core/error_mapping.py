@@ -8,12 +8,12 @@ from baker.core.errors import BakerError, Cancelled, ResourceError
 
 # Messages for error numbers of the operating system: a resource ran out, or access is denied.
 _RESOURCE_ERRNO = {
-    errno.ENOSPC: "the disk is full; free some space, or write elsewhere with -o",
-    errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with -o",
-    errno.EACCES: "no permission; change it, or write elsewhere with -o",
-    errno.EPERM: "no permission; change it, or write elsewhere with -o",
-    errno.EROFS: "the file system is read-only; write elsewhere with -o",
-    errno.ENOMEM: "out of memory; try a smaller --resolution or fewer --threads",
+    errno.ENOSPC: "the disk is full; free some space, or write elsewhere with `out`",
+    errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with `out`",
+    errno.EACCES: "no permission; change it, or write elsewhere with `out`",
+    errno.EPERM: "no permission; change it, or write elsewhere with `out`",
+    errno.EROFS: "the file system is read-only; write elsewhere with `out`",
+    errno.ENOMEM: "out of memory; try a smaller `resolution` or fewer `threads`",
     errno.EMFILE: "too many open files; raise the limit (ulimit -n)",
 }
 
@@ -37,7 +37,7 @@ def explain(error: BaseException) -> BakerError | None:
         return Cancelled("interrupted")
     if isinstance(error, MemoryError):
         return ResourceError(
-            "out of memory; try a smaller --resolution, a lower --density or fewer --threads"
+            "out of memory; try a smaller `resolution`, a lower `density` or fewer `threads`"
         )
     if isinstance(error, OSError):
         reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))

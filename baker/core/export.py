@@ -40,5 +40,5 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     for name in names:
         for channel in EXPORTS.require(name, "export", setting="export").needs:
             if channel not in channels:
-                message = f"the export '{name}' needs the channel {channel}; add it to --channels"
+                message = f"the export '{name}' needs the channel {channel}; add it to `channels`"
                 raise SettingsError(message, object="export")

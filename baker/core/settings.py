@@ -1,72 +1,77 @@
-"""What a bake can be told: every setting once, with its meaning, unit, range and default.
+"""The settings of a bake, each once, with its meaning, unit, range and default.
 
-The command line, the configuration file and the settings page of the docs are made from this class.
+The command line, the configuration file, the keywords of `baker.bake` and the settings page of the docs are
+made from this class.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
-from baker.core.names import unknown_name
-from baker.core.options import BaseModel, ConfigDict, Field, ValidationError
+from baker.core.settings_model import Names, Settings, Text, seed_setting, setting, threads_setting
 
-# Hemisphere rays per texel for each preset. Light samples per texel are as many.
+# Hemisphere rays per texel of each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
-# Settings that are lists of names: with commas on the command line.
-_LISTS = {"channels", "encode", "exclude", "export", "include"}
-# Lists that may be given several times.
-REPEATED = frozenset({"exclude", "include"})
 
+class CommonSettings(Settings):
+    """Holds the settings of a bake that no plugin brings."""
 
-class CommonSettings(BaseModel):
-    """The settings of a bake that no plugin brings."""
+    table: ClassVar[str] = "bake"
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    channels: Names = setting(("irradiance", "ao"), "What to bake.")
+    resolution: int = setting(1024, "Page width and height, exact.", unit="texels", ge=16, le=16384)
+    density: float | None = setting(
+        None, "Texels per metre; pages overflow into more.", unit="texels/m", gt=0
+    )
+    max_pages: int = setting(16, "Most pages that `density` may fill.", ge=1, le=256)
+    padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64)
+    uv: Literal["auto", "keep", "unwrap"] = setting("auto", "Keep a valid TEXCOORD_1, or unwrap.")
+    unwrapper: Literal["xatlas"] = setting("xatlas", "Library that cuts and packs charts.")
+    quality: Literal["preview", "medium", "high", "ultra"] = setting(
+        "medium", "Preset of samples: preview 16, medium 64, high 256, ultra 1024."
+    )
+    samples: int | None = setting(None, "Hemisphere rays per texel; default by quality.", ge=1, le=65536)
+    light_samples: int | None = setting(None, "Shadow rays per texel; default: samples.", ge=1, le=65536)
+    ao_samples: int | None = setting(None, "AO rays per texel; default: samples.", ge=1, le=65536)
+    ao_distance: Text = setting(
+        "10%", "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
+    )
+    sky: Text | None = setting(None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2")
+    sky_strength: float = setting(1.0, "Factor on the sky.", ge=0, allow_inf_nan=False)
+    bounces: int | None = setting(None, "Reflections of light; default: until converged.", ge=0, le=1000)
+    denoise: bool = setting(True, "Denoise with Open Image Denoise.")
+    encode: Names = setting((), f"Further files of each page: {encodings_in_words()}.")
+    export: Names = setting(
+        (), "Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
+    )
+    include: Names = setting(
+        (),
+        "Bake only objects with these names or paths of nodes (`*` and `?` stand for others).",
+        repeated=True,
+    )
+    exclude: Names = setting(
+        (),
+        "Leave out objects and lights with these names or paths of nodes, and what is below.",
+        repeated=True,
+    )
+    up: Literal["y", "z"] = setting("y", "Up axis of OBJ, PLY, STL and OFF files.")
+    scale: float = setting(1.0, "Metres per unit of OBJ, PLY, STL and OFF files.", unit="m", gt=0)
+    seed: int = seed_setting()
+    threads: int | None = threads_setting()
 
-    channels: tuple[str, ...] = Field(("irradiance", "ao"), description="What to bake.")
-    resolution: int = Field(1024, ge=16, le=16384, description="Page width and height in texels, exact.")
-    density: float | None = Field(None, gt=0, description="Texels per metre; pages overflow into more.")
-    max_pages: int = Field(16, ge=1, le=256, description="Most pages that --density may fill.")
-    padding: int = Field(4, ge=0, le=64, description="Empty texels between charts.")
-    uv: Literal["auto", "keep", "unwrap"] = Field("auto", description="Keep a valid TEXCOORD_1, or unwrap.")
-    unwrapper: Literal["xatlas"] = Field("xatlas", description="Library that cuts and packs charts.")
-    quality: Literal["preview", "medium", "high", "ultra"] = Field(
-        "medium", description="Preset of samples: preview 16, medium 64, high 256, ultra 1024."
-    )
-    samples: int | None = Field(
-        None, ge=1, le=65536, description="Hemisphere rays per texel; default by quality."
-    )
-    light_samples: int | None = Field(
-        None, ge=1, le=65536, description="Shadow rays per texel; default: samples."
-    )
-    ao_samples: int | None = Field(None, ge=1, le=65536, description="AO rays per texel; default: samples.")
-    ao_distance: str = Field(
-        "10%", description="Reach of AO: metres, `10%` of the scene's diagonal, or `inf`."
-    )
-    sky: str | None = Field(None, description="Sky radiance R,G,B in cd/m2.")
-    sky_strength: float = Field(1.0, ge=0, allow_inf_nan=False, description="Factor on the sky.")
-    bounces: int | None = Field(
-        None, ge=0, le=1000, description="Reflections of light; default: until converged."
-    )
-    denoise: bool = Field(True, description="Denoise with Open Image Denoise.")
-    encode: tuple[str, ...] = Field((), description=f"Further files of each page: {encodings_in_words()}.")
-    export: tuple[str, ...] = Field(
-        (), description="Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
-    )
-    include: tuple[str, ...] = Field(
-        (), description="Bake only objects with these names or paths of nodes (`*` and `?` stand for others)."
-    )
-    exclude: tuple[str, ...] = Field(
-        (), description="Leave out objects and lights with these names or paths of nodes, and what is below."
-    )
-    up: Literal["y", "z"] = Field("y", description="Up axis of OBJ, PLY, STL and OFF files.")
-    scale: float = Field(1.0, gt=0, description="Metres per unit of OBJ, PLY, STL and OFF files.")
-    seed: int = Field(0, ge=0, le=2**31 - 1, description="Seed of all random numbers.")
-    threads: int | None = Field(None, ge=1, le=1024, description="Threads; default: all cores.")
+    def check(self) -> None:
+        """Raise `SettingsError` for values that do not go together."""
+        super().check()
+        if max(self.sky_radiance) > BRIGHTEST:
+            raise SettingsError(f"sky: {self.sky} is above {BRIGHTEST:.0e} cd/m2", object="sky")
+        self.ao_reach(1.0)
+        if not self.channels:
+            raise SettingsError("channels names nothing to bake", object="channels")
 
     @property
     def hemisphere_samples(self) -> int:
@@ -83,16 +88,7 @@ class CommonSettings(BaseModel):
 
     def ao_reach(self, diagonal: float) -> float:
         """Return the AO distance in metres for a scene of this diagonal (may be inf)."""
-        text = self.ao_distance.strip()
-        try:
-            reach = float(text[:-1]) / 100.0 * diagonal if text.endswith("%") else float(text)
-        except ValueError:
-            reach = -1.0
-        if not reach > 0:
-            raise SettingsError(
-                f"ao_distance '{self.ao_distance}' is not a positive number of metres, a percentage or inf"
-            )
-        return reach
+        return ao_metres(self.ao_distance, diagonal)
 
 
 if TYPE_CHECKING:
@@ -106,8 +102,56 @@ else:
         """All settings of a bake, checked: common ones, and the options of each encoding."""
 
 
+def ao_metres(distance: str, diagonal: float) -> float:
+    """Return an AO distance in metres.
+
+    Parameters
+    ----------
+    distance : str
+        Metres, per cent of the diagonal ("10%"), or "inf".
+    diagonal : float
+        Diagonal of the scene's bounding box, metres.
+
+    Returns
+    -------
+    float
+        Above 0; may be inf.
+
+    Raises
+    ------
+    SettingsError
+        If the text is none of these.
+    """
+    text = distance.strip()
+    try:
+        metres = float(text[:-1]) / 100.0 * diagonal if text.endswith("%") else float(text)
+    except ValueError:
+        metres = -1.0
+    if not metres > 0:
+        raise SettingsError(
+            f"ao_distance '{distance}' is not a positive number of metres, a percentage or inf"
+        )
+    return metres
+
+
 def parse_sky(text: str) -> tuple[float, float, float]:
-    """Return R, G, B of a `--sky` value, or raise `SettingsError`."""
+    """Return the radiance of a constant sky.
+
+    Parameters
+    ----------
+    text : str
+        Three numbers with commas, or one for all three.
+
+    Returns
+    -------
+    tuple of three floats
+        Red, green, blue, cd/m2.
+
+    Raises
+    ------
+    SettingsError
+        If the text is something else.
+    """
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
@@ -119,43 +163,17 @@ def parse_sky(text: str) -> tuple[float, float, float]:
     return (values[0], values[1], values[2])
 
 
-def make_settings(values: dict[str, Any]) -> BakeSettings:
-    """Check `values` and return settings.
+def make_settings(values: Mapping[str, Any]) -> BakeSettings:
+    """Return the settings of a bake, checked.
 
     Parameters
     ----------
-    values : dict
+    values : mapping of str to object
         Setting names and values; a dash in a name counts as an underscore.
 
-    Raises
-    ------
-    SettingsError
-        For an unknown name (with the nearest known one) or a value out of range.
+    Returns
+    -------
+    BakeSettings
+        With defaults for what `values` leaves out.
     """
-    known = list(BakeSettings.model_fields)
-    clean: dict[str, Any] = {}
-    for key, value in values.items():
-        name = key.replace("-", "_")
-        if name not in known:
-            raise unknown_name("setting", key, known, object=key)
-        if name in {"ao_distance", "sky"} and isinstance(value, int | float):
-            value = str(value)
-        if name == "sky" and isinstance(value, list | tuple):
-            value = ",".join(str(v) for v in value)
-        if name in REPEATED and isinstance(value, list | tuple):
-            value = ",".join(map(str, value))
-        if name in _LISTS and isinstance(value, str):
-            value = [part.strip() for part in value.split(",") if part.strip()]
-        clean[name] = value
-    try:
-        settings = BakeSettings(**clean)
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = ".".join(str(part) for part in first["loc"])
-        raise SettingsError(f"{name}: {first['msg']} (was {first['input']!r})", object=name) from None
-    if max(settings.sky_radiance) > BRIGHTEST:
-        raise SettingsError(f"sky: {settings.sky} is above {BRIGHTEST:.0e} cd/m2", object="sky")
-    settings.ao_reach(1.0)
-    if not settings.channels:
-        raise SettingsError("channels names nothing to bake", object="channels")
-    return settings
+    return BakeSettings.make(values)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
-from baker.core.options import Field
+from baker.core.settings_model import setting
 
 # The largest finite half.
 HALF_MAX = 65504.0
@@ -143,8 +143,8 @@ def decode_exr(path: Path) -> DecodedImage:
 class ExrOptions(EncodingOptions):
     """Number format and compression."""
 
-    dtype: Literal["half", "float"] = Field(default="half", description="Number format of the EXR files.")
-    exr_compression: Literal["zip", "piz"] = Field(default="zip", description="Compression of the EXR files.")
+    dtype: Literal["half", "float"] = setting("half", "Number format of the EXR files.")
+    exr_compression: Literal["zip", "piz"] = setting("zip", "Compression of the EXR files.")
 
 
 class ExrEncoding(Encoding[ExrOptions]):
@@ -154,8 +154,8 @@ class ExrEncoding(Encoding[ExrOptions]):
     components: tuple[int, ...] = tuple(range(1, MAX_COMPONENTS + 1))
     signed = True
     options_type = ExrOptions
-    when_clipped = "use --dtype float"
-    when_banded = "use --dtype float"
+    when_clipped = "use `dtype='float'`"
+    when_banded = "use `dtype='float'`"
 
     def options_of_image(self, image: DecodedImage) -> ExrOptions:
         """Return the number format of the image."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError, SettingsError
-from baker.core.options import Field, field_validator
+from baker.core.settings_model import Text, setting
 from baker.io.png import decode_png, encode_png
 
 GAMMA = 2.2
@@ -25,22 +25,25 @@ GAMMA = 2.2
 class RgbmOptions(EncodingOptions):
     """The value stored as all ones."""
 
-    rgbm_range: str = Field(
-        "auto", description="Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel."
+    rgbm_range: Text = setting(
+        "auto", "Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.", unit="lx"
     )
 
-    @field_validator("rgbm_range", mode="before")
-    @classmethod
-    def _check(cls, value: object) -> str:
-        text = str(value).strip()
+    def check(self) -> None:
+        """Raise `SettingsError` if the range is neither auto nor a number above 0."""
+        super().check()
         try:
-            fits = text == "auto" or 0 < float(text) < float("inf")
+            fits = self.is_auto or 0 < float(self.rgbm_range) < float("inf")
         except ValueError:
             fits = False
         if not fits:
-            why = f"rgbm_range '{value}' is neither auto nor a number of lx above 0"
+            why = f"rgbm_range '{self.rgbm_range}' is neither auto nor a number of lx above 0"
             raise SettingsError(why, object="rgbm_range")
-        return text
+
+    @property
+    def is_auto(self) -> bool:
+        """Return whether the value depends on the map."""
+        return self.rgbm_range.strip() == "auto"
 
     @property
     def top(self) -> float:
@@ -54,12 +57,12 @@ class RgbmEncoding(Encoding[RgbmOptions]):
     suffix = ".rgbm.png"
     components: tuple[int, ...] = (3,)
     options_type = RgbmOptions
-    when_clipped = "raise --rgbm-range or set it to auto"
-    when_banded = "lower --rgbm-range or use the EXR"
+    when_clipped = "raise `rgbm_range` or set it to auto"
+    when_banded = "lower `rgbm_range` or use the EXR"
 
     def fitted(self, options: RgbmOptions, brightest: float) -> RgbmOptions:
         """Replace `auto` by the map's largest value, or by 1 for a black map."""
-        if options.rgbm_range != "auto":
+        if not options.is_auto:
             return options
         return RgbmOptions(rgbm_range=repr(brightest if brightest > 0 else 1.0))
 

@@ -25,7 +25,7 @@ class BabylonExport:
                 "its glTF loader): `import { loadBake } from './babylon/lightmap.js';`",
                 "`await loadBake(BABYLON, 'babylon/', scene);` The file's lights are baked in, so off.",
                 "ZIP pages need fflate, which Babylon.js fetches from a CDN: serve it yourself with",
-                "`{ fflate: 'URL of fflate/umd/index.js' }`, or bake with `--exr-compression piz`.",
+                "`{ fflate: 'URL of fflate/umd/index.js' }`, or bake with `exr_compression='piz'`.",
             ),
             scale="EXR holds irradiance E in lx; unlit materials show albedo x E / pi, in cd/m2. "
             "`{ exposure: x }` multiplies all of it.",

@@ -212,7 +212,9 @@ def _native_path(library: Any) -> Path:
         path = folder / pattern
         if path.exists():
             return path
-    raise ResourceError(f"Open Image Denoise is not in {folder}: reinstall pyoidn or bake with --no-denoise")
+    raise ResourceError(
+        f"Open Image Denoise is not in {folder}: reinstall pyoidn or bake with `denoise=False`"
+    )
 
 
 def _library() -> Any:
@@ -223,14 +225,16 @@ def _library() -> Any:
         supported = bool(pyoidn.Device.is_cpu_available())
     except (ImportError, OSError, AttributeError) as error:
         raise ResourceError(
-            f"Open Image Denoise cannot be loaded ({error}): reinstall pyoidn or bake with --no-denoise"
+            f"Open Image Denoise cannot be loaded ({error}): reinstall pyoidn or bake with `denoise=False`"
         ) from error
     if not supported:
-        raise ResourceError("Open Image Denoise does not support this processor: bake with --no-denoise")
+        raise ResourceError("Open Image Denoise does not support this processor: bake with `denoise=False`")
     return pyoidn
 
 
 def _check(library: Any, device: Any) -> None:
     message = device.get_error()
     if message is not None:
-        raise ResourceError(f"Open Image Denoise failed ({message}): bake with --no-denoise or smaller pages")
+        raise ResourceError(
+            f"Open Image Denoise failed ({message}): bake with `denoise=False` or smaller pages"
+        )

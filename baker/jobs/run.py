@@ -195,7 +195,7 @@ class _Run:
 
         peak = estimate_peak(job.scene, job.settings)
         if peak > limit:
-            message = f"it needs about {size_words(peak)}, more than --memory {size_words(limit)}"
+            message = f"it needs about {size_words(peak)}, more than `memory` {size_words(limit)}"
             raise ResourceError(f"{message}; allow more, or lower resolution, density or max_pages")
         return peak
 
@@ -260,7 +260,7 @@ class _Run:
         self.finish(ticket, Outcome(ticket.job, "failed", str(told), seconds, error["code"]))
         if self.options.fail_fast:
             for other in self.waiting:
-                why = f"not run, since '{ticket.job.scene}' failed (--fail-fast)"
+                why = f"not run, since '{ticket.job.scene}' failed (`fail_fast`)"
                 self.outcomes[other.number] = Outcome(other.job, "failed", why, 0.0, error["code"])
             self.waiting.clear()
 

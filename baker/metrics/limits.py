@@ -1,4 +1,4 @@
-"""Limits on figures, as `--fail-if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+"""Limits on figures, as `fail_if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
 A limit names what must not be: it fails where its comparison is true. `bias` and the like are compared by
 their size, so that a bake too dark fails like one too bright.
@@ -85,18 +85,18 @@ def parse_limits(text: str, channels: Iterable[str], figures: Iterable[str]) -> 
         match = _LIMIT.fullmatch(part)
         if match is None:
             raise SettingsError(
-                f"'{part.strip()}' is not of the form channel.figure > number", object="--fail-if"
+                f"'{part.strip()}' is not of the form channel.figure > number", object="fail_if"
             )
         channel, figure, sign, number = match.groups()
         for what, name, known in (("channel", channel, channels), ("figure", figure, figures)):
             if name not in known:
-                raise unknown_name(what, name, known, object="--fail-if")
+                raise unknown_name(what, name, known, object="fail_if")
         try:
             value = float(number)
         except ValueError:
-            raise SettingsError(f"'{number}' is not a number", object="--fail-if") from None
+            raise SettingsError(f"'{number}' is not a number", object="fail_if") from None
         if value != value:
-            raise SettingsError("a limit of nan is never reached", object="--fail-if")
+            raise SettingsError("a limit of nan is never reached", object="fail_if")
         limits.append(Limit(channel, figure, sign, value))
     return limits
 

@@ -26,11 +26,11 @@ def parse_camera(text: str) -> Camera:
         px, py, pz, tx, ty, tz, fov = (float(part) for part in text.split(","))
     except ValueError:
         message = "seven numbers are needed: position x,y,z, target x,y,z, vertical field of view in degrees"
-        raise SettingsError(f"'{text[:60]}' is no camera; {message}", object="--camera") from None
+        raise SettingsError(f"'{text[:60]}' is no camera; {message}", object="camera") from None
     if not all(math.isfinite(v) for v in (px, py, pz, tx, ty, tz)):
-        raise SettingsError(f"'{text[:60]}' holds a number that is not finite", object="--camera")
+        raise SettingsError(f"'{text[:60]}' holds a number that is not finite", object="camera")
     if not 0 < fov < 180:
-        raise SettingsError("the field of view must be above 0 and below 180 degrees", object="--camera")
+        raise SettingsError("the field of view must be above 0 and below 180 degrees", object="camera")
     return look_at((px, py, pz), (tx, ty, tz), fov)
 
 
@@ -44,9 +44,9 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     """
     length = math.dist(target, position)
     if not length > 0:
-        raise SettingsError("position and target are the same point; move one", object="--camera")
+        raise SettingsError("position and target are the same point; move one", object="camera")
     if not math.isfinite(length):
-        raise SettingsError("position and target are too far apart", object="--camera")
+        raise SettingsError("position and target are too far apart", object="camera")
     forward = np.subtract(target, position) / length
     # Straight up or down +Y says nothing about what is up in the picture: -Z is.
     hint = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.99999 else np.array([0.0, 0.0, -1.0])

@@ -98,7 +98,7 @@ def bake(
             result = replace(result, out=folder, manifest=manifest)
     except MemoryError:
         raise ResourceError(
-            "memory ran out; lower --resolution or --samples, or bake fewer objects"
+            "memory ran out; lower `resolution` or `samples`, or bake fewer objects"
         ) from None
     return result
 

@@ -62,7 +62,7 @@ def _light(
     texels, sky = world.texels, np.array(settings.sky_radiance)
     if not scene.lights and not len(world.emitters.power) and not sky.any():
         record.warnings.append(
-            SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use --sky")
+            SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use `sky`")
         )
     with record.stage("direct light"):
         run = executor.runner("direct light", {"inside": world.inside})

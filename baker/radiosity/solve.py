@@ -153,7 +153,7 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
         return []
     message = (
         f"bounced light is exact to {100 * solution.patch_error:.2g} % only: the solve ended after"
-        f" {solution.iterations} iterations; lower base colours near 1 in closed rooms, or set --bounces"
+        f" {solution.iterations} iterations; lower base colours near 1 in closed rooms, or set `bounces`"
     )
     return [SceneWarning("solve-not-converged", message)]
 

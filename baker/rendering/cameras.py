@@ -33,7 +33,7 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
         return cameras[int(text)]
     if not cameras:
         message = "the file has no camera of its own; give seven numbers, PX,PY,PZ,TX,TY,TZ,FOV"
-        raise SettingsError(message, object="--camera")
+        raise SettingsError(message, object="camera")
     told = ", ".join(f"{number} '{camera.name}'" for number, camera in enumerate(cameras[:_TOLD]))
     more = f" and {len(cameras) - _TOLD} more (see baker inspect)" if len(cameras) > _TOLD else ""
     what = (
@@ -41,4 +41,4 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
         if found
         else f"no camera '{text}'"
     )
-    raise SettingsError(f"{what}; the file has {told}{more}", object="--camera")
+    raise SettingsError(f"{what}; the file has {told}{more}", object="camera")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera, Scene, SceneWarning
-from baker.core.settings import make_settings
 from baker.io.load import load_scene
 from baker.kernels.not_kept import cache_warnings
 from baker.pathtracer.camera import parse_camera
@@ -71,14 +69,13 @@ def render(
     # Seven numbers are judged before anything is loaded; a name needs the file.
     text = settings.camera
     camera = parse_camera(text) if text is not None and ("," in text or not text) else None
-    resolved = make_settings(_bake_settings(settings))
     if settings.denoise:
         from baker.finish.oidn import denoiser_name
 
         # Here, so that nobody waits for a picture that cannot be denoised.
         denoiser_name()
     warnings: list[SceneWarning] = []
-    baked, sky = None, resolved.sky_radiance
+    baked, sky = None, settings.sky_radiance
     if settings.lightmap is not None:
         baked = BakedLight.read(settings.lightmap)
         warnings = [*baked.bake.warnings]
@@ -93,7 +90,7 @@ def render(
     with build_reference(scene, sky=sky, threads=settings.threads) as reference:
         run = Run(reference, camera or _own_camera(scene, reference), settings, start, progress)
         if settings.ao:
-            estimate = openness(run, resolved.ao_reach(reference.geometry.diagonal))
+            estimate = openness(run, settings.ao_reach(reference.geometry.diagonal))
         elif baked is not None:
             estimate = lit_by(run, baked, sky)
         else:
@@ -123,16 +120,6 @@ def render(
     )
 
 
-def _bake_settings(settings: RenderSettings) -> dict[str, Any]:
-    """Return what a bake calls by the same names."""
-    found: dict[str, Any] = {"sky_strength": settings.sky_strength}
-    if settings.sky is not None:
-        found["sky"] = settings.sky
-    if settings.ao_distance is not None:
-        found["ao_distance"] = settings.ao_distance
-    return found
-
-
 def _own_camera(scene: Scene, reference: Reference) -> Camera:
     """Return the file's first camera.
 
@@ -154,6 +141,6 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
     digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
     numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(
-        f"the scene holds no perspective camera; name one, for a view of all: --camera {numbers}",
+        f"the scene holds no perspective camera; name one, for a view of all: `camera='{numbers}'`",
         file=None if scene.path is None else str(scene.path),
     )

@@ -1,87 +1,96 @@
-"""What a picture is to show, checked before any work."""
+"""The settings of a rendered picture."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
-from baker.pathtracer.estimators import estimator_named
+from baker.core.settings import BakeSettings, ao_metres
+from baker.core.settings_model import Names, Settings, Text, seed_setting, setting, threads_setting
 
 AOVS = ("albedo", "normal", "depth")
 DEFAULT_SPP = 64
 
 
-@dataclass(frozen=True)
-class RenderSettings:
-    """What is rendered.
+class RenderSettings(Settings):
+    """Holds the settings of a picture, checked."""
 
-    Attributes
-    ----------
-    camera : str or None
-        Numbers as `parse_camera` takes them, or the name or number of one of the file's own (`named_camera`);
-        None takes the file's first camera.
-    width, height : int
-    spp : int or None
-        Samples of each pixel, rounded up to whole passes, of which there are at least two; None renders until
-        the time limit (64 without one).
-    time_limit : float or None
-        Seconds from the start, loading included. Two passes are always made.
-    estimator : str
-    max_depth : int or None
-        Vertices of a path after the camera: 1 shows lamps and directly lit surfaces. None is unlimited.
-    ao : bool
-        Ambient occlusion instead of light; `ao_distance` in metres or per cent of the diagonal.
-    aov : tuple of str
-        Of `AOVS`.
-    denoise : bool
-    lightmap : Path or None
-        Output folder of a bake: the scene is lit by its maps, without any path.
-    sky : str or None
-        As `bake` takes it, with its strength; None with `lightmap` is the bake's own.
-    """
+    table: ClassVar[str] = "render"
+    what: ClassVar[str] = "render setting"
 
-    camera: str | None = None
-    width: int = 640
-    height: int = 480
-    spp: int | None = None
-    time_limit: float | None = None
-    estimator: str = "mis"
-    max_depth: int | None = None
-    ao: bool = False
-    ao_distance: str | None = None
-    aov: tuple[str, ...] = ()
-    denoise: bool = False
-    lightmap: Path | None = None
-    sky: str | None = None
-    sky_strength: float | str = 1.0
-    seed: int = 0
-    threads: int | None = None
+    camera: str | None = setting(
+        None,
+        "Position, target, vertical field of view in degrees; or one of the file's own; default: its first.",
+        metavar="PX,PY,PZ,TX,TY,TZ,FOV|NAME|NUMBER",
+    )
+    width: int = setting(640, "Width of the picture.", unit="pixels", ge=1, le=16384)
+    height: int = setting(480, "Height of the picture.", unit="pixels", ge=1, le=16384)
+    spp: int | None = setting(
+        None, "Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.", ge=1
+    )
+    time_limit: float | None = setting(
+        None,
+        "Stop after this time, loading included; two passes are always made.",
+        unit="s",
+        metavar="SECONDS",
+        gt=0,
+        allow_inf_nan=False,
+    )
+    estimator: str = setting(
+        "mis", "One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.", metavar="NAME"
+    )
+    max_depth: int | None = setting(
+        None, "Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.", ge=1
+    )
+    ao: bool = setting(False, "Render ambient occlusion.")
+    ao_distance: Text | None = setting(
+        None, "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
+    )
+    aov: Names = setting((), "Further layers: albedo, normal, depth.")
+    denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
+    lightmap: Path | None = setting(None, "Light the scene by this bake instead.", metavar="OUT")
+    sky: Text | None = setting(
+        None, "Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.", unit="cd/m2"
+    )
+    sky_strength: float = setting(1.0, "Factor on the sky.", ge=0, allow_inf_nan=False)
+    seed: int = seed_setting()
+    threads: int | None = threads_setting()
 
-    def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
-        for name in ("width", "height"):
-            if not 1 <= getattr(self, name) <= 16384:
-                raise SettingsError(f"--{name} must be 1 to 16384", object=name)
-        if self.spp is not None and self.spp < 1:
-            raise SettingsError("--spp must be at least 1", object="spp")
-        if self.time_limit is not None and not 0 < self.time_limit < math.inf:
-            raise SettingsError("--time-limit must be a number of seconds above 0", object="time_limit")
-        if self.max_depth is not None and self.max_depth < 1:
-            raise SettingsError("--max-depth must be at least 1", object="max_depth")
+    def check(self) -> None:
+        """Raise `SettingsError` for values that do not go together."""
         if self.ao and self.lightmap is not None:
-            raise SettingsError("--ao and --lightmap exclude each other", object="ao")
+            raise SettingsError("`ao` and `lightmap` exclude each other", object="ao")
         if self.max_depth is not None and (self.ao or self.lightmap is not None):
-            other = "--ao" if self.ao else "--lightmap"
-            raise SettingsError(f"--max-depth bounds paths; {other} traces none", object="max_depth")
-        if self.ao_distance is not None and not self.ao:
-            raise SettingsError("--ao-distance needs --ao", object="ao_distance")
-        estimator_named(self.estimator)
+            other = "`ao`" if self.ao else "`lightmap`"
+            raise SettingsError(f"`max_depth` bounds paths; {other} traces none", object="max_depth")
+        if self.ao_distance is not None:
+            if not self.ao:
+                raise SettingsError("`ao_distance` needs `ao`", object="ao_distance")
+            ao_metres(self.ao_distance, 1.0)
+        # Checks the sky.
+        self.sky_radiance  # noqa: B018
+        if self.estimator != "mis":
+            from baker.pathtracer.estimators import estimator_named
+
+            estimator_named(self.estimator)
         unknown = [name for name in self.aov if name not in AOVS]
         if unknown:
             raise unknown_name("AOV", unknown[0], AOVS, object="aov")
+
+    @property
+    def sky_radiance(self) -> tuple[float, float, float]:
+        """Return the constant sky's radiance in cd/m2 (black if none is set)."""
+        return BakeSettings(sky=self.sky, sky_strength=self.sky_strength).sky_radiance
+
+    def ao_reach(self, diagonal: float) -> float:
+        """Return the AO distance in metres for a scene of this diagonal (may be inf)."""
+        return (
+            BakeSettings().ao_reach(diagonal)
+            if self.ao_distance is None
+            else ao_metres(self.ao_distance, diagonal)
+        )
 
     @property
     def goal(self) -> int | None:

@@ -41,7 +41,7 @@ def check_image(path: Path, aov: Collection[str] = ()) -> None:
     if path.is_dir():
         raise SettingsError("this is a folder; name an image file", file=str(path))
     if aov and path.suffix.lower() != ".exr":
-        raise SettingsError("only an EXR takes the layers of --aov; name an .exr file", file=str(path))
+        raise SettingsError("only an EXR takes the layers of `aov`; name an .exr file", file=str(path))
     parent = next(p for p in path.resolve().parents if p.exists())
     if not parent.is_dir():
         raise SettingsError(f"'{parent}' is a file; the picture cannot lie in it", file=str(path))

@@ -25,31 +25,10 @@ from baker.repairs.mesh import repair_mesh
 from baker.repairs.meshlab import require_meshlab
 from baker.repairs.part import Part
 from baker.repairs.plan import Change, finish_part, plan_mesh
+from baker.repairs.settings import RepairSettings
 from baker.topology.triangle_check import face_normal, in_range
 
 STAGE = "mend"
-
-
-@dataclass(frozen=True)
-class MendSettings:
-    """How a scene is mended.
-
-    Attributes
-    ----------
-    resolution : int
-        Page width in texels at which lightmap uv are judged and made.
-    up, scale : str, float
-        Up axis and metres per unit of formats that do not say.
-    threads : int or None
-    repair : bool
-        Also mend the shape of meshes, with pymeshlab: non-manifold edges, holes, orientation, needles.
-    """
-
-    resolution: int = 1024
-    up: str = "y"
-    scale: float = 1.0
-    threads: int | None = None
-    repair: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,14 +98,14 @@ def _change_json(change: Change) -> dict[str, Any]:
     return told
 
 
-def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Progress = silent) -> Mended:
+def mend_file(path: Path, settings: RepairSettings | None = None, progress: Progress = silent) -> Mended:
     """Mend a scene file.
 
     Parameters
     ----------
     path : Path
         Of any format that is read. It is not changed.
-    settings : MendSettings
+    settings : RepairSettings
     progress : Progress
         Told the stage "mend"; a truthy answer stops the work.
 
@@ -143,6 +122,7 @@ def mend_file(path: Path, settings: MendSettings = MendSettings(), progress: Pro
     Cancelled
         If `progress` asks for it.
     """
+    settings = settings or RepairSettings()
     if settings.repair:
         require_meshlab()
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True)
@@ -176,7 +156,7 @@ def _and_then(first: Mended, second: Mended) -> Mended:
 def _mend(
     scene: Scene,
     data: bytes | None,
-    settings: MendSettings,
+    settings: RepairSettings,
     progress: Progress,
     *,
     make_normals: bool = True,

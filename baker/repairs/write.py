@@ -37,7 +37,7 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
                 "this is the input, which is never written over; name another file", file=str(out)
             )
         if not force:
-            raise SettingsError("the file exists; name another one, or add --force", file=str(out))
+            raise SettingsError("the file exists; name another one, or add `force=True`", file=str(out))
     parent = next(p for p in out.resolve().parents if p.exists())
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
         raise ResourceError("nothing can be written there; name another place", file=str(out))

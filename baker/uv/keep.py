@@ -92,7 +92,8 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
         name = instance.name or scene.meshes[instance.mesh].name
         if mode == "keep":
             raise InputError(
-                f"the lightmap uv cannot be kept, because {why}; repair it or use --uv auto or --uv unwrap",
+                f"the lightmap uv cannot be kept, because {why}; repair it or use `uv='auto'`"
+                " or `uv='unwrap'`",
                 file=str(scene.path) if scene.path else None,
                 object=name,
             )

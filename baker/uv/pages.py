@@ -115,7 +115,7 @@ def fill_pages(
         if pages is not None:
             if gap < settings.padding:
                 message = (
-                    f"padding {settings.padding} leaves no room, {gap} texels are kept; raise --resolution"
+                    f"padding {settings.padding} leaves no room, {gap} texels are kept; raise `resolution`"
                 )
                 warnings.append(SceneWarning("uv.padding_reduced", message))
             return pages, warnings
@@ -124,7 +124,7 @@ def fill_pages(
     area = float(outlines.shapes.area[outlines.item_shape].sum())
     start = settings.resolution * float(np.sqrt(0.25 * settings.max_pages / max(area, 1e-12)))
     pages = _fill_at(packer, start, names, settings.max_pages, [])
-    message = f"the charts do not fit one page, {len(pages)} are used; raise --resolution"
+    message = f"the charts do not fit one page, {len(pages)} are used; raise `resolution`"
     warnings.append(SceneWarning("uv.more_pages", message))
     return pages, warnings
 
@@ -244,10 +244,10 @@ def _too_many_charts(packer: _Packer, names: list[str], instance: NDArray[np.int
     count = first[instance + 1] - first[instance]
     if len(instance) > 1:
         return InputError(
-            f"{int(count.sum())} charts do not fit pages of {packer.page[0]} texels; raise --resolution"
+            f"{int(count.sum())} charts do not fit pages of {packer.page[0]} texels; raise `resolution`"
         )
     name = names[int(instance[0])]
     return InputError(
-        f"its {int(count.max())} charts do not fit pages of {packer.page[0]} texels; raise --resolution",
+        f"its {int(count.max())} charts do not fit pages of {packer.page[0]} texels; raise `resolution`",
         object=name,
     )

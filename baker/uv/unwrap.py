@@ -102,7 +102,7 @@ def _keep_all(scene: Scene, settings: BakeSettings, warnings: tuple[SceneWarning
         message = f"{close} texels of the kept uv have another chart within the padding of {settings.padding}"
         found.append(SceneWarning("uv.close", message))
     if settings.density is not None:
-        message = "the kept uv fills one page as it is; --density is not used"
+        message = "the kept uv fills one page as it is; `density` is not used"
         found.append(SceneWarning("uv.density_unused", message))
     return Atlas(settings.resolution, 1, tuple(layouts), n_charts, settings.padding, tuple(found))
 

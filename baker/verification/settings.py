@@ -1,46 +1,40 @@
-"""How much `verify` path-traces, and by what it judges."""
+"""The settings of a verification: how much is path-traced, and the limits on the figures."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import ClassVar
 
-from baker.core.errors import SettingsError
+from baker.core.settings_model import Settings, seed_setting, setting, threads_setting
+
+# Time limit of path tracing where neither samples nor a time are given, seconds.
+DEFAULT_TIME = 40.0
 
 
-@dataclass(frozen=True)
-class VerifySettings:
-    """How much is path-traced.
+class VerifySettings(Settings):
+    """Holds the settings of a verification, checked."""
 
-    Attributes
-    ----------
-    texels : int
-        Texels judged at their middles; points at edges and suspects come on top.
-    spp : int or None
-        Paths for each texel; None goes on until `target_se` or the time limit.
-    target_se : float
-        Relative standard error at which a texel is good enough.
-    time_limit : float or None
-        Seconds of path tracing.
-    fail_if : str or None
-        Limits; None takes those of `judgements.default_limits`.
-    seed, threads
-    """
+    table: ClassVar[str] = "verify"
+    what: ClassVar[str] = "verify setting"
 
-    texels: int = 2000
-    spp: int | None = None
-    target_se: float = 0.005
-    time_limit: float | None = 40.0
-    fail_if: str | None = None
-    seed: int = 0
-    threads: int | None = None
+    texels: int = setting(
+        2000, "Texels compared at their centres; points at edges and suspects come on top.", ge=1
+    )
+    spp: int | None = setting(None, "Paths for each texel, whatever its error.", ge=1)
+    target_se: float = setting(0.005, "Relative standard error at which a texel is good enough.", gt=0)
+    time_limit: float | None = setting(
+        None,
+        "Time for path tracing; default: 40 without `spp`, else none. `inf` is none.",
+        unit="s",
+        metavar="SECONDS",
+        gt=0,
+    )
+    fail_if: str | None = setting(None, 'Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".', metavar="EXPR")
+    seed: int = seed_setting()
+    threads: int | None = threads_setting()
 
-    def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
-        if self.texels < 1:
-            raise SettingsError("--texels must be at least 1", object="texels")
-        if self.spp is not None and self.spp < 1:
-            raise SettingsError("--spp must be at least 1", object="spp")
-        if not self.target_se > 0:
-            raise SettingsError("--target-se must be above 0", object="target_se")
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise SettingsError("--time-limit must be above 0", object="time_limit")
+    @property
+    def seconds(self) -> float | None:
+        """Return the time limit of path tracing in seconds, None without one."""
+        if self.time_limit is None:
+            return DEFAULT_TIME if self.spp is None else None
+        return None if self.time_limit == float("inf") else self.time_limit

@@ -181,7 +181,7 @@ def verify(
             evidence = _evidence(name, bake, geometry, pages, traced, settings)
             channels[name], rows[name] = _judge(evidence, settings.target_se, traced.estimates[name])
         worst = worst_texels(bake.scene.instances, bake.atlas.resolution, pixel, owner, position, channels)
-        spare = None if settings.time_limit is None else _CROP_TIME * settings.time_limit
+        spare = None if settings.seconds is None else _CROP_TIME * settings.seconds
         bounces = bake.manifest.get("settings", {}).get("bounces")
         crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)
     figures = {name: check.figures for name, check in channels.items()}
@@ -222,7 +222,7 @@ def _trace(
     report(progress, "start", 0.5, "points")
     points, air = choose_points(reference, bake, geometry, pages, names, settings)
     unjudged = measure_unjudged(reference, bake, geometry, pages, air, settings.seed)
-    deadline = None if settings.time_limit is None else time.monotonic() + settings.time_limit
+    deadline = None if settings.seconds is None else time.monotonic() + settings.seconds
     effort = Effort(settings.spp, settings.target_se, deadline, settings.seed, points.room)
     baked = bake.manifest.get("settings", {})
     estimates: dict[str, PointEstimate] = {}

@@ -23,7 +23,7 @@ _PLACES = (
     "build/three.min.js",
     "three.min.js",
 )
-_HELP = "`pip install jupyter-threejs-sage`, or `npm install three` and name its folder with --three"
+_HELP = "`pip install jupyter-threejs-sage`, or `npm install three` and name its folder with `three=PATH`"
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ def find_three(place: Path | None) -> ThreeScript:
     Returns
     -------
     ThreeScript
+        The file that the page loads, and whether it is a module.
 
     Raises
     ------

@@ -77,9 +77,16 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     Parameters
     ----------
     bake : StoredBake
+        The bake that the page shows.
     three : ThreeScript
+        The files of three.js that the page loads.
     port : int
         0 for any free one.
+
+    Returns
+    -------
+    ViewServer
+        `serve_forever` makes it answer.
 
     Raises
     ------
@@ -92,7 +99,7 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     except OSError as error:
         if error.errno not in (errno.EADDRINUSE, errno.EACCES):
             raise
-        message = f"port {port} is taken or not ours to use; name another with --port, or leave it out"
+        message = f"port {port} is taken or not ours to use; name another with `port`, or leave it out"
         raise ResourceError(message) from None
 
 

@@ -142,7 +142,7 @@ def test_what_cannot_be_exported_is_refused():
     check_exports(("gltf",), ("ao",))
     with pytest.raises(SettingsError, match="known are babylon, bevy"):
         check_exports(("cryengine",), ("irradiance",))
-    with pytest.raises(SettingsError, match="needs the channel irradiance; add it to --channels"):
+    with pytest.raises(SettingsError, match="needs the channel irradiance; add it to `channels`"):
         check_exports(("three",), ("ao",))
 
 

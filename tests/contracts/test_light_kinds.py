@@ -30,7 +30,8 @@ from baker.rendering.render import render
 from baker.rendering.settings import RenderSettings
 from baker.topology.solids import lights_and_cameras
 from baker.uv.unwrap import unwrap_scene
-from baker.verification import VerifySettings, verify
+from baker.verification.settings import VerifySettings
+from baker.verification.verify import verify
 
 SETTINGS = make_settings({"resolution": 64, "samples": 16, "denoise": False})
 OCCLUSION = make_settings({"resolution": 64, "samples": 16, "denoise": False, "channels": ("ao",)})

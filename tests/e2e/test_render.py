@@ -18,8 +18,9 @@ from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.png import decode_png
 from baker.pipeline.bake import bake
-from baker.rendering import RenderSettings, render
 from baker.rendering.passes import STAGE
+from baker.rendering.render import render
+from baker.rendering.settings import RenderSettings
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 CORNELL = ASSETS / "cornell.glb"

@@ -19,7 +19,9 @@ from baker.core.scene import Material, PunctualLight
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.pipeline.bake import bake
-from baker.verification import VerifySettings, tracing, verify
+from baker.verification import tracing
+from baker.verification.settings import VerifySettings
+from baker.verification.verify import verify
 
 QUICK = ["--texels", "400", "--spp", "256"]
 

@@ -14,7 +14,9 @@ from tiny_scenes import Quad, box_quads, grey, quad_scene
 from baker.cli.app import run
 from baker.core.settings import make_settings
 from baker.pipeline.bake import bake
-from baker.verification import VerifySettings, verification_json, verify
+from baker.verification.settings import VerifySettings
+from baker.verification.summary import verification_json
+from baker.verification.verify import verify
 
 QUICK = VerifySettings(texels=120, spp=128, time_limit=None)
 

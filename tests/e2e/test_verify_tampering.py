@@ -24,7 +24,8 @@ from baker.io.bake.read_bake import read_bake
 from baker.lights.emissive import build_emitters
 from baker.metrics.texel_area import instance_map, texel_places
 from baker.pipeline.bake import bake
-from baker.verification import VerifySettings, verify
+from baker.verification.settings import VerifySettings
+from baker.verification.verify import verify
 
 # The module, which the function of the same name hides.
 module = importlib.import_module("baker.verification.verify")
@@ -267,7 +268,7 @@ def test_single_wrong_texels_are_found(sound, surface, tmp_path):
     inside = np.argwhere(binary_erosion(covered(surface), np.ones((3, 3))))
     salt = inside[np.random.default_rng(1).permutation(len(inside))[:20]]
     pixels[salt[:, 0], salt[:, 1]] = pixels.max()
-    found = verify(tampered(sound, tmp_path, pixels), replace(SETTINGS, texels=200, spp=64))
+    found = verify(tampered(sound, tmp_path, pixels), SETTINGS.changed(texels=200, spp=64))
     assert "wrong_suspects" in failed(found)
 
 
@@ -300,7 +301,7 @@ def test_an_emitter_that_both_finders_forget_is_missed_all_the_same(tmp_path, mo
     for place in ("baker.pipeline.world", "baker.pathtracer.light_table"):
         monkeypatch.setattr(f"{place}.build_emitters", forgetful)
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
-    found = verify(tmp_path / "out", replace(SETTINGS, texels=300, spp=256))
+    found = verify(tmp_path / "out", SETTINGS.changed(texels=300, spp=256))
     # Only what rays meet at the lamp itself is left in the dim room of this bake.
     assert "region_bias" in failed(found)
     assert not found.passed

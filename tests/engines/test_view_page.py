@@ -32,7 +32,8 @@ from baker.core.colour import linear_from_srgb
 from baker.encodings.exr import decode_exr
 from baker.io.bake.read_bake import read_bake
 from baker.io.png import decode_palette_png
-from baker.viewer import find_three, make_server
+from baker.viewer.script import find_three
+from baker.viewer.server import make_server
 
 pytestmark = pytest.mark.engines
 # sRGB bytes may be rounded either way by the card, and by the texture unit before that.

@@ -92,7 +92,7 @@ def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
     "zero-area",
     group="geometry",
     severity="warning",
-    fix="dissolve degenerate faces (`--fix` drops them); a bake leaves them out",
+    fix="dissolve degenerate faces (`fix` drops them); a bake leaves them out",
 )
 def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area: a line or a point.
@@ -111,7 +111,7 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     "needle-faces",
     group="geometry",
     severity="info",
-    fix="remesh or retriangulate where these faces are (`--repair` can, for scans)",
+    fix="remesh or retriangulate where these faces are (`repair` can, for scans)",
 )
 def needle_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces less than a thousandth as high as long.
@@ -134,7 +134,7 @@ def needle_faces(context: CheckContext) -> Iterator[RawFinding]:
     "duplicate-faces",
     group="geometry",
     severity="warning",
-    fix="remove doubles (`--fix` drops them); a bake keeps the first of each",
+    fix="remove doubles (`fix` drops them); a bake keeps the first of each",
 )
 def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that repeat another one of the same mesh, corner by corner.

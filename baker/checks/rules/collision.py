@@ -21,7 +21,7 @@ _NAME = re.compile(
     "collision-hull",
     group="geometry",
     severity="warning",
-    fix="leave it out with --exclude, or rename it if it is to be seen",
+    fix="leave it out with `exclude`, or rename it if it is to be seen",
     in_bake=True,
 )
 def collision_hull(context: CheckContext) -> Iterator[RawFinding]:

@@ -123,13 +123,13 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
 
 
 @check(
-    "cost", group="cost", severity="info", fix="lower --resolution, --density or --quality if it is too much"
+    "cost", group="cost", severity="info", fix="lower `resolution`, `density` or `quality` if it is too much"
 )
 def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
     """What a bake with these settings will take: texels, pages, rays, memory, and time if it is known.
 
-    Time comes from an earlier bake: the one that `--rates OUT` names, else the latest of this scene in a
-    folder beside it; or, with `--cost` and no bake, from rays cast for one second. Else it is left out. It
+    Time comes from an earlier bake: the one that `rates` names, else the latest of this scene in a
+    folder beside it; or, with `cost` and no bake, from rays cast for one second. Else it is left out. It
     does not hold the unwrap, whose time hangs on the shapes. `objects` lists the 20 largest with their
     share of surface, which is their share of texels and nearly of the time.
     """

@@ -27,7 +27,7 @@ NOTES = {
     "skinned": ("info", "nothing to do, if the pose of the file is what is to be baked"),
     "transmission": ("warning", "give the material alphaMode BLEND and an alpha below 1"),
     "unknown-material": ("warning", "export the material with a base colour"),
-    "up-and-scale-ignored": ("info", "leave --up and --scale away for glTF"),
+    "up-and-scale-ignored": ("info", "leave `up` and `scale` away for glTF"),
 }
 
 

@@ -28,7 +28,7 @@ _WITNESSES = 8
     "inside-out",
     group="geometry",
     severity="error",
-    fix="flip the normals of this part (`--fix` does), or make the material double-sided",
+    fix="flip the normals of this part (`fix` does), or make the material double-sided",
     in_bake=True,
 )
 def inside_out(context: CheckContext) -> Iterator[RawFinding]:

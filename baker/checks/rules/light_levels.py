@@ -36,12 +36,12 @@ def all_black(context: CheckContext) -> Iterator[RawFinding]:
     "clips-half",
     group="light",
     severity="warning",
-    fix="lower the lights, move them away from surfaces, or bake with --dtype float",
+    fix="lower the lights, move them away from surfaces, or bake with `dtype='float'`",
 )
 def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     """Direct light over 65504 lx, the largest half float, at some of 512 points on the surfaces.
 
-    The map stores that number instead. With `--dtype float` nothing is clipped.
+    The map stores that number instead. With `dtype='float'` nothing is clipped.
     """
     levels = context.levels
     if levels is None:

@@ -29,7 +29,7 @@ FLOOR = 0.5
     "no-light",
     group="light",
     severity="warning",
-    fix="add a light or an emissive material, or bake with --sky; for AO alone use --channels ao",
+    fix="add a light or an emissive material, or bake with `sky`; for AO alone use `channels='ao'`",
 )
 def no_light(context: CheckContext) -> Iterator[RawFinding]:
     """A scene without any light, emissive surface or sky: its irradiance is black."""

@@ -27,7 +27,7 @@ def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
     "non-manifold-edges",
     group="geometry",
     severity="warning",
-    fix="split the mesh there, or delete the inner faces (`--repair` can)",
+    fix="split the mesh there, or delete the inner faces (`repair` can)",
 )
 def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Edges at which more than two faces meet.
@@ -96,7 +96,7 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
     "open-edges",
     group="geometry",
     severity="warning",
-    fix="merge vertices by distance and fill the holes (`--repair` fills small ones)",
+    fix="merge vertices by distance and fill the holes (`repair` fills small ones)",
 )
 def open_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Open edges in a mesh that is closed but for small holes.
@@ -161,7 +161,7 @@ def _hole_area(
     "flipped-neighbours",
     group="geometry",
     severity="warning",
-    fix="recalculate normals outside (`--fix` does, in closed meshes)",
+    fix="recalculate normals outside (`fix` does, in closed meshes)",
 )
 def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
     """Neighbouring faces wound in opposite directions.

@@ -126,7 +126,7 @@ def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     "duplicate-vertices",
     group="geometry",
     severity="info",
-    fix="merge equal vertices on export (`--fix` welds them): smaller files, the same picture",
+    fix="merge equal vertices on export (`fix` welds them): smaller files, the same picture",
 )
 def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Vertices that repeat another one of the same primitive in every attribute."""

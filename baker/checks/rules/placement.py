@@ -111,12 +111,12 @@ def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
     "scene-size",
     group="geometry",
     severity="warning",
-    fix="export in metres (--scale for OBJ, PLY, STL and OFF)",
+    fix="export in metres (`scale` for OBJ, PLY, STL and OFF)",
 )
 def scene_size(context: CheckContext) -> Iterator[RawFinding]:
     """A scene whose size suggests a wrong unit: a diagonal under 5 cm or over 5 km.
 
-    Intensities in candela fall off with metres, AO reaches metres, --density counts texels per metre.
+    Intensities in candela fall off with metres, AO reaches metres, `density` counts texels per metre.
     """
     diagonal = context.diagonal
     if diagonal > 0 and not SMALLEST <= diagonal <= LARGEST:

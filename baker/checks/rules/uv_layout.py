@@ -20,7 +20,7 @@ OVERLAP_TOLERANCE = 1e-3
 EDGE_SLACK = 0.05
 # Share of the surface without uv area above which the whole uv is useless.
 MOST_LOST = 0.01
-_UNWRAP = "unwrap the object anew (`--fix` does, a bake with --uv auto does so, too)"
+_UNWRAP = "unwrap the object anew (`fix` does, a bake with `uv='auto'` does so, too)"
 
 
 def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
@@ -45,7 +45,7 @@ def worst_first(faces: NDArray[np.int64], badness: NDArray[np.float64]) -> NDArr
 def missing(context: CheckContext) -> Iterator[RawFinding]:
     """Objects without a lightmap uv (TEXCOORD_1).
 
-    A bake unwraps them. With `--uv keep` that is an error.
+    A bake unwraps them. With `uv='keep'` that is an error.
     """
     severity = "error" if context.settings.uv == "keep" else None
     for m, facts in enumerate(context.meshes):

@@ -31,7 +31,7 @@ PALETTE_SHARE = 0.9
     "uv.tiny_chart",
     group="uv",
     severity="warning",
-    fix="give these charts more room, join them with neighbours, or raise --resolution",
+    fix="give these charts more room, join them with neighbours, or raise `resolution`",
 )
 def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that cover less than four texels.
@@ -80,7 +80,7 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
     fix="use 2^level texels and more between charts, or sample the lightmap without mipmaps",
 )
 def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that mix at the asked mip level (`--mip`, default 2).
+    """Charts that mix at the asked mip level (`mip`, default 2).
 
     At level n a texel stands for 2^n of the page. Only lightmaps that are sampled with mipmaps mind.
     """

@@ -57,7 +57,7 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
         _check_writable(folder, out)
         ours = own_files(folder)
         if ours is None and not force and any(folder.iterdir()):
-            message = "the folder holds files that baker did not write; name another one, or add --force"
+            message = "the folder holds files that baker did not write; name another one, or add `force=True`"
             raise SettingsError(f"{message} (they are kept)", file=str(out))
     except OSError as error:
         raise ResourceError(f"the folder cannot be read ({error.strerror})", file=str(out)) from None

@@ -21,6 +21,6 @@ FIGURE_NAMES = tuple(name for judgement in JUDGEMENTS for name in judgement.figu
 
 
 def default_limits(channels: Iterable[str]) -> str:
-    """Return the limits that a bake is held against unless others are given, as `--fail-if` writes them."""
+    """Return the limits that a bake is held against unless others are given, as `fail_if` takes them."""
     texts = [judgement.limits.get(name, "") for name in channels for judgement in JUDGEMENTS]
     return ", ".join(text for text in texts if text)

@@ -41,7 +41,7 @@ def judge(evidence: Evidence) -> Judged:
         "uncovered_share": f"{area.uncovered:.3g} m2 of {total:.3g} lie on texels without a measured value",
         "unresolved_share": (
             f"the reference of {evidence.channel} stayed too noisy to judge {noisy:.3g} m2 of {judged:.3g};"
-            " raise --time-limit"
+            " raise `time_limit`"
         ),
     }
     return Judged(figures, {name: text for name, text in remarks.items() if np.isfinite(figures[name])})

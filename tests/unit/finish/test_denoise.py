@@ -232,7 +232,7 @@ def test_a_missing_library_is_one_sentence(monkeypatch):
     broken = types.ModuleType("pyoidn")
     monkeypatch.setitem(sys.modules, "pyoidn", broken)
     monkeypatch.setitem(sys.modules, "pyoidn.capi", None)
-    with pytest.raises(ResourceError, match="--no-denoise"):
+    with pytest.raises(ResourceError, match="bake with `denoise=False`"):
         oidn.denoiser_name()
 
 

@@ -102,7 +102,7 @@ def test_memory_is_shared_and_what_never_fits_is_refused(jobs, monkeypatch):
     assert states(found) == "bbbfbb"
     assert found[3].code == 4
     assert "20" in found[3].why
-    assert "--memory 10" in found[3].why
+    assert "`memory` 10" in found[3].why
     assert bakery.most == 2
     assert sorted(bakery.log) == list("abcef")
 

@@ -14,12 +14,13 @@ from repair_scenes import PICTURE, away_from, box, drawn, random_builder, soup
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings import make_settings
 from baker.io.load import load_scene
-from baker.repairs.file import MendSettings, mend_file
+from baker.repairs.file import mend_file
+from baker.repairs.settings import RepairSettings
 from baker.repairs.write import check_fixed, write_fixed
 from baker.uv.unwrap import unwrap_scene
 
 SEEDS = range(24)
-QUICK = MendSettings(resolution=128)
+QUICK = RepairSettings(resolution=128)
 
 
 def mend_builder(builder: GltfBuilder, folder: Path):

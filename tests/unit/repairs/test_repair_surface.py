@@ -13,11 +13,12 @@ from repair_scenes import PICTURE, away_from, box, drawn, torus, volume
 
 from baker.core.errors import ResourceError
 from baker.repairs import meshlab
-from baker.repairs.file import MendSettings, mend_file
+from baker.repairs.file import mend_file
+from baker.repairs.settings import RepairSettings
 from baker.repairs.surface import Surface, distance
 from baker.repairs.winding import count_edges
 
-REPAIR = MendSettings(resolution=128, repair=True)
+REPAIR = RepairSettings(resolution=128, repair=True)
 
 
 def builder(position, triangle, **members) -> GltfBuilder:
@@ -253,7 +254,7 @@ def test_without_pymeshlab_there_is_one_sentence(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(ResourceError, match="pip install pymeshlab"):
         mend_file(path, REPAIR)
-    assert mend_file(path, MendSettings()).fixed
+    assert mend_file(path, RepairSettings()).fixed
 
 
 def test_pymeshlab_is_never_loaded_unasked(tmp_path):

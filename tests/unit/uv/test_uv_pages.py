@@ -79,7 +79,7 @@ def test_padding_gives_way_before_pages_do():
 
 
 def test_more_charts_than_all_pages_hold_are_refused():
-    with pytest.raises(InputError, match="raise --resolution"):
+    with pytest.raises(InputError, match="raise `resolution`"):
         unwrap_scene(boxes(60), make_settings({"resolution": 16, "max_pages": 2}))
 
 

@@ -13,9 +13,11 @@ from view_bake import PLAIN_AT, SIZE, make_bake, plain_uv
 
 from baker.core.errors import InputError, ResourceError
 from baker.io.bake.read_bake import read_bake
-from baker.viewer import find_three, make_server, script
+from baker.viewer import script
 from baker.viewer.page_data import page_numbers
 from baker.viewer.scene_data import scene_data
+from baker.viewer.script import find_three
+from baker.viewer.server import make_server
 
 
 @pytest.fixture(scope="module")

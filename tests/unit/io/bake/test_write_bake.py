@@ -338,7 +338,7 @@ def test_further_encodings_lie_beside_the_exr(tmp_path: Path) -> None:
     assert rgbm["clipped"] == int((value > 40).any(axis=2).sum()) > 5
     assert [w["message"] for w in manifest["warnings"] if w["code"] == "clipped"] == [
         f"irradiance_0.rgbm.png: {rgbm['clipped']} texels are outside the range of the format "
-        "and were clipped; raise --rgbm-range or set it to auto"
+        "and were clipped; raise `rgbm_range` or set it to auto"
     ]
 
 

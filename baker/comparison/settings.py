@@ -1,0 +1,20 @@
+"""The settings of a comparison of two bakes."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from baker.core.settings_model import Settings, seed_setting, setting, threads_setting
+
+
+class DiffSettings(Settings):
+    """Holds the settings of a comparison, checked."""
+
+    table: ClassVar[str] = "diff"
+    what: ClassVar[str] = "diff setting"
+
+    texels: int = setting(20000, "Texels of A to compare.", ge=1)
+    flip: bool = setting(True, "Compare pages as pictures, too, with the measure FLIP.")
+    fail_if: str | None = setting(None, 'Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".', metavar="EXPR")
+    seed: int = seed_setting()
+    threads: int | None = threads_setting()

@@ -1,0 +1,26 @@
+"""The settings of fixes and repairs."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from baker.core.settings_model import Settings, setting, threads_setting
+
+
+class RepairSettings(Settings):
+    """Holds the settings of fixes and repairs, checked."""
+
+    table: ClassVar[str] = "repair"
+    what: ClassVar[str] = "repair setting"
+
+    repair: bool = setting(
+        False,
+        "Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers"
+        " (needs pip install pymeshlab).",
+    )
+    resolution: int = setting(
+        1024, "Page width for which lightmap uv are tested and made.", unit="texels", ge=16, le=16384
+    )
+    up: Literal["y", "z"] = setting("y", "Up axis of OBJ, PLY, STL and OFF files.")
+    scale: float = setting(1.0, "Metres per unit of OBJ, PLY, STL and OFF files.", unit="m", gt=0)
+    threads: int | None = threads_setting()

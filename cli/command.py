@@ -1,0 +1,189 @@
+"""The decorator of commands: adds the flags of settings, and does what all commands do before they work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, make_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TextIO, TypeVar, cast
+
+import typer
+from typer.core import TyperCommand
+
+from baker.cli.commands import COMMANDS
+from baker.cli.fields import flag_of, help_of, is_repeated, is_switch, metavar_of
+from baker.cli.flags import FlagStream
+from baker.core.settings_model import Settings
+
+if TYPE_CHECKING:
+    from baker.cli.progress import Reporter
+    from baker.cli.session import Session
+
+_S = TypeVar("_S", bound=Settings)
+
+
+@dataclass
+class Run:
+    """One command line, parsed: `ctx.obj` of a command.
+
+    Attributes
+    ----------
+    session : Session
+    as_json, quiet : bool
+    verbose : int
+    given : dict
+        Settings that were on the command line.
+    settings : dict
+        The settings by their model, from defaults, configuration file and command line.
+    """
+
+    session: Session
+    as_json: bool
+    quiet: bool
+    verbose: int
+    given: dict[str, Any]
+    settings: dict[type[Settings], Settings]
+
+    def of(self, model: type[_S]) -> _S:
+        """Return the settings of one model."""
+        return cast("_S", self.settings[model])
+
+    @contextmanager
+    def progress(self) -> Iterator[Reporter]:
+        """Show progress; begins with the stage "start", since importing the kernels takes a moment."""
+        with self.session.reporter(quiet=self.quiet) as reporter:
+            reporter("start", 0.0)
+            yield reporter
+
+    @property
+    def text(self) -> TextIO:
+        """Return the stream for the command's text; settings in it are written as flags."""
+        return cast("TextIO", FlagStream(self.session.text_stream(as_json=self.as_json)))
+
+
+# Flags of every command.
+_COMMON: list[tuple[str, Any, Any]] = [
+    (
+        "as_json",
+        Annotated[bool, typer.Option("--json", help="One JSON object on stdout; text goes to stderr.")],
+        False,
+    ),
+    ("quiet", Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")], False),
+    (
+        "verbose",
+        Annotated[
+            int,
+            typer.Option(
+                "--verbose", "-v", count=True, show_default=False, help="Print more; -vv shows tracebacks."
+            ),
+        ],
+        0,
+    ),
+]
+_CONFIG = Annotated[Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")]
+
+# `--cluster`, of the commands that can work on more than one machine.
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Work on a dask.distributed cluster: tcp://HOST:8786, or local:N for N processes here.",
+    ),
+]
+
+
+def command(
+    name: str, *models: type[Settings], fixed: dict[str, Any] | None = None
+) -> Callable[[Callable[..., None]], Callable[[], Any]]:
+    """Make a subcommand of a function with a typer signature.
+
+    Parameters
+    ----------
+    name : str
+        Of the subcommand, as in `commands.COMMANDS`.
+    *models : type of Settings
+        Models whose fields become flags; of fields with the same name the first counts.
+        With a model that has a table, `--config` is a flag as well.
+    fixed : dict, optional
+        Settings that have this value and no flag.
+
+    Returns
+    -------
+    callable
+        A decorator. The function it makes returns the subcommand; the function it takes is called with the
+        context, whose `obj` is a `Run`, and its own arguments.
+    """
+    fixed = fixed or {}
+
+    def decorate(work: Callable[..., None]) -> Callable[[], Any]:
+        def make() -> Any:
+            app = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+            app.command(name, cls=_SettingsCommand, help=COMMANDS[name])(work)
+            made = typer.main.get_command(app)
+            assert isinstance(made, _SettingsCommand)
+            made.add_settings(models, fixed)
+            return made
+
+        return make
+
+    return decorate
+
+
+class _SettingsCommand(TyperCommand):
+    """Is a command with the flags of settings beside its own."""
+
+    models: tuple[type[Settings], ...] = ()
+    fixed: dict[str, Any]
+
+    def add_settings(self, models: tuple[type[Settings], ...], fixed: dict[str, Any]) -> None:
+        """Append the flags of `models` and the common ones, without those of `fixed`."""
+        self.models, self.fixed = models, fixed
+        fields = {
+            name: field
+            for model in reversed(models)
+            for name, field in model.model_fields.items()
+            if name not in fixed
+        }
+        ordered = dict.fromkeys(name for model in models for name in model.model_fields if name in fields)
+        flags: list[tuple[str, Any, Any]] = [
+            ("config", _CONFIG, None) for _ in [0] if any(model.table for model in models)
+        ]
+        flags += [(name, _annotation(name, fields[name]), None) for name in ordered]
+        # typer reads a signature; that of a dataclass is made of its fields.
+        holder = make_dataclass("Flags", [*flags, *_COMMON], kw_only=True)
+        app = typer.Typer(add_completion=False)
+        app.command()(holder)
+        self.params += typer.main.get_command(app).params
+        self.flag_names = [name for name, _, _ in flags]
+
+    def invoke(self, ctx: Any) -> Any:
+        """Resolve settings and call the command with its own arguments."""
+        from baker.cli.config import resolve
+
+        session: Session = ctx.obj
+        values = ctx.params
+        given = {name: values.pop(name, None) for name in self.flag_names}
+        config = given.pop("config", None)
+        given = {name: value for name, value in given.items() if value not in (None, [], ())}
+        ctx.obj = Run(
+            session=session,
+            as_json=values.pop("as_json") or session.as_json,
+            quiet=values.pop("quiet"),
+            verbose=values.pop("verbose"),
+            given=given,
+            settings=resolve(self.models, {**given, **self.fixed}, config),
+        )
+        return super().invoke(ctx)
+
+
+def _annotation(name: str, field: Any) -> Any:
+    """Return the annotation of a flag: None if it is not given, else a value that the model checks."""
+    if is_switch(field):
+        option = typer.Option(flag_of(name, field), help=help_of(field), show_default=False)
+        return Annotated[bool | None, option]
+    option = typer.Option(
+        flag_of(name, field), help=help_of(field), metavar=metavar_of(field), show_default=False
+    )
+    return Annotated[list[str] | None if is_repeated(field) else str | None, option]

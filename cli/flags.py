@@ -1,0 +1,133 @@
+"""Names of settings in messages of the library, written as flags of the command line.
+
+The library names a setting or an argument between backticks, with a value in the form of Python:
+"raise `resolution`", "pass `denoise=False`", "use `dtype='float'`".
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any, TextIO
+
+_NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
+# Arguments of commands that are no settings.
+_ARGUMENTS = frozenset({
+    "cluster", "config", "fail_fast", "fix", "force", "jobs", "junit", "memory", "out", "port", "report",
+    "sarif", "three",
+})  # fmt: skip
+# Arguments whose flag is another word.
+_SHORT = {"out": "-o"}
+# The name of an export, too: a flag only with a value.
+_AMBIGUOUS = "three"
+
+
+@cache
+def flag_names() -> frozenset[str]:
+    """Return the names of all settings and arguments that have a flag.
+
+    Returns
+    -------
+    frozenset of str
+        With underscores.
+    """
+    from baker.checks.settings import CheckSettings
+    from baker.comparison.settings import DiffSettings
+    from baker.core.settings import BakeSettings
+    from baker.rendering.settings import RenderSettings
+    from baker.repairs.settings import RepairSettings
+    from baker.verification.settings import VerifySettings
+
+    models = (BakeSettings, CheckSettings, DiffSettings, RenderSettings, RepairSettings, VerifySettings)
+    return _ARGUMENTS.union(*(model.model_fields for model in models))
+
+
+def in_flags(text: str, quote: str = "") -> str:
+    """Return a message of the library with its settings as flags.
+
+    Parameters
+    ----------
+    text : str
+        With settings between backticks.
+    quote : str
+        Written before and after each flag.
+
+    Returns
+    -------
+    str
+        "raise --resolution" for "raise `resolution`".
+    """
+
+    def flag(found: re.Match[str]) -> str:
+        return f"{quote}{_flag(found[1], found[2])}{quote}" if _is_named(found) else found[0]
+
+    return _NAMED.sub(flag, text)
+
+
+def in_keys(text: str) -> str:
+    """Return a message of the library with its settings in quotes, as keys of a configuration file.
+
+    Parameters
+    ----------
+    text : str
+        With settings between backticks.
+
+    Returns
+    -------
+    str
+        "'resolution' is above 16384" for "`resolution` is above 16384".
+    """
+    return _NAMED.sub(lambda found: f"'{found[1]}'" if _is_named(found) else found[0], text)
+
+
+def values_in_flags(value: Any) -> Any:
+    """Return plain values (dicts, lists, texts, numbers) with `in_flags` applied to each text.
+
+    Parameters
+    ----------
+    value : object
+        What `--json` prints.
+
+    Returns
+    -------
+    object
+        Of the same shape.
+    """
+    if isinstance(value, str):
+        return in_flags(value)
+    if isinstance(value, dict):
+        return {key: values_in_flags(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [values_in_flags(item) for item in value]
+    return value
+
+
+class FlagStream:
+    """Writes texts of the library to a stream with settings as flags.
+
+    Parameters
+    ----------
+    stream : TextIO
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text; settings between backticks become flags."""
+        return self._stream.write(in_flags(text))
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        self._stream.flush()
+
+
+def _is_named(found: re.Match[str]) -> bool:
+    return found[1] in flag_names() and (found[1] != _AMBIGUOUS or found[2] is not None)
+
+
+def _flag(name: str, value: str | None) -> str:
+    if value == "False":
+        return "--no-" + name.replace("_", "-")
+    flag = _SHORT.get(name, "--" + name.replace("_", "-"))
+    return flag if value in (None, "True") else f"{flag} {str(value).strip(chr(39))}"

@@ -1,0 +1,114 @@
+"""The library names settings, the command line turns the names into flags; no library text names a flag."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from baker.cli.flags import flag_names, in_flags, in_keys, values_in_flags
+from baker.core.errors import SettingsError
+from baker.core.settings import BakeSettings
+from baker.rendering.settings import RenderSettings
+from baker.verification.settings import VerifySettings
+
+BAKER = Path(__file__).parents[2] / "baker"
+FLAG = re.compile(r"(?<![\w-])--[a-z]")
+# Flags of other programs, and Python files that other programs run.
+OTHERS = ("blender --python",)
+
+
+def texts(path):
+    """Yield (line, text) of the string literals of a file, without the docstrings of those that have one."""
+    tree = ast.parse(path.read_text("utf-8"))
+    docs = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
+            docs.add(id(node.body[0].value))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            yield node.lineno, node.value
+
+
+def flags_in(path):
+    for line, text in texts(path):
+        for other in OTHERS:
+            text = text.replace(other, "")
+        if FLAG.search(text):
+            yield line, text
+
+
+def test_no_text_of_the_library_names_a_flag():
+    found = [
+        f"{path.relative_to(BAKER)}:{line} {text}"
+        for path in sorted(BAKER.rglob("*.py"))
+        if "templates" not in path.parts
+        for line, text in flags_in(path)
+    ]
+    assert found == []
+
+
+def test_a_flag_in_a_text_is_seen(tmp_path):
+    path = tmp_path / "a.py"
+    path.write_text(
+        '"""Of `--json`."""\nx = f"lower --resolution {1}"\ny = "a -- b"\nz = "blender --python x"\n'
+    )
+    assert [line for line, _ in flags_in(path)] == [2]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("raise `resolution`", "raise --resolution"),
+        ("bake with `denoise=False`", "bake with --no-denoise"),
+        ("use `dtype='float'` or `exr_compression`", "use --dtype float or --exr-compression"),
+        ("write elsewhere with `out`, or add `force=True`", "write elsewhere with -o, or add --force"),
+        ("`camera='1,2,-3e2,0,0,0,45'`", "--camera 1,2,-3e2,0,0,0,45"),
+        (
+            "lights whose `range` ends, `three`, `pip install x`",
+            "lights whose `range` ends, `three`, `pip install x`",
+        ),
+        ("name its folder with `three=PATH`", "name its folder with --three PATH"),
+    ],
+)
+def test_settings_in_messages_become_flags(text, shown):
+    assert in_flags(text) == shown
+    assert values_in_flags({"a": [text, 1, None], "`seed`": {"b": (text,)}}) == {
+        "a": [shown, 1, None],
+        "`seed`": {"b": [shown]},
+    }
+
+
+def test_settings_in_messages_become_keys():
+    assert in_keys("`max_depth` bounds paths; `range`") == "'max_depth' bounds paths; `range`"
+    assert {"resolution", "time_limit", "fail_on", "flip", "camera", "repair", "out"} <= flag_names()
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "words"),
+    [
+        (BakeSettings, {"resolution": 3}, ["`resolution`", "16", "(was 3)"]),
+        (BakeSettings, {"resolutoin": 64}, ["did you mean 'resolution'"]),
+        (BakeSettings, {"ao-distance": 1, "ao_distance": 2}, ["twice"]),
+        (VerifySettings, {"texels": 0}, ["`texels`", "1"]),
+        (RenderSettings, {"ao": True, "lightmap": "x"}, ["`ao` and `lightmap` exclude each other"]),
+    ],
+)
+def test_a_wrong_setting_is_a_settings_error_that_names_it(model, values, words):
+    with pytest.raises(SettingsError) as caught:
+        model(**values)
+    assert all(word in caught.value.message for word in words), caught.value.message
+    with pytest.raises(SettingsError) as caught:
+        model.make(values, file="a.toml")
+    assert caught.value.file == "a.toml"
+
+
+def test_changed_settings_are_checked():
+    settings = VerifySettings(texels=5, spp=7)
+    assert settings.changed(spp=8) == VerifySettings(texels=5, spp=8)
+    assert (settings.seconds, VerifySettings().seconds) == (None, 40.0)
+    assert VerifySettings(time_limit="inf").seconds is None
+    with pytest.raises(SettingsError):
+        settings.changed(spp=0)
