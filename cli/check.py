@@ -21,7 +21,7 @@ from baker.repairs.settings import RepairSettings
 if TYPE_CHECKING:
     from baker.checks.run import CheckReport
     from baker.checks.scenes import Unreadable
-    from baker.repairs.file import Mended
+    from baker.repairs.fix_file import FixResult
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class _Checked:
     reports: list[CheckReport]
     unreadable: list[Unreadable]
     request: FixRequest | None
-    fixed: Mended | None
+    fixed: FixResult | None
 
 
 @command("check", BakeSettings, CheckSettings, RepairSettings)

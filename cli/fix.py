@@ -10,8 +10,8 @@ from baker.core.errors import SettingsError
 
 if TYPE_CHECKING:
     from baker.core.progress import Progress
-    from baker.repairs.file import Mended
-    from baker.repairs.plan import Change
+    from baker.repairs.fix_file import FixResult
+    from baker.repairs.mesh_plan import Change
     from baker.repairs.settings import RepairSettings
 
 
@@ -55,31 +55,31 @@ def fix_request(
     return FixRequest(scenes[0], out, settings)
 
 
-def fix_scene(request: FixRequest, progress: Progress) -> Mended:
+def fix_scene(request: FixRequest, progress: Progress) -> FixResult:
     """Fix a scene and write the result."""
-    from baker.repairs.file import mend_file
+    from baker.repairs.fix_file import fix_file
     from baker.repairs.write import write_fixed
 
-    result = mend_file(request.scene, request.settings, progress)
+    result = fix_file(request.scene, request.settings, progress)
     write_fixed(request.out, result.data)
     return result
 
 
-def write_fixed_text(result: Mended, request: FixRequest, stream: TextIO) -> None:
+def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> None:
     """Write what was fixed and what was left alone, a line each."""
     for fix in result.fixed:
         change = fix.change
         stream.write(
-            f"{request.scene}: mended: {change.change}: '{fix.object}' (node {fix.node})"
+            f"{request.scene}: fixed: {change.change}: '{fix.object}' (node {fix.node})"
             f" {change.counted}: {change.before} -> {change.after}{_more(change)}\n"
         )
     for left in result.left_alone:
         stream.write(f"{request.scene}: left alone: '{left.object}' (node {left.node}) {left.reason}\n")
     if not result.fixed:
-        stream.write(f"{request.scene}: nothing to mend\n")
+        stream.write(f"{request.scene}: nothing to fix\n")
 
 
-def fixed_json(result: Mended, request: FixRequest) -> dict[str, Any]:
+def fixed_json(result: FixResult, request: FixRequest) -> dict[str, Any]:
     """Return the keys that a fix adds to `--json`."""
     return {**result.json(), "out": str(request.out)}
 

@@ -1,1 +1,1 @@
-"""Rewrites the meshes of a file where that keeps their look: `baker check --fix` and `--repair`."""
+"""Fixes and repairs of the meshes of a file: `baker check --fix` and `--repair`."""

@@ -1,4 +1,4 @@
-"""Finds the closed parts that look inwards although nothing is in them, as `baker check` does."""
+"""Finds the closed parts that `baker check` reports as inside out, as faces to flip."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ from baker.core.scene import Scene
 from baker.core.settings import make_settings
 
 
-def faces_to_turn(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
-    """Return the faces of parts that are inside out: by mesh, for each primitive a (T,) bool.
+def faces_to_flip(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
+    """Return the faces of parts that are inside out: by mesh, for each primitive a (T,) bool mask.
 
     Parameters
     ----------
     scene : Scene
-        Read leniently. Meshes without such faces are not in the answer.
+        Read leniently.
+
+    Returns
+    -------
+    dict of int to list of (T,) bool
+        Only of meshes that have such faces.
     """
     context = CheckContext(scene, make_settings({}))
     found: dict[int, list[NDArray[np.bool_]]] = {}

@@ -1,9 +1,9 @@
-"""Unwraps meshes anew whose own lightmap uv (TEXCOORD_1) cannot carry a lightmap."""
+"""Unwraps meshes whose own lightmap uv (TEXCOORD_1) cannot hold a lightmap."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,84 +11,108 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.progress import Progress
 from baker.core.scene import Instance, Material, Mesh, Scene
-from baker.core.settings import make_settings
+from baker.core.settings import BakeSettings, make_settings
 from baker.core.source_mesh import SourceInstance
-from baker.repairs.plan import Change, MeshPlan
+from baker.repairs.mesh_plan import Change, MeshPlan
 from baker.topology.triangle_check import duplicates, usable_vertices
 from baker.uv.keep import find_fault
 from baker.uv.unwrap import unwrap_scene
 
-# Texels across which an object is unwrapped at least, however small a share of the scene it is.
+# Smallest page in texels for which an object is unwrapped, whatever its share of the scene.
 _SMALLEST = 64
 
 
+@dataclass(frozen=True)
+class UvRequest:
+    """For what lightmap page uv are tested and made.
+
+    Attributes
+    ----------
+    resolution : int
+        Page width in texels.
+    share : float
+        The mesh's part of the scene's area, 0 to 1: it will get about this part of a page.
+    threads : int or None
+    """
+
+    resolution: int
+    share: float
+    threads: int | None
+
+    def unwrap_settings(self) -> BakeSettings:
+        """Return the settings that unwrap the mesh for its part of a page, a multiple of 16 texels wide."""
+        width = min(self.resolution, max(_SMALLEST, 16 * round(self.resolution * np.sqrt(self.share) / 16)))
+        return make_settings({"resolution": width, "uv": "unwrap", "threads": self.threads})
+
+
 def new_lightmap_uv(
-    plan: MeshPlan,
-    shown: Sequence[SourceInstance],
-    share: float,
-    *,
-    resolution: int,
-    threads: int | None,
-    progress: Progress,
+    plan: MeshPlan, shown: Sequence[SourceInstance], request: UvRequest, progress: Progress
 ) -> tuple[MeshPlan, list[NDArray[np.float32]] | None]:
-    """Judge the TEXCOORD_1 of what is left of a mesh, and make a new one if it fails.
+    """Test the TEXCOORD_1 of the faces that stay of a mesh, and make a new one if it fails.
 
     Parameters
     ----------
     plan : MeshPlan
     shown : sequence of SourceInstance
-        The nodes that show the mesh; it is cut for the first one's scale.
-    share : float
-        The mesh's part of the scene's area, 0 to 1: it will get about this part of a page.
-    resolution : int
-        Page width in texels.
-    threads : int or None
+        The nodes that show the mesh; it is unwrapped for the scale of the first one.
+    request : UvRequest
     progress : Progress
 
     Returns
     -------
     plan : MeshPlan
-        With what was changed, or why it was not.
+        With the change, or the reason why there is none.
     uv : list of (T, 3, 2) float32, for each primitive, or None
     """
-    if not any(1 in part.part.arrays.texcoord for part in plan.parts):
+    if not any(1 in edit.primitive.arrays.texcoord for edit in plan.edits):
         return plan, None
     mesh = _mesh(plan)
     if mesh is None:
         return plan, None
-    # A bake leaves doubles out, so they do not count as overlap.
+    # A bake leaves duplicates out, so they do not count as overlap.
     single = ~duplicates(mesh.position, mesh.triangle.astype(np.int64), mesh.material, np.zeros(1, bool))
-    fault = find_fault(replace(mesh, triangle=mesh.triangle[single]), resolution)
+    fault = find_fault(replace(mesh, triangle=mesh.triangle[single]), request.resolution)
     if fault is None:
         return plan, None
     stays = f"its lightmap uv stay, though {fault[1]}: "
-    locked = next((part.part.locked for part in plan.parts if part.part.locked), "")
+    obstacle = _obstacle(plan)
+    if obstacle:
+        return _left(plan, stays + obstacle), None
+    try:
+        uv = _unwrap(mesh, shown[0], request, progress)
+    except InputError as error:
+        return _left(plan, f"{stays}it cannot be unwrapped ({error.message})"), None
+    again = find_fault(_replaced(mesh, uv, single), request.resolution)
+    if again is not None:
+        return _left(plan, f"{stays}unwrapped again, {again[1]}"), None
+    change = Change("lightmap-uv", f"lightmap uv of which {fault[1].removeprefix('its ')}", 1, 0)
+    ends = np.cumsum([len(edit.triangle) for edit in plan.edits])[:-1]
+    return replace(plan, changes=(*plan.changes, change)), np.split(uv, ends)
+
+
+def _obstacle(plan: MeshPlan) -> str:
+    """Return why the TEXCOORD_1 of a mesh must stay, as the end of a sentence; empty if it need not."""
+    locked = next((edit.primitive.locked for edit in plan.edits if edit.primitive.locked), "")
     if locked:
-        return _left(plan, stays + locked), None
-    if any(part.part.reads_lightmap_uv for part in plan.parts):
-        return _left(
-            plan, f"{stays}a texture of its material reads them; a bake makes others beside them"
-        ), None
-    side = min(resolution, max(_SMALLEST, 16 * round(resolution * np.sqrt(share) / 16)))
-    settings = make_settings({"resolution": side, "uv": "unwrap", "threads": threads})
+        return locked
+    if any(edit.primitive.reads_lightmap_uv for edit in plan.edits):
+        return "a texture of its material reads them; a bake makes others beside them"
+    return ""
+
+
+def _unwrap(
+    mesh: Mesh, instance: SourceInstance, request: UvRequest, progress: Progress
+) -> NDArray[np.float32]:
+    """Return new uv of a mesh unwrapped alone, (T, 3, 2) float32."""
     alone = Scene(
         name=mesh.name,
         path=None,
         meshes=(mesh,),
         materials=(Material(),),
-        instances=(Instance(0, shown[0].name, 0, shown[0].world_from_object),),
+        instances=(Instance(0, instance.name, 0, instance.world_from_object),),
     )
-    try:
-        layout = unwrap_scene(alone, settings, progress).layouts[0]
-    except InputError as error:
-        return _left(plan, f"{stays}it cannot be unwrapped ({error.message})"), None
-    uv = layout.uv[layout.triangle]
-    again = find_fault(_replaced(mesh, uv, single), resolution)
-    if again is not None:
-        return _left(plan, f"{stays}unwrapped anew, {again[1]}"), None
-    change = Change("lightmap-uv", f"lightmap uv of which {fault[1].removeprefix('its ')}", 1, 0)
-    ends = np.cumsum([len(part.triangle) for part in plan.parts])[:-1]
-    return replace(plan, changes=(*plan.changes, change)), np.split(uv, ends)
+    layout = unwrap_scene(alone, request.unwrap_settings(), progress).layouts[0]
+    return layout.uv[layout.triangle]
 
 
 def _left(plan: MeshPlan, reason: str) -> MeshPlan:
@@ -96,29 +120,24 @@ def _left(plan: MeshPlan, reason: str) -> MeshPlan:
 
 
 def _mesh(plan: MeshPlan) -> Mesh | None:
-    """Return what is left of a mesh for unwrapping; None if its coordinates are unusable."""
-    parts = plan.parts
-    start = np.cumsum([0] + [len(part.part.arrays.position) for part in parts[:-1]])
-    position = np.concatenate([part.part.arrays.position for part in parts])
-    triangle = np.concatenate([part.triangle + s for part, s in zip(parts, start, strict=True)])
+    """Return the faces that stay of a mesh, for unwrapping; None if their coordinates are unusable."""
+    arrays = [edit.primitive.arrays for edit in plan.edits]
+    start = np.cumsum([0] + [len(a.position) for a in arrays[:-1]])
+    position = np.concatenate([a.position for a in arrays])
+    triangle = np.concatenate([edit.triangle + s for edit, s in zip(plan.edits, start, strict=True)])
     if not usable_vertices(position)[triangle].all():
         return None
-    uv = np.concatenate(
-        [
-            part.part.arrays.texcoord.get(1, np.zeros((len(part.part.arrays.position), 2), np.float32))
-            for part in parts
-        ]
-    )
+    uv = np.concatenate([a.texcoord.get(1, np.zeros((len(a.position), 2), np.float32)) for a in arrays])
     zero_t, zero_v = np.zeros(len(triangle), np.int32), np.zeros(len(position), np.int32)
     row = np.arange(len(position), dtype=np.int32)
-    # Normals play no part in unwrapping.
+    # Unwrapping does not use normals.
     normal = np.zeros_like(position)
     corner = triangle.astype(np.int32)
     return Mesh("", position, normal, corner, zero_t, zero_t, zero_v, row, (None, uv))
 
 
 def _replaced(mesh: Mesh, uv: NDArray[np.float32], single: NDArray[np.bool_]) -> Mesh:
-    """Return the mesh's faces marked `single`, with a vertex for each corner and other lightmap uv."""
+    """Return the faces that the (T,) mask selects, with one vertex per corner and (T, 3, 2) lightmap uv."""
     flat = np.arange(3 * len(mesh.triangle), dtype=np.int32).reshape(-1, 3)[single]
     position = mesh.position[mesh.triangle].reshape(-1, 3)
     return replace(mesh, position=position, triangle=flat, texcoord=(None, uv.reshape(-1, 2)))

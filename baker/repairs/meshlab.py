@@ -1,7 +1,7 @@
-"""Repairs of surfaces by MeshLab's filters; the only file that knows pymeshlab.
+"""Repairs of surfaces by MeshLab's filters; the only file that imports pymeshlab.
 
-pymeshlab is under the GPL and no part of baker: it is loaded here, when a repair was asked for, and at no
-other time. All meshes here have one vertex for each place.
+pymeshlab is under the GPL and no part of baker: it is imported here only, and only when a repair was asked
+for. All meshes here have one vertex for each position.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 
-# Points on a surface at which its distance from another is measured.
+# Number of points on a surface at which its distance from another is measured.
 _DISTANCE_SAMPLES = 20000
 
 
 def require_meshlab() -> None:
-    """Make sure that repairs are possible.
+    """Check that repairs are possible.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def require_meshlab() -> None:
 
 
 def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Choose faces so that no edge belongs to more than two: the smallest at such an edge go.
+    """Choose faces so that no edge belongs to more than two: the smallest ones at such an edge are removed.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) ->
     return keep
 
 
-def orient_by_sight(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell which faces to turn so that fronts look to where more can be seen, (T,) bool."""
+def orient_by_visibility(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which faces to flip so that their fronts look to the side where more can be seen, (T,) bool."""
     _, new, origin = _apply(position, triangle, "meshing_re_orient_faces_by_geometry", rays=64)
     flip = np.zeros(len(triangle), bool)
     old = triangle[origin]
-    # Turned faces may also start at another corner.
+    # Flipped faces may also start at another corner.
     start = np.argmax(new == old[:, :1], axis=1)
     flip[origin] = np.take_along_axis(new, ((start + 1) % 3)[:, None], axis=1)[:, 0] != old[:, 1]
     return flip
@@ -61,7 +61,7 @@ def orient_by_sight(position: NDArray[np.float32], triangle: NDArray[np.int64]) 
 def close_holes(
     position: NDArray[np.float32], triangle: NDArray[np.int64], most_edges: int
 ) -> NDArray[np.int64]:
-    """Return (K, 3) int64 new faces, of vertices that exist, over holes of at most `most_edges` edges."""
+    """Return (K, 3) int64 new faces, of existing vertices, over holes of at most `most_edges` edges."""
     _, face, origin = _apply(
         position, triangle, "meshing_close_holes", maxholesize=most_edges, refinehole=False
     )
@@ -75,8 +75,15 @@ def remesh(
 
     Parameters
     ----------
+    position : (P, 3) float32
+    triangle : (T, 3) int64
     edge_length : float
-        Length aimed at, in units of the positions.
+        Target length, in units of the positions.
+
+    Returns
+    -------
+    position : (P', 3) float32
+    triangle : (T', 3) int64
 
     Notes
     -----
@@ -96,16 +103,21 @@ def remesh(
     return vertex, face
 
 
-def furthest(
+def largest_distance(
     sampled: tuple[NDArray[np.float32], NDArray[np.int64]],
     target: tuple[NDArray[np.float32], NDArray[np.int64]],
 ) -> float:
-    """Return the furthest that a point of one surface is from another: half a Hausdorff distance.
+    """Return the largest distance of a point of one surface from another: a one-sided Hausdorff distance.
 
     Parameters
     ----------
     sampled, target : (position (P, 3) float32, triangle (T, 3) int64)
-        Measured at all vertices of the sampled faces and on a grid of some 20 000 points, always the same.
+        Measured at all vertices of the sampled faces and at about 20 000 points of a fixed grid on them.
+
+    Returns
+    -------
+    float
+        In units of the positions; 0 without sampled faces.
     """
     if not len(sampled[1]):
         return 0.0
@@ -129,23 +141,23 @@ def transfer(
     position: NDArray[np.float32],
     triangle: NDArray[np.int64],
     value: NDArray[np.float32],
-    place: NDArray[np.float32],
+    point: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Return values at places near a surface, from the nearest points of its faces.
+    """Return values at points near a surface, from the nearest points of its faces.
 
     Parameters
     ----------
     position : (P, 3) float32
     triangle : (T, 3) int64
     value : (P, C) float32
-    place : (Q, 3) float32
+    point : (Q, 3) float32
 
     Returns
     -------
     (Q, C) float32
     """
     library = _library()
-    out = np.zeros((len(place), value.shape[1]), np.float32)
+    out = np.zeros((len(point), value.shape[1]), np.float32)
     for channel in range(value.shape[1]):
         meshes = library.MeshSet()
         meshes.add_mesh(
@@ -155,7 +167,7 @@ def transfer(
                 v_scalar_array=value[:, channel].astype(np.float64),
             )
         )
-        meshes.add_mesh(library.Mesh(vertex_matrix=place.astype(np.float64)))
+        meshes.add_mesh(library.Mesh(vertex_matrix=point.astype(np.float64)))
         meshes.apply_filter(
             "transfer_attributes_per_vertex",
             sourcemesh=0,
@@ -169,7 +181,7 @@ def transfer(
 
 
 def _points_on(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return points on faces, denser on larger ones, corners included, (N, 3) float64."""
+    """Return points on (T, 3) faces, in proportion to area, corners included, (N, 3) float64."""
     corner = position[triangle].astype(np.float64)
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     # A grid of n steps along each side has about n^2 / 2 points.
@@ -195,7 +207,7 @@ def _library() -> Any:
 
 
 def _mesh(library: Any, position: NDArray[np.float32], triangle: NDArray[np.int64]) -> Any:
-    """Return a mesh whose faces carry their number plus one: new faces carry 0."""
+    """Return a mesh whose face scalars are the face number plus one, so that new faces have 0."""
     return library.Mesh(
         vertex_matrix=position.astype(np.float64),
         face_matrix=triangle.astype(np.int32),
@@ -206,7 +218,7 @@ def _mesh(library: Any, position: NDArray[np.float32], triangle: NDArray[np.int6
 def _apply(
     position: NDArray[np.float32], triangle: NDArray[np.int64], filter_name: str, **parameters: Any
 ) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
-    """Run one filter; return vertices, faces, and the face that each was before (-1 for new ones)."""
+    """Run one filter; return vertices, faces, and the old number of each face (-1 for new ones)."""
     library = _library()
     meshes = library.MeshSet()
     meshes.add_mesh(_mesh(library, position, triangle))
@@ -214,7 +226,7 @@ def _apply(
         meshes.apply_filter(filter_name, **parameters)
     except library.PyMeshLabException as error:
         raise ResourceError(f"MeshLab's {filter_name} gave up: {error}", object="pymeshlab") from None
-    # The arrays are copied here: a mesh does not outlive its set.
+    # Copy the arrays: the mesh is freed with its set.
     mesh = meshes.current_mesh()
     mesh.compact()
     return (

@@ -1,6 +1,6 @@
-"""Makes vertex normals where the file has none, or none that say anything.
+"""Makes vertex normals where the file has none, or none with a direction.
 
-Without normals a face is flat (glTF 2.0, 3.7.2.1), so flat normals are what every renderer shows already.
+A primitive without normals is flat-shaded (glTF 2.0, 3.7.2.1), so flat normals change nothing visible.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from baker.topology.triangle_check import face_normal
 
-# Difference from 1 that a normal's length may have: what single precision and sloppy exporters leave.
+# Deviation of a normal's length from 1 that is left as it is: rounding to single precision or short decimals.
 LENGTH_SLACK = 1e-2
 
 
@@ -23,13 +23,13 @@ class NormalChoice:
     Attributes
     ----------
     corner : (T, 3, 3) float32, unit, or None
-        None if the file's own can stay as they are.
+        None: the file's own normals stay.
     n_missing : int
-        Vertices that had no normal at all.
+        Vertices without a normal.
     n_empty : int
-        Vertices whose normal was not finite or had no length.
+        Vertices whose normal is not finite or has no length.
     n_long : int
-        Vertices whose normal pointed somewhere but was not of unit length.
+        Vertices whose normal has a direction but not unit length.
     """
 
     corner: NDArray[np.float32] | None
@@ -48,18 +48,23 @@ def choose_normals(
     triangle: NDArray[np.int64],
     normal: NDArray[np.float32] | None,
     *,
-    exact: bool,
+    is_float: bool,
 ) -> NormalChoice:
     """Return normals for the corners of faces.
 
     Parameters
     ----------
     position : (V, 3) float32
-    triangle : (T, 3) int64, with area
+    triangle : (T, 3) int64
+        Faces with area.
     normal : (V, 3) float32 or None
         As the file has them.
-    exact : bool
-        The file stores floats; shorter numbers cannot have unit length and are not judged by it.
+    is_float : bool
+        The file stores float32. Normalized integers cannot have unit length, and their length is not tested.
+
+    Returns
+    -------
+    NormalChoice
     """
     used = np.unique(triangle)
     if normal is None:
@@ -69,7 +74,7 @@ def choose_normals(
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.sqrt((given * given).sum(axis=1))
         empty = ~(np.isfinite(length) & (length > 1e-12))
-        long = ~empty & (np.abs(length - 1.0) > LENGTH_SLACK) if exact else np.zeros(len(given), bool)
+        long = ~empty & (np.abs(length - 1.0) > LENGTH_SLACK) if is_float else np.zeros(len(given), bool)
     n_empty, n_long = int(empty[used].sum()), int(long[used].sum())
     if not n_empty and not n_long:
         return NormalChoice(None)
@@ -78,12 +83,13 @@ def choose_normals(
     out[empty] = 0.0
     corner = out[triangle]
     if n_empty:
+        # Replace empty normals by the area-weighted mean of the vertex's faces.
         face = face_normal(position, triangle)
         smooth = np.zeros_like(given)
         for axis in range(3):
             smooth[:, axis] = np.bincount(triangle.ravel(), np.repeat(face[:, axis], 3), minlength=len(given))
         size = np.bincount(triangle.ravel(), np.repeat(np.linalg.norm(face, axis=1), 3), minlength=len(given))
-        # Faces that cancel out leave no direction: each corner takes the normal of its own face then.
+        # Where the faces cancel out, each corner takes the normal of its own face.
         lost = np.linalg.norm(smooth, axis=1) <= 1e-6 * size
         made = np.where(lost[triangle][..., None], face[:, None, :], smooth[triangle])
         filled = _unit(made.reshape(-1, 3)).reshape(-1, 3, 3).astype(np.float32)
@@ -92,7 +98,8 @@ def choose_normals(
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    # By the largest component first, so that squares of tiny or huge vectors stay in range.
+    """Return (N, 3) vectors at unit length; zero ones stay zero."""
+    # Divide by the largest component first: squares of tiny or huge components leave the exponent's range.
     scaled = vector / np.maximum(np.abs(vector).max(axis=1, keepdims=True, initial=0.0), 1e-300)
     length = np.sqrt((scaled * scaled).sum(axis=1, keepdims=True))
     return np.asarray(scaled / np.maximum(length, 1e-300))

@@ -1,8 +1,8 @@
-"""Turns the faces of closed pieces so that all of them look the same way.
+"""Finds faces of closed pieces that are wound against the others.
 
 A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
-Which side its faces should look to is read from what the file says of it: from the vertex normals if they
-take sides, else from the larger part of the faces as they are.
+The front is the side that the vertex normals point to if they clearly agree, else the side that the larger
+part of the faces has already.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected, number_by_first
 
-# Share of a piece's area by which normals have to lean to one side to be believed.
+# Mean of sign(normal . front) over a piece's area, in absolute value, above which the normals decide.
 _CLEAR = 0.5
 
 
 @dataclass(frozen=True)
 class Winding:
-    """What is wrong with the winding of a mesh's faces.
+    """Defects of the winding of a mesh's faces.
 
     Attributes
     ----------
     flip : (T,) bool
-        Faces to be turned.
+        Faces to be flipped.
     n_pieces : int
-        Closed pieces with faces to be turned.
+        Closed pieces with faces to be flipped.
     n_one_sided : int
         Closed pieces that cannot be wound consistently (like a Klein bottle).
     """
@@ -37,7 +37,7 @@ class Winding:
     n_one_sided: int
 
 
-def judge_winding(
+def find_wrong_winding(
     position: NDArray[np.float32],
     corner: NDArray[np.int64],
     normal: NDArray[np.float32] | None,
@@ -49,13 +49,12 @@ def judge_winding(
     Parameters
     ----------
     position : (P, 3) float32
-        One row for each place: corners in the same place have the same number.
     corner : (T, 3) int64
-        Places of each face's corners, all different.
+        Rows of `position` of each face's corners, all different; equal positions have the same number.
     normal : (T, 3) float32 or None
         Mean of the vertex normals of each face, zero where the file has none.
     open_too : bool
-        Judge open pieces as well, of which no edge belongs to more than two faces.
+        Include open pieces of which no edge belongs to more than two faces.
 
     Returns
     -------
@@ -70,14 +69,14 @@ def judge_winding(
     first_side, one_sided = _orient(edge, n, closed_face)
     n_pieces_all = int(piece.max()) + 1
     faulty = np.bincount(piece, one_sided, n_pieces_all) > 0
-    judged = closed_face & ~faulty[piece]
+    tested = closed_face & ~faulty[piece]
 
     a, b, c = (position[corner[:, k]].astype(np.float64) for k in range(3))
     double_area = np.cross(b - a, c - a)
-    # All faces as their piece's first face has it.
+    # +1: wound like the piece's first face, -1: against it.
     sign = np.where(first_side, 1.0, -1.0)
     area = np.linalg.norm(double_area, axis=1)
-    # Volume under each face as seen from a corner of its own piece, where little is lost to rounding.
+    # Signed volume of each piece, relative to one of its own corners to lose few digits.
     anchor = np.zeros((n_pieces_all, 3))
     anchor[piece[::-1]] = a[::-1]
     a, b, c = (p - anchor[piece] for p in (a, b, c))
@@ -88,27 +87,41 @@ def judge_winding(
     if normal is not None:
         agree = np.sign(np.einsum("ij,ij->i", double_area, normal.astype(np.float64)))
         by_normal = np.bincount(piece, sign * area * agree, n_pieces_all) / total
-    # +1: the first face's side is the right one; a tie goes to the outside.
+    # +1: the first face's winding is right. By normals, else by area, else outwards.
     outside = np.where(volume >= 0, 1.0, -1.0)
     leaning = np.where(np.abs(as_wound) > 1e-9, np.sign(as_wound), outside)
     right = np.where(np.abs(by_normal) > _CLEAR, np.sign(by_normal), leaning)
-    flip = judged & (sign != right[piece])
+    flip = tested & (sign != right[piece])
     turned = np.bincount(piece, flip, n_pieces_all) > 0
     return Winding(flip, int(turned.sum()), int((closed & faulty).sum()))
 
 
 def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how many of the faces (T, 3) each of their edges belongs to, (E,) int64."""
+    """Return the number of (T, 3) faces at each of their edges, (E,) int64."""
     return _Edges(corner).count
 
 
 class _Edges:
-    """The edges of triangles, sorted so that equal ones are neighbours."""
+    """The edges of (T, 3) triangles, sorted so that equal ones are neighbours.
+
+    Attributes
+    ----------
+    face : (3T,) int64
+        Face of each sorted half edge.
+    rising : (3T,) bool
+        The face runs along the edge from the lower vertex to the higher one.
+    number : (3T,) int64
+        Edge of each half edge.
+    count : (E,) int64
+        Faces at each edge.
+    second : (K,) int64
+        Half edges that follow another one of the same edge.
+    """
 
     def __init__(self, corner: NDArray[np.int64]) -> None:
         start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
-        n_places = int(corner.max(initial=0)) + 1
-        key = np.minimum(start, end) * n_places + np.maximum(start, end)
+        n_vertices = int(corner.max(initial=0)) + 1
+        key = np.minimum(start, end) * n_vertices + np.maximum(start, end)
         order = np.argsort(key, kind="stable")
         ordered = key[order]
         self.face = order // 3
@@ -117,11 +130,13 @@ class _Edges:
         new[1:] = ordered[1:] != ordered[:-1]
         self.number = np.cumsum(new) - 1
         self.count = np.bincount(self.number)
-        # Rows where an edge is the same as in the row before.
         self.second = np.flatnonzero(~new)
 
     def pieces(self, n_faces: int, *, open_too: bool) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the piece of each face, and which pieces are closed (or at least have no crowded edge)."""
+        """Return the (T,) piece of each face, and the (P,) mask of closed pieces.
+
+        With `open_too`, pieces without an edge of more than two faces count as closed.
+        """
         a, b = self.face[self.second - 1], self.face[self.second]
         piece = _components(a, b, n_faces)
         good = self.count <= 2 if open_too else self.count == 2
@@ -134,11 +149,12 @@ class _Edges:
 def _orient(
     edge: _Edges, n: int, closed_face: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which faces are wound like the first of their piece, and which belong to one-sided pieces.
+    """Return the (n,) masks of faces wound like the first of their piece, and of faces of one-sided pieces.
 
-    Each face stands in a graph twice, once for each way round. Neighbours that run along their edge in
-    opposite directions agree, so that equal ways hang together; else opposite ways do. A piece that can be
-    oriented falls into two halves, one for each side.
+    A graph has two nodes for each face: as it is (f), and flipped (f + n). Neighbours that run along their
+    edge in opposite directions agree, so f is connected to g and f + n to g + n; otherwise f to g + n and
+    f + n to g. A piece that can be oriented consists of two components, one for each side; in a one-sided
+    piece f and f + n are connected.
     """
     second = edge.second[closed_face[edge.face[edge.second]]]
     a, b = edge.face[second - 1], edge.face[second]
@@ -149,7 +165,7 @@ def _orient(
         2 * n,
     )
     one_sided = label[:n] == label[n:]
-    # Labels are numbered by first occurrence, and faces as they are come first.
+    # Components are numbered by first occurrence, and unflipped faces come first.
     return label[:n] < label[n:], one_sided
 
 

@@ -1,4 +1,4 @@
-"""Writes a mended scene so that it is either whole or not there, and never over anything a user made."""
+"""Writes a fixed scene completely or not at all, and never over a file without being asked."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from baker.io.temporary import write_atomically
 
 
 def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
-    """Make sure, before the work, that a mended scene may be written to `out`.
+    """Check, before the work, that a fixed scene may be written to `out`.
 
     Parameters
     ----------
     out : Path
+        The GLB to write.
     scene : Path
         The input, which is never written over.
     force : bool
@@ -28,7 +29,7 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
         If nothing can be written there.
     """
     if out.suffix.lower() != ".glb":
-        raise SettingsError("a mended scene is a GLB; name a file that ends in .glb", file=str(out))
+        raise SettingsError("a fixed scene is a GLB; name a file that ends in .glb", file=str(out))
     if out.is_dir():
         raise SettingsError("this is a folder; name a .glb file", file=str(out))
     if out.exists():
@@ -44,11 +45,18 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
 
 
 def write_fixed(out: Path, data: bytes) -> None:
-    """Write a mended scene in one step.
+    """Write a fixed scene in one step.
+
+    Parameters
+    ----------
+    out : Path
+        The file.
+    data : bytes
+        The GLB.
 
     Raises
     ------
     ResourceError
-        If it cannot be written; what was there before is as it was.
+        If it cannot be written; a file that was there is unchanged.
     """
-    write_atomically(out, data, "mended scene")
+    write_atomically(out, data, "fixed scene")

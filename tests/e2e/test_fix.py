@@ -76,7 +76,7 @@ def room(tmp_path):
     return write(tmp_path / "room.glb", spoiled_room())
 
 
-def test_the_mended_file_bakes_to_the_same_picture(room, tmp_path):
+def test_the_fixed_file_bakes_to_the_same_picture(room, tmp_path):
     fixed = tmp_path / "fixed.glb"
     code, _ = check(room, "--fix", "-o", fixed, "-q")
     assert code == 0
@@ -100,7 +100,7 @@ def test_the_mended_file_bakes_to_the_same_picture(room, tmp_path):
             assert b.mean() == pytest.approx(a.mean(), rel=0.03)
 
 
-def test_json_tells_what_was_mended_and_what_is_left(room, tmp_path):
+def test_json_lists_what_was_fixed_and_what_is_left(room, tmp_path):
     code, text = check(room, "--fix", "-o", tmp_path / "fixed.glb", "--json", "-q")
     told = json.loads(text)
     assert code == 0
@@ -115,15 +115,15 @@ def test_json_tells_what_was_mended_and_what_is_left(room, tmp_path):
     assert told["left_alone"] == []
     assert told["out"] == str(tmp_path / "fixed.glb")
     # The same codes are no longer found.
-    mended = {"zero-area", "duplicate-faces", "duplicate-vertices", "missing-normals", "uv-overlap"}
+    fixable = {"zero-area", "duplicate-faces", "duplicate-vertices", "missing-normals", "uv-overlap"}
     _, before = check(room, "--json", "-q")
-    assert mended & {f["code"] for f in json.loads(before)["findings"]}
-    assert not mended & {f["code"] for f in told["findings"]}
+    assert fixable & {f["code"] for f in json.loads(before)["findings"]}
+    assert not fixable & {f["code"] for f in told["findings"]}
 
 
 def test_text_names_every_change(room, tmp_path):
     _, text = check(room, "--fix", "-o", tmp_path / "fixed.glb")
-    assert "mended: duplicate-faces: 'floor' (node 0) faces: 4 -> 2" in text
+    assert "fixed: duplicate-faces: 'floor' (node 0) faces: 4 -> 2" in text
     assert f"{tmp_path / 'fixed.glb'}: passed" in text
 
 
@@ -158,7 +158,7 @@ def test_repair_tells_how_far_the_surface_moved(tmp_path):
     scene = write(tmp_path / "scan.glb", b)
     code, text = check(scene, "--repair", "-o", tmp_path / "fixed.glb")
     assert code == 0
-    line = next(line for line in text.splitlines() if "mended: remeshed" in line)
+    line = next(line for line in text.splitlines() if "fixed: remeshed" in line)
     assert "'scan' (node 0) faces: 600 -> " in line
     assert "the surface moved by up to 0.00" in line
     assert line.endswith("TEXCOORD_0 could not be kept")
@@ -172,8 +172,8 @@ def test_repair_without_its_library_is_one_sentence(room, tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
-def test_third_party_scenes_are_mended_once(path, tmp_path):
-    """Each comes out readable, with every material as it was; a second time there is nothing left to mend."""
+def test_third_party_scenes_are_fixed_once(path, tmp_path):
+    """Each comes out readable, with every material as it was; a second time there is nothing left to fix."""
     first, second = tmp_path / "first.glb", tmp_path / "second.glb"
     code, text = check(path, "--fix", "-o", first, "--json", "-q", "--resolution", "256")
     assert code in (0, 1), text

@@ -11,10 +11,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Place, RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
+from baker.topology.slivers import find_slivers
 from baker.topology.triangle_check import usable_vertices
-
-# Height over longest side of a face that counts as a needle.
-NEEDLE = 1e-3
 
 
 def faces_found(
@@ -108,26 +106,24 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
 
 
 @check(
-    "needle-faces",
+    "sliver-faces",
     group="geometry",
     severity="info",
     fix="remesh or retriangulate where these faces are (`repair` can, for scans)",
 )
-def needle_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces less than a thousandth as high as long.
+def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
+    """Faces less than a fiftieth as high as long.
 
-    Their normals are mostly rounding and unwrapping makes slivers of them, which own hardly a texel.
+    A sliver has hardly a texel of its own: at a length of 50 texels it is less than one texel high. The
+    thinner it is, the more its normal consists of rounding. By the same limit, `--repair` remeshes meshes of
+    500 faces or more of which a tenth are slivers.
     """
     for m, facts in _each(context):
         if not len(facts.good):
             continue
-        corner = facts.corner
-        longest = np.max(
-            [np.linalg.norm(corner[:, (k + 1) % 3] - corner[:, k], axis=1) for k in range(3)], axis=0
-        )
-        bad = facts.good[2.0 * facts.area < NEEDLE * longest**2]
+        bad = facts.good[find_slivers(facts.corner)]
         if len(bad):
-            yield faces_found(context, m, bad, "{some} thinner than a thousandth of their length")
+            yield faces_found(context, m, bad, "{some} less than a fiftieth as high as long")
 
 
 @check(

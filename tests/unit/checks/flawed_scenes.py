@@ -183,7 +183,7 @@ FAR_CUBE = np.concatenate([CUBE, CUBE + np.float32([1, 1, 1])])
 TWO_CUBES = np.concatenate([CUBE_TRIANGLE, CUBE_TRIANGLE + 8])
 FLIPPED = GRID_TRIANGLE.copy()
 FLIPPED[0] = FLIPPED[0, ::-1]
-ROD, ROD_TRIANGLE = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.0005, 0]]), np.int64([[0, 1, 2]])
+ROD, ROD_TRIANGLE = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.019, 0]]), np.int64([[0, 1, 2]])
 WIDE = np.float32([[0, 0, 0], [8, 0, 0], [8, 1, 0], [0, 1, 0]])
 SMALL = np.float32(FLOOR * 0.5 + [0, 0.5, 0])
 LAMP = {**GREY, "emissiveFactor": [1, 1, 1]}
@@ -193,7 +193,7 @@ CASES: dict[str, Case] = {
     "index-range": Case(scene((QUAD, [[0, 1, 2], [0, 2, 9]])), scene((QUAD, QUAD_TRIANGLE))),
     "bad-vertices": Case(scene((_nan(QUAD), [[0, 1, 2], [1, 2, 3]])), scene((QUAD, [[0, 1, 2], [1, 2, 3]]))),
     "zero-area": Case(scene((QUAD, [[0, 1, 2], [0, 2, 2]])), scene((QUAD, QUAD_TRIANGLE))),
-    "needle-faces": Case(scene((ROD, ROD_TRIANGLE)), scene((ROD * np.float32([1, 4, 1]), ROD_TRIANGLE))),
+    "sliver-faces": Case(scene((ROD, ROD_TRIANGLE)), scene((ROD * np.float32([1, 1.1, 1]), ROD_TRIANGLE))),
     "duplicate-faces": Case(scene((QUAD, [[0, 1, 2], [1, 2, 0]])), scene((QUAD, [[0, 1, 2], [1, 0, 2]]))),
     "no-triangles": Case(
         scene((QUAD, [[0, 0, 0]]), (QUAD, QUAD_TRIANGLE)), scene((QUAD, [[0, 1, 2]]), (QUAD, QUAD_TRIANGLE))

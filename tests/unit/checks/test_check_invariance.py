@@ -14,7 +14,7 @@ from baker.checks.settings import CheckSettings
 from baker.core.settings import BakeSettings
 
 # A mesh with a bit of everything: two boxes stuck together, one inside out, one with a hole, a flipped
-# face, a face without area, a double, a needle.
+# face, a face without area, a double, a sliver.
 NEEDLE = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.0004, 0]])
 PARTS = [
     (CUBE, CUBE_TRIANGLE),
@@ -58,7 +58,7 @@ def counts(tmp_path, meshes, **node):
 def plain(tmp_path_factory):
     found = counts(tmp_path_factory.mktemp("plain"), [whole()])
     expected = {
-        "zero-area", "duplicate-faces", "needle-faces", "open-edges", "flipped-neighbours", "inside-out",
+        "zero-area", "duplicate-faces", "sliver-faces", "open-edges", "flipped-neighbours", "inside-out",
         "self-intersection", "enclosed-faces",
     }  # fmt: skip
     assert set(found) == expected
@@ -71,7 +71,7 @@ def test_rotating_and_moving_the_node(tmp_path, plain):
 
 
 def test_turning_the_vertices_themselves(tmp_path, plain):
-    # An exact quarter turn: rounding could make a needle of what was none.
+    # An exact quarter turn: rounding could make a sliver of what was none.
     position, triangle = whole()
     assert counts(tmp_path, [(position[:, [1, 2, 0]], triangle)]) == plain
 

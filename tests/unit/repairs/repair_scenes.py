@@ -1,4 +1,4 @@
-"""Shapes and glTF files with known defects for the tests of mending, made from nothing but numpy."""
+"""Shapes and glTF files with known defects for the tests of fixes and repairs, from numpy alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gltf_builder import GltfBuilder
 
 from baker.core.source_mesh import SourcePrimitive
 from baker.io.png import encode_png
-from baker.repairs.part import Part
+from baker.repairs.primitive_edit import EditablePrimitive
 
 PICTURE = encode_png(np.full((2, 2, 3), 77, np.uint8))
 
@@ -52,7 +52,7 @@ def bytes_of(array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1)
 
 
-def part(position, triangle, normal=None, *, stitched=False, uv=None, **members) -> Part:
+def part(position, triangle, normal=None, *, stitched=False, uv=None, **members) -> EditablePrimitive:
     """Return a primitive of float attributes; `uv` becomes TEXCOORD_0."""
     column = {"POSITION": bytes_of(position)}
     texcoord = {}
@@ -62,7 +62,7 @@ def part(position, triangle, normal=None, *, stitched=False, uv=None, **members)
         column["TEXCOORD_0"], texcoord[0] = bytes_of(uv), uv
     column |= members.pop("column", {})
     arrays = SourcePrimitive(0, 0, position, triangle, normal, texcoord, stitched=stitched)
-    return Part(arrays, column, **members)
+    return EditablePrimitive(arrays, column, **members)
 
 
 def soup(position: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +71,7 @@ def soup(position: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def random_builder(seed: int) -> GltfBuilder:
-    """Return a document of a few objects with random defects, and much that mending must not touch.
+    """Return a document of a few objects with random defects, and much that a fix must not touch.
 
     Each object is a box or a ring, its faces shuffled, with some of: doubled and flat faces, split vertices,
     turned faces, no normals, normals of wrong length, failing TEXCOORD_1, tangents, custom attributes, skins,

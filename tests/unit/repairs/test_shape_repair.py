@@ -11,11 +11,14 @@ from glb_reader import Glb
 from gltf_builder import GltfBuilder, write
 from repair_scenes import PICTURE, away_from, box, drawn, torus, volume
 
+from baker.checks.run import check_scene
+from baker.checks.settings import CheckSettings
 from baker.core.errors import ResourceError
+from baker.core.settings import BakeSettings
 from baker.repairs import meshlab
-from baker.repairs.file import mend_file
+from baker.repairs.fix_file import fix_file
 from baker.repairs.settings import RepairSettings
-from baker.repairs.surface import Surface, distance
+from baker.repairs.welded_mesh import WeldedMesh, distance
 from baker.repairs.winding import count_edges
 
 REPAIR = RepairSettings(resolution=128, repair=True)
@@ -30,13 +33,13 @@ def builder(position, triangle, **members) -> GltfBuilder:
 
 def repaired(b, folder, settings=REPAIR):
     path = write(folder / "scene.glb", b)
-    mended = mend_file(path, settings)
-    glb = Glb(mended.data)
-    return mended, glb, glb.json["meshes"][0]["primitives"][0]
+    fixed = fix_file(path, settings)
+    glb = Glb(fixed.data)
+    return fixed, glb, glb.json["meshes"][0]["primitives"][0]
 
 
-def told(mended):
-    return {fix.change.change: (fix.change.before, fix.change.after) for fix in mended.fixed}
+def told(fixed):
+    return {fix.change.change: (fix.change.before, fix.change.after) for fix in fixed.fixed}
 
 
 def places(glb, primitive):
@@ -53,8 +56,8 @@ def test_small_holes_are_closed_with_the_vertices_of_their_rims(tmp_path):
     hole[[5, 6, 1000]] = False
     uv = position[:, :2].copy()
     b = builder(position, triangle[hole], NORMAL=normal, TEXCOORD_0=uv)
-    mended, glb, primitive = repaired(b, tmp_path)
-    assert told(mended) == {"holes": (9, 0), "patches": (4797, 4800)}
+    fixed, glb, primitive = repaired(b, tmp_path)
+    assert told(fixed) == {"holes": (9, 0), "patches": (4797, 4800)}
     place, face = places(glb, primitive)
     assert (count_edges(face) == 2).all()
     # Four corners of a flat quad may be joined by its other diagonal; a triangle has no choice.
@@ -73,18 +76,16 @@ def test_small_holes_are_closed_with_the_vertices_of_their_rims(tmp_path):
     ):
         assert known[p.tobytes()] == t.tobytes()
     # The furthest that the new surface is from the old one: inside the patch over two faces.
-    moved = {fix.change.distance for fix in mended.fixed}
+    moved = {fix.change.distance for fix in fixed.fixed}
     assert len(moved) == 1
     assert 0.01 < moved.pop() < 0.1
 
 
 def test_large_openings_stay_open(tmp_path):
     position, triangle = box()
-    mended, _, _ = repaired(
-        builder(position, triangle[:-2], NORMAL=away_from(position, (0.5,) * 3)), tmp_path
-    )
-    assert told(mended) == {}
-    assert mended.left_alone == ()
+    fixed, _, _ = repaired(builder(position, triangle[:-2], NORMAL=away_from(position, (0.5,) * 3)), tmp_path)
+    assert told(fixed) == {}
+    assert fixed.left_alone == ()
 
 
 def test_a_flat_shaded_rim_gets_a_flat_patch(tmp_path):
@@ -94,8 +95,8 @@ def test_a_flat_shaded_rim_gets_a_flat_patch(tmp_path):
     front = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal = np.repeat(front / np.linalg.norm(front, axis=1, keepdims=True), 3, axis=0).astype(np.float32)
     flat = np.arange(3 * len(corner)).reshape(-1, 3)
-    mended, glb, primitive = repaired(builder(corner.reshape(-1, 3), flat, NORMAL=normal), tmp_path)
-    assert told(mended)["holes"] == (3, 0)
+    fixed, glb, primitive = repaired(builder(corner.reshape(-1, 3), flat, NORMAL=normal), tmp_path)
+    assert told(fixed)["holes"] == (3, 0)
     made = glb.corners(primitive, "NORMAL").astype(np.float64)
     place = glb.corners(primitive, "POSITION").astype(np.float64)
     front = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
@@ -109,18 +110,18 @@ def test_a_splinter_goes_and_a_wall_stays(tmp_path):
     splinter = np.concatenate([position, position[:1] + np.float32(0.004)])
     more = np.concatenate([triangle, [[0, 1, len(position)]]])
     b = builder(splinter, more, NORMAL=np.concatenate([normal, normal[:1]]))
-    mended, glb, primitive = repaired(b, tmp_path)
-    assert told(mended) == {"non-manifold-edges": (1, 0), "non-manifold-faces": (4801, 4800)}
+    fixed, glb, primitive = repaired(b, tmp_path)
+    assert told(fixed) == {"non-manifold-edges": (1, 0), "non-manifold-faces": (4801, 4800)}
     assert len(places(glb, primitive)[1]) == 4800
     # The tip of the splinter is all that is gone: it stood some 7 mm off.
-    assert 0.001 < mended.fixed[0].change.distance < 0.007
+    assert 0.001 < fixed.fixed[0].change.distance < 0.007
 
     position, triangle = box()
     wall = np.concatenate([position, np.float32([[0.5, -3, 0.5]])])
     more = np.concatenate([triangle, [[0, 1, 8]]])
-    mended, _, _ = repaired(builder(wall, more, NORMAL=away_from(wall, (0.5,) * 3)), tmp_path)
-    assert told(mended) == {}
-    assert "1 edges belong to more than two faces" in mended.left_alone[0].reason
+    fixed, _, _ = repaired(builder(wall, more, NORMAL=away_from(wall, (0.5,) * 3)), tmp_path)
+    assert told(fixed) == {}
+    assert "1 edges belong to more than two faces" in fixed.left_alone[0].reason
 
 
 @pytest.mark.parametrize("with_normals", [True, False])
@@ -138,8 +139,8 @@ def test_a_soup_is_turned_outwards(with_normals, tmp_path):
         members["NORMAL"] = np.repeat(
             outward / np.linalg.norm(outward, axis=1, keepdims=True), 3, axis=0
         ).astype(np.float32)
-    mended, glb, primitive = repaired(builder(shrunk, flat, **members), tmp_path)
-    assert told(mended)["orientation"] == (160, 0)
+    fixed, glb, primitive = repaired(builder(shrunk, flat, **members), tmp_path)
+    assert told(fixed)["orientation"] == (160, 0)
     place = glb.corners(primitive, "POSITION").astype(np.float64)
     front = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
     centre = place.mean(axis=1)
@@ -147,15 +148,15 @@ def test_a_soup_is_turned_outwards(with_normals, tmp_path):
     outward = centre - 2 * ring / np.linalg.norm(ring, axis=1, keepdims=True)
     assert (np.einsum("tx,tx->t", front, outward) > 0).all()
     assert (np.einsum("tkx,tx->tk", glb.corners(primitive, "NORMAL"), front) > 0).all()
-    assert mended.fixed[0].change.distance < 1e-6
+    assert fixed.fixed[0].change.distance < 1e-6
 
 
 def test_open_surfaces_are_wound_alike(tmp_path):
     position, triangle = box()
     triangle = triangle[:-2].copy()
     triangle[[0, 5]] = triangle[[0, 5]][:, ::-1]
-    mended, glb, primitive = repaired(builder(position, triangle), tmp_path)
-    assert told(mended)["orientation"] == (2, 0)
+    fixed, glb, primitive = repaired(builder(position, triangle), tmp_path)
+    assert told(fixed)["orientation"] == (2, 0)
     place, face = places(glb, primitive)
     a, b = face.ravel(), np.roll(face, -1, axis=1).ravel()
     # Each direction of an edge comes once at most.
@@ -172,34 +173,38 @@ def vault(n: int = 300):
     return position, np.concatenate([one, np.stack([k, k + n + 2, k + n + 1], axis=1)])
 
 
-def test_needles_are_made_anew_with_their_colours_and_normals(tmp_path):
+def test_slivers_are_remeshed_with_their_colours_and_normals(tmp_path):
     position, triangle = vault()
     colour = np.concatenate([position / 2 + 0.5, np.ones((len(position), 1))], axis=1).astype(np.float32)
     normal = (position * [1, 1, 0]).astype(np.float32)
     b = builder(position, triangle, NORMAL=normal, COLOR_0=colour, TEXCOORD_0=position[:, :2].copy())
-    mended, glb, primitive = repaired(b, tmp_path)
-    changes = {fix.change.change: fix.change for fix in mended.fixed}
-    assert (changes["needles"].before, changes["needles"].after) == (600, 0)
+    fixed, glb, primitive = repaired(b, tmp_path)
+    changes = {fix.change.change: fix.change for fix in fixed.fixed}
+    assert (changes["slivers"].before, changes["slivers"].after) == (600, 0)
+    # The check reports what the repair remeshes.
+    report = check_scene(tmp_path / "scene.glb", CheckSettings(), BakeSettings())
+    reported = [f.found.count for f in report.findings if f.code == "sliver-faces"]
+    assert reported == [600]
     assert changes["remeshed"].lost == ("TEXCOORD_0",)
     assert 300 < changes["remeshed"].after < 1200
     assert set(primitive["attributes"]) == {"POSITION", "NORMAL", "COLOR_0"}
-    place, made, tint = (
+    place, made, paint = (
         glb.accessor(primitive["attributes"][name]) for name in ("POSITION", "NORMAL", "COLOR_0")
     )
-    assert np.abs(tint[:, :3] - (place / 2 + 0.5)).max() < 5e-3
+    assert np.abs(paint[:, :3] - (place / 2 + 0.5)).max() < 5e-3
     assert np.abs(made - place * [1, 1, 0]).max() < 0.02
     # A vault of chords: its corners lie on the arc, each chord below it by (edge length)^2 / 8 at most.
     assert np.abs(np.hypot(place[:, 0], place[:, 1]) - 1).max() < 0.005
-    assert 0 < changes["needles"].distance < 0.01
+    assert 0 < changes["slivers"].distance < 0.01
     corner = glb.corners(primitive, "POSITION").astype(np.float64)
     area = (
         np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
     )
     assert area == pytest.approx(np.pi, rel=0.01)
     # The same bytes twice, and nothing left to do.
-    assert mend_file(tmp_path / "scene.glb", REPAIR).data == mended.data
-    (tmp_path / "again.glb").write_bytes(mended.data)
-    assert mend_file(tmp_path / "again.glb", REPAIR).fixed == ()
+    assert fix_file(tmp_path / "scene.glb", REPAIR).data == fixed.data
+    (tmp_path / "again.glb").write_bytes(fixed.data)
+    assert fix_file(tmp_path / "again.glb", REPAIR).fixed == ()
 
 
 def test_textured_and_locked_meshes_are_left_and_named(tmp_path):
@@ -207,30 +212,31 @@ def test_textured_and_locked_meshes_are_left_and_named(tmp_path):
     members = {"NORMAL": (position * [1, 1, 0]).astype(np.float32), "TEXCOORD_0": position[:, :2].copy()}
     b = builder(position, triangle, material=0, **members)
     b.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": {"index": b.image(PICTURE)}}})
-    mended = mend_file(write(tmp_path / "textured.glb", b), REPAIR)
-    assert mended.fixed == ()
-    assert mended.left_alone[0].reason == "its needle-shaped faces stay: its textures would lose their uv"
+    fixed = fix_file(write(tmp_path / "textured.glb", b), REPAIR)
+    assert fixed.fixed == ()
+    assert fixed.left_alone[0].reason == "its slivers stay: its textures would lose their uv"
     skin = {
         "JOINTS_0": np.zeros((len(position), 4), np.uint8),
         "WEIGHTS_0": np.tile(np.float32([1, 0, 0, 0]), (len(position), 1)),
     }
-    mended, _, _ = repaired(builder(position, triangle, **members, **skin), tmp_path)
-    assert mended.fixed == ()
-    assert mended.left_alone[0].reason == "its shape is not repaired: it is skinned"
+    fixed, _, _ = repaired(builder(position, triangle, **members, **skin), tmp_path)
+    assert fixed.fixed == ()
+    assert fixed.left_alone[0].reason == "its shape is not repaired: it is skinned"
 
 
 def test_the_distance_of_two_boxes_is_their_shift():
     position, triangle = box()
     none = np.zeros(len(triangle), np.int64)
-    one = Surface(position, triangle, none, triangle)
-    shifted = Surface(position + np.float32([0.25, 0, 0]), triangle, none, triangle)
+    one = WeldedMesh(position, triangle, none, triangle)
+    shifted = WeldedMesh(position + np.float32([0.25, 0, 0]), triangle, none, triangle)
     assert distance(one, shifted) == pytest.approx(0.25, abs=1e-6)
     # A small thing in the corner of a large one: all of the small one is near, not all of the large one.
-    near = Surface(position * np.float32(0.1), triangle, none, triangle)
-    assert meshlab.furthest((near.position, triangle), (position, triangle)) == pytest.approx(0.1, abs=1e-6)
+    near = WeldedMesh(position * np.float32(0.1), triangle, none, triangle)
+    one_sided = meshlab.largest_distance((near.position, triangle), (position, triangle))
+    assert one_sided == pytest.approx(0.1, abs=1e-6)
     assert distance(one, near) == distance(near, one) == pytest.approx(np.sqrt(3 * 0.9**2), abs=1e-6)
     # One face less: the middle of its long side is nearest to the other half's, its corner to itself.
-    less = Surface(position, triangle[:-1], none[:-1], triangle[:-1])
+    less = WeldedMesh(position, triangle[:-1], none[:-1], triangle[:-1])
     assert 0.2 < distance(one, less) < 0.5
 
 
@@ -253,15 +259,15 @@ def test_without_pymeshlab_there_is_one_sentence(monkeypatch, tmp_path):
     path = write(tmp_path / "scene.glb", builder(*box()))
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(ResourceError, match="pip install pymeshlab"):
-        mend_file(path, REPAIR)
-    assert mend_file(path, RepairSettings()).fixed
+        fix_file(path, REPAIR)
+    assert fix_file(path, RepairSettings()).fixed
 
 
 def test_pymeshlab_is_never_loaded_unasked(tmp_path):
     path = write(tmp_path / "scene.glb", builder(*box()))
     code = (
-        "import sys, pathlib, baker.repairs.file as m;"
-        f"m.mend_file(pathlib.Path({str(path)!r}));"
+        "import sys, pathlib, baker.repairs.fix_file as m;"
+        f"m.fix_file(pathlib.Path({str(path)!r}));"
         "sys.exit('pymeshlab' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,4 +1,4 @@
-"""Reads a scene, mends its meshes one by one, and makes the GLB that holds the result."""
+"""Reads a scene, fixes its meshes one by one, and makes the GLB that holds the result."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from baker.io.gltf.primitive_columns import read_columns, why_locked
 from baker.io.gltf.write_fixed import write_mended
 from baker.io.gltf.write_source import source_glb
 from baker.io.load import IMPORTERS, SceneFile, load_scene
-from baker.repairs.inside_out import faces_to_turn
-from baker.repairs.lightmap_uv import new_lightmap_uv
-from baker.repairs.mesh import repair_mesh
+from baker.repairs.inside_out import faces_to_flip
+from baker.repairs.lightmap_uv import UvRequest, new_lightmap_uv
+from baker.repairs.mesh_plan import Change, plan_mesh
+from baker.repairs.mesh_repair import repair_mesh
 from baker.repairs.meshlab import require_meshlab
-from baker.repairs.part import Part
-from baker.repairs.plan import Change, finish_part, plan_mesh
+from baker.repairs.primitive_edit import EditablePrimitive, apply_edit
 from baker.repairs.settings import RepairSettings
 from baker.topology.triangle_check import face_normal, in_range
 
-STAGE = "mend"
+STAGE = "fix"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Fix:
 
 @dataclass(frozen=True)
 class LeftAlone:
-    """Something that was found and not mended, with the reason."""
+    """A defect that was found and not fixed, with the reason."""
 
     object: str
     node: int
@@ -57,13 +57,13 @@ class LeftAlone:
 
 
 @dataclass(frozen=True)
-class Mended:
-    """A mended scene.
+class FixResult:
+    """A fixed scene.
 
     Attributes
     ----------
     data : bytes
-        The GLB; the very bytes of the input if that is a GLB and nothing was mended.
+        The GLB; the very bytes of the input if that is a GLB and nothing was fixed.
     fixed : tuple of Fix
     left_alone : tuple of LeftAlone
     """
@@ -85,33 +85,35 @@ class Mended:
 
 
 def _change_json(change: Change) -> dict[str, Any]:
-    told: dict[str, Any] = {
+    value: dict[str, Any] = {
         "change": change.change,
         "counted": change.counted,
         "before": change.before,
         "after": change.after,
     }
     if change.distance is not None:
-        told["distance"] = change.distance
+        value["distance"] = change.distance
     if change.lost:
-        told["lost"] = list(change.lost)
-    return told
+        value["lost"] = list(change.lost)
+    return value
 
 
-def mend_file(path: Path, settings: RepairSettings | None = None, progress: Progress = silent) -> Mended:
-    """Mend a scene file.
+def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progress = silent) -> FixResult:
+    """Fix a scene file.
 
     Parameters
     ----------
     path : Path
-        Of any format that is read. It is not changed.
+        Of any format that can be read. It is not changed.
     settings : RepairSettings
+        Lightmap resolution, units of the file, and whether shapes are repaired.
     progress : Progress
-        Told the stage "mend"; a truthy answer stops the work.
+        Called with the stages "fix" and "repair"; a truthy answer stops the work.
 
     Returns
     -------
-    Mended
+    FixResult
+        The GLB with what was fixed and what was left alone.
 
     Raises
     ------
@@ -128,32 +130,32 @@ def mend_file(path: Path, settings: RepairSettings | None = None, progress: Prog
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True)
     data: bytes | None = None
     if scene.source is None:
-        # What other formats hold is written as GLB first, bad triangles and all, and that is mended.
+        # Convert other formats to GLB, defective triangles included, and fix that.
         assert scene.source_scene is not None
         data = source_glb(scene, scene.source_scene)
         scene = _read_glb(path, data)
     elif not _names_files(scene.source):
         written = path.read_bytes()
         data = written if written[:4] == b"glTF" else None
-    mended = _mend(scene, data, settings, progress, make_normals=not settings.repair)
+    result = _fix(scene, data, settings, progress, make_normals=not settings.repair)
     if settings.repair:
-        mended = _repair(_read_glb(path, mended.data), mended, progress)
-        # What was repaired may now have double vertices, or need normals or other lightmap uv.
-        mended = _and_then(mended, _mend(_read_glb(path, mended.data), mended.data, settings, progress))
-    tidy = _read_glb(path, mended.data)
-    wrong = faces_to_turn(tidy)
+        result = _repair(_read_glb(path, result.data), result, progress)
+        # Repaired meshes may have duplicate vertices, and need normals or other lightmap uv.
+        result = _joined(result, _fix(_read_glb(path, result.data), result.data, settings, progress))
+    fixed = _read_glb(path, result.data)
+    wrong = faces_to_flip(fixed)
     if wrong:
-        mended = _and_then(mended, _mend(tidy, mended.data, settings, progress, inside_out=wrong))
-    return mended
+        result = _joined(result, _fix(fixed, result.data, settings, progress, inside_out=wrong))
+    return result
 
 
-def _and_then(first: Mended, second: Mended) -> Mended:
-    """Return what two steps did; what the second still finds to leave alone is told once."""
+def _joined(first: FixResult, second: FixResult) -> FixResult:
+    """Return the result of two steps; what both leave alone is listed once."""
     left = dict.fromkeys((*first.left_alone, *second.left_alone))
-    return Mended(second.data, (*first.fixed, *second.fixed), tuple(left))
+    return FixResult(second.data, (*first.fixed, *second.fixed), tuple(left))
 
 
-def _mend(
+def _fix(
     scene: Scene,
     data: bytes | None,
     settings: RepairSettings,
@@ -161,11 +163,11 @@ def _mend(
     *,
     make_normals: bool = True,
     inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
-) -> Mended:
-    """Mend what cannot be seen; `data` is the GLB that stands if nothing has to be done, or None."""
+) -> FixResult:
+    """Make changes that cannot be seen. `data` is the scene's GLB, returned if there are none; or None."""
     source, source_scene = _parsed(scene)
     area = _area_shares(source_scene)
-    mended: dict[tuple[int, int], EditedPrimitive] = {}
+    edited: dict[tuple[int, int], EditedPrimitive] = {}
     fixed: list[Fix] = []
     left: list[LeftAlone] = []
     for number, mesh, shown in _shown_meshes(source_scene):
@@ -173,32 +175,26 @@ def _mend(
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
         plan = plan_mesh(
-            _parts(source, index, mesh),
+            _editable(source, index, mesh),
             make_normals=make_normals,
             inside_out=(inside_out or {}).get(number),
         )
-        plan, uv = new_lightmap_uv(
-            plan,
-            shown,
-            area[number],
-            resolution=settings.resolution,
-            threads=settings.threads,
-            progress=_within(progress, number, len(source_scene.meshes)),
-        )
-        for k, part in enumerate(plan.parts):
-            made = finish_part(part, None if uv is None else uv[k])
+        request = UvRequest(settings.resolution, area[number], settings.threads)
+        plan, uv = new_lightmap_uv(plan, shown, request, _within(progress, number, len(source_scene.meshes)))
+        for k, edit in enumerate(plan.edits):
+            made = apply_edit(edit, None if uv is None else uv[k])
             if made is not None:
-                mended[index, part.part.arrays.index] = made
+                edited[index, edit.primitive.arrays.index] = made
         fixed += [Fix(name, node, change) for change in plan.changes]
         left += [LeftAlone(name, node, reason) for reason in plan.left]
     report(progress, STAGE, 1.0)
-    if mended or data is None:
-        data = write_mended(source, mended)
-    return Mended(data, tuple(fixed), tuple(left))
+    if edited or data is None:
+        data = write_mended(source, edited)
+    return FixResult(data, tuple(fixed), tuple(left))
 
 
-def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
-    """Repair the shapes of a scene that is mended otherwise; what was done so far is told first."""
+def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
+    """Repair the shapes of a scene that is fixed otherwise; the fixes of `first` are listed first."""
     source, source_scene = _parsed(scene)
     made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
@@ -208,12 +204,12 @@ def _repair(scene: Scene, first: Mended, progress: Progress) -> Mended:
         index = source.json["nodes"][node]["mesh"]
         primitives = source.json["meshes"][index]["primitives"]
         textured = any(reads_texture(source.json, primitives[arrays.index]) for arrays in mesh.primitives)
-        repair = repair_mesh(_parts(source, index, mesh), textured, shown[0])
+        repair = repair_mesh(_editable(source, index, mesh), textured, shown[0])
         made |= {(index, primitive): new for primitive, new in repair.made.items()}
         fixed += [Fix(name, node, change) for change in repair.changes]
         left += [LeftAlone(name, node, reason) for reason in repair.left]
     report(progress, "repair", 1.0)
-    return Mended(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
+    return FixResult(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
 
 
 def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
@@ -223,14 +219,14 @@ def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
 
 
 def _shown_meshes(source_scene: SourceScene) -> Iterator[tuple[int, SourceMesh, list[SourceInstance]]]:
-    """List the meshes that have triangles, with their number and the nodes that show them."""
+    """Yield the meshes that have triangles, with their number and the nodes that show them."""
     for number, mesh in enumerate(source_scene.meshes):
         if mesh.primitives:
             yield number, mesh, [instance for instance in source_scene.instances if instance.mesh == number]
 
 
 def _names_files(source: SourceDocument) -> bool:
-    """Say whether a GLB needs files beside it."""
+    """Return whether a GLB refers to files beside it."""
     things = [*source.json.get("images", []), *source.json.get("buffers", [])]
     return any("uri" in thing and not thing["uri"].startswith("data:") for thing in things)
 
@@ -240,12 +236,12 @@ def _read_glb(path: Path, data: bytes) -> Scene:
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:
-    """Return the progress of a stage inside the work on one mesh of several."""
+    """Return the progress of a stage inside the work on mesh `number` of `count`."""
     return lambda stage, fraction, detail="": progress(STAGE, (number + fraction) / count, detail)
 
 
 def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
-    """Return each mesh's part of the scene's area, by its first instance, (M,) float64."""
+    """Return each mesh's share of the scene's area, by its first instance, (M,) float64."""
     area = np.zeros(len(source_scene.meshes))
     for instance in source_scene.instances:
         if area[instance.mesh] == 0.0:
@@ -260,18 +256,19 @@ def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
 
 
 def _in_range(arrays: SourcePrimitive) -> NDArray[np.bool_]:
-    """Tell which faces name only vertices that exist, (T,) bool."""
+    """Return which faces have indices of existing vertices only, (T,) bool."""
     n = np.full(len(arrays.triangle), len(arrays.position))
     return in_range(arrays.triangle, np.zeros_like(n), n)
 
 
-def _parts(source: SourceDocument, index: int, mesh: SourceMesh) -> list[Part]:
+def _editable(source: SourceDocument, index: int, mesh: SourceMesh) -> list[EditablePrimitive]:
+    """Return the primitives of mesh `index` of the document, with what limits their edits."""
     document = source.json
     primitives = document["meshes"][index]["primitives"]
-    parts = []
+    found = []
     for arrays in mesh.primitives:
         primitive = primitives[arrays.index]
-        # Variants may show the primitive in several materials: all of them have to allow what is done.
+        # Variants may show the primitive in several materials: an edit must be safe in all of them.
         materials = [
             document["materials"][holder["material"]] if "material" in holder else {}
             for holder in material_holders(primitive)
@@ -281,8 +278,8 @@ def _parts(source: SourceDocument, index: int, mesh: SourceMesh) -> list[Part]:
         if not good.all():
             arrays = replace(arrays, triangle=arrays.triangle[good])
             locked = f"{int((~good).sum())} of its faces name vertices that do not exist; export it again"
-        parts.append(
-            Part(
+        found.append(
+            EditablePrimitive(
                 arrays=arrays,
                 column=read_columns(source, primitive),
                 double_sided=all(material.get("doubleSided", False) for material in materials),
@@ -291,4 +288,4 @@ def _parts(source: SourceDocument, index: int, mesh: SourceMesh) -> list[Part]:
                 locked=locked,
             )
         )
-    return parts
+    return found

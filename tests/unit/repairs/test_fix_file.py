@@ -1,4 +1,4 @@
-"""Mending whole files: what is not mended survives, the look stays, a second time there is nothing to do."""
+"""Fixing whole files: what is not fixed survives, the look stays, a second time there is nothing to do."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from repair_scenes import PICTURE, away_from, box, drawn, random_builder, soup
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings import make_settings
 from baker.io.load import load_scene
-from baker.repairs.file import mend_file
+from baker.repairs.fix_file import fix_file
 from baker.repairs.settings import RepairSettings
 from baker.repairs.write import check_fixed, write_fixed
 from baker.uv.unwrap import unwrap_scene
@@ -23,11 +23,11 @@ SEEDS = range(24)
 QUICK = RepairSettings(resolution=128)
 
 
-def mend_builder(builder: GltfBuilder, folder: Path):
+def fix_builder(builder: GltfBuilder, folder: Path):
     """Return the file before and after, and what was done."""
     path = write(folder / "scene.glb", builder)
-    mended = mend_file(path, QUICK)
-    return Glb(path), Glb(mended.data), mended
+    fixed = fix_file(path, QUICK)
+    return Glb(path), Glb(fixed.data), fixed
 
 
 def primitives(glb: Glb):
@@ -50,13 +50,13 @@ def resolved(glb: Glb, primitive) -> dict:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_what_is_not_mended_survives(seed, tmp_path):
-    before, after, mended = mend_builder(random_builder(seed), tmp_path)
+def test_what_is_not_fixed_survives(seed, tmp_path):
+    before, after, fixed = fix_builder(random_builder(seed), tmp_path)
     old, new = before.json, after.json
     for key in old.keys() | new.keys():
         if key not in ("accessors", "bufferViews", "buffers", "meshes"):
             assert new[key] == old[key], key
-    touched = {fix.object.split()[-1] for fix in mended.fixed}
+    touched = {fix.object.split()[-1] for fix in fixed.fixed}
     for (m, _, a), (_, _, b) in zip(primitives(before), primitives(after), strict=True):
         assert {k: v for k, v in old["meshes"][m].items() if k != "primitives"} == {
             k: v for k, v in new["meshes"][m].items() if k != "primitives"
@@ -78,13 +78,13 @@ def test_what_is_not_mended_survives(seed, tmp_path):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_look_stays(seed, tmp_path):
     """Every face with area is drawn as before, unless it was said to look the wrong way."""
-    before, after, mended = mend_builder(random_builder(seed), tmp_path)
+    before, after, fixed = fix_builder(random_builder(seed), tmp_path)
     turned = {
-        fix.object.split()[-1]: fix.change.before for fix in mended.fixed if fix.change.change == "winding"
+        fix.object.split()[-1]: fix.change.before for fix in fixed.fixed if fix.change.change == "winding"
     }
     made = {
         (fix.object.split()[-1], {"lightmap-uv": "TEXCOORD_1"}.get(fix.change.change, "NORMAL"))
-        for fix in mended.fixed
+        for fix in fixed.fixed
         if fix.change.change in ("lightmap-uv", "missing-normals", "bad-normals", "winding")
     }
     for (m, _, a), (_, _, b) in zip(primitives(before), primitives(after), strict=True):
@@ -104,20 +104,20 @@ def test_the_look_stays(seed, tmp_path):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_second_time_changes_nothing(seed, tmp_path):
-    _, _, mended = mend_builder(random_builder(seed), tmp_path)
-    again = write_glb(tmp_path / "again.glb", mended.data)
-    second = mend_file(again, QUICK)
+    _, _, fixed = fix_builder(random_builder(seed), tmp_path)
+    again = write_glb(tmp_path / "again.glb", fixed.data)
+    second = fix_file(again, QUICK)
     assert second.fixed == ()
-    assert second.data == mended.data
-    assert [left.reason for left in second.left_alone] == [left.reason for left in mended.left_alone]
+    assert second.data == fixed.data
+    assert [left.reason for left in second.left_alone] == [left.reason for left in fixed.left_alone]
 
 
 def test_random_files_have_every_defect(tmp_path):
     found, reasons = set(), set()
     for seed in SEEDS:
-        _, _, mended = mend_builder(random_builder(seed), tmp_path)
-        found |= {fix.change.change for fix in mended.fixed}
-        reasons |= {left.reason.rpartition(": ")[2] for left in mended.left_alone}
+        _, _, fixed = fix_builder(random_builder(seed), tmp_path)
+        found |= {fix.change.change for fix in fixed.fixed}
+        reasons |= {left.reason.rpartition(": ")[2] for left in fixed.left_alone}
     assert found == {
         "zero-area-faces", "duplicate-faces", "duplicate-vertices", "winding", "missing-normals",
         "bad-normals", "lightmap-uv",
@@ -149,12 +149,12 @@ def box_builder(*, uv1=None, texcoord=0, **members) -> GltfBuilder:
     return b
 
 
-def test_lightmap_uv_that_overlap_are_made_anew(tmp_path):
-    _, after, mended = mend_builder(
+def test_lightmap_uv_that_overlap_are_replaced(tmp_path):
+    _, after, fixed = fix_builder(
         box_builder(uv1=np.tile(np.float32([[0, 0], [1, 0], [0, 1]]), (12, 1))), tmp_path
     )
-    assert [fix.change.change for fix in mended.fixed] == ["duplicate-vertices", "lightmap-uv"]
-    assert "TEXCOORD_1 overlaps itself" in mended.fixed[1].change.counted
+    assert [fix.change.change for fix in fixed.fixed] == ["duplicate-vertices", "lightmap-uv"]
+    assert "TEXCOORD_1 overlaps itself" in fixed.fixed[1].change.counted
     primitive = after.json["meshes"][0]["primitives"][0]
     uv = after.corners(primitive, "TEXCOORD_1").astype(np.float64)
     assert uv.min() >= 0
@@ -164,16 +164,16 @@ def test_lightmap_uv_that_overlap_are_made_anew(tmp_path):
     area = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     assert np.ptp(area) < 0.02 * area.mean()
     assert 0.4 < area.sum() < 1
-    scene = load_scene(write_glb(tmp_path / "fixed.glb", mended.data))
+    scene = load_scene(write_glb(tmp_path / "fixed.glb", fixed.data))
     atlas = unwrap_scene(scene, make_settings({"resolution": 128, "uv": "keep"}))
     assert atlas.layouts[0].kept
 
 
 def test_lightmap_uv_that_a_texture_reads_stay(tmp_path):
     uv = np.tile(np.float32([[0, 0], [1, 0], [0, 1]]), (12, 1))
-    before, after, mended = mend_builder(box_builder(uv1=uv, texcoord=1), tmp_path)
-    assert "lightmap-uv" not in {fix.change.change for fix in mended.fixed}
-    assert "a texture of its material reads them" in mended.left_alone[0].reason
+    before, after, fixed = fix_builder(box_builder(uv1=uv, texcoord=1), tmp_path)
+    assert "lightmap-uv" not in {fix.change.change for fix in fixed.fixed}
+    assert "a texture of its material reads them" in fixed.left_alone[0].reason
     a, b = (glb.json["meshes"][0]["primitives"][0] for glb in (before, after))
     assert drawn(before, a) == drawn(after, b)
 
@@ -185,9 +185,9 @@ def test_a_clean_glb_comes_out_byte_for_byte(tmp_path):
         mesh=b.mesh(b.primitive(position, triangle.astype(np.uint16), NORMAL=away_from(position, (0.5,) * 3)))
     )
     path = write(tmp_path / "clean.glb", b)
-    mended = mend_file(path, QUICK)
-    assert mended.data == path.read_bytes()
-    assert mended.fixed == mended.left_alone == ()
+    fixed = fix_file(path, QUICK)
+    assert fixed.data == path.read_bytes()
+    assert fixed.fixed == fixed.left_alone == ()
 
 
 def test_files_beside_the_scene_move_into_it(tmp_path):
@@ -203,9 +203,9 @@ def test_files_beside_the_scene_move_into_it(tmp_path):
     )
     b.node(mesh=b.mesh({**primitive, "material": 0}))
     for name in ("scene.glb", "scene.gltf"):
-        mended = mend_file(write(tmp_path / name, b), QUICK)
-        assert mended.fixed == ()
-        after = Glb(mended.data)
+        fixed = fix_file(write(tmp_path / name, b), QUICK)
+        assert fixed.fixed == ()
+        after = Glb(fixed.data)
         assert after.view(after.json["images"][0]["bufferView"]) == PICTURE
         assert drawn(after, after.json["meshes"][0]["primitives"][0])
 
@@ -221,8 +221,8 @@ def test_tangents_of_turned_faces_keep_their_bitangent(tmp_path):
     normal = np.repeat(front / np.linalg.norm(front, axis=1, keepdims=True), 3, axis=0).astype(np.float32)
     tangent = np.concatenate([normal[:, [1, 2, 0]], np.ones((36, 1), np.float32)], axis=1)
     b.node(mesh=b.mesh(b.primitive(flat, wrong.astype(np.uint16), NORMAL=normal, TANGENT=tangent)))
-    before, after, mended = mend_builder(b, tmp_path)
-    assert [f.change.change for f in mended.fixed if f.change.change == "winding"] == ["winding"]
+    before, after, fixed = fix_builder(b, tmp_path)
+    assert [f.change.change for f in fixed.fixed if f.change.change == "winding"] == ["winding"]
 
     def bitangents(glb):
         primitive = glb.json["meshes"][0]["primitives"][0]
@@ -242,9 +242,9 @@ def test_attributes_that_are_too_short_and_indices_that_lead_nowhere_are_named(t
     position, triangle = box()
     wild = np.concatenate([triangle, [[0, 1, 8]]]).astype(np.uint32)
     b.node(mesh=b.mesh(b.primitive(position, wild)), name="wild")
-    before, after, mended = mend_builder(b, tmp_path)
-    assert mended.fixed == ()
-    assert [left.reason.partition(": ")[2] for left in mended.left_alone] == [
+    before, after, fixed = fix_builder(b, tmp_path)
+    assert fixed.fixed == ()
+    assert [left.reason.partition(": ")[2] for left in fixed.left_alone] == [
         "its attribute TANGENT has fewer elements than POSITION; export it again",
         "1 of its faces name vertices that do not exist; export it again",
     ]
@@ -265,8 +265,8 @@ def test_a_body_inside_out_is_turned_and_a_room_is_not(inside, normals, tmp_path
         b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
         b.json["extensionsUsed"] = ["KHR_lights_punctual"]
         b.node(translation=[0.5, 0.5, 0.5], extensions={"KHR_lights_punctual": {"light": 0}})
-    _, after, mended = mend_builder(b, tmp_path)
-    done = {fix.change.change: (fix.change.before, fix.change.after) for fix in mended.fixed}
+    _, after, fixed = fix_builder(b, tmp_path)
+    done = {fix.change.change: (fix.change.before, fix.change.after) for fix in fixed.fixed}
     primitive = after.json["meshes"][0]["primitives"][0]
     place = after.corners(primitive, "POSITION").astype(np.float64)
     front = np.cross(place[:, 1] - place[:, 0], place[:, 2] - place[:, 0])
@@ -279,15 +279,15 @@ def test_a_body_inside_out_is_turned_and_a_room_is_not(inside, normals, tmp_path
         assert "inside-out" not in done
         assert not outwards.any()
     if inside == "skin":
-        assert "12 faces are inside out, but it is skinned" in {left.reason for left in mended.left_alone}
+        assert "12 faces are inside out, but it is skinned" in {left.reason for left in fixed.left_alone}
 
 
 @pytest.mark.parametrize("shape", ["zero scale", "shared"])
-def test_a_mesh_is_mended_once_for_all_its_nodes(shape, tmp_path):
+def test_a_mesh_is_fixed_once_for_all_its_nodes(shape, tmp_path):
     b = box_builder()
     b.node(mesh=0, name="second", scale=[0, 1, 1] if shape == "zero scale" else [2, 1, 1])
-    _, after, mended = mend_builder(b, tmp_path)
-    assert [(fix.object, fix.node) for fix in mended.fixed] == [("crate", 0)]
+    _, after, fixed = fix_builder(b, tmp_path)
+    assert [(fix.object, fix.node) for fix in fixed.fixed] == [("crate", 0)]
     assert [node["mesh"] for node in after.json["nodes"]] == [0, 0]
 
 
@@ -312,8 +312,8 @@ def test_a_file_is_written_whole_and_nothing_else(tmp_path):
 
 
 def test_json_is_plain(tmp_path):
-    _, _, mended = mend_builder(random_builder(3), tmp_path)
-    told = json.loads(json.dumps(mended.json()))
+    _, _, fixed = fix_builder(random_builder(3), tmp_path)
+    told = json.loads(json.dumps(fixed.json()))
     assert all(
         set(fix) == {"object", "node", "change", "counted", "before", "after"} for fix in told["fixed"]
     )
@@ -323,4 +323,4 @@ def test_json_is_plain(tmp_path):
 @pytest.mark.parametrize("data", [b"", b"glTF", b"{}", b'{"asset":{"version":"1.0"}}'])
 def test_what_is_no_scene_is_refused(data, tmp_path):
     with pytest.raises(InputError):
-        mend_file(write_glb(tmp_path / "bad.gltf", data), QUICK)
+        fix_file(write_glb(tmp_path / "bad.gltf", data), QUICK)

@@ -1,0 +1,148 @@
+"""One primitive of a glTF mesh, and the edit that a fix or a repair makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.source_mesh import SourcePrimitive
+from baker.io.gltf.edited_primitive import EditedPrimitive
+from baker.repairs.normals import NormalChoice
+from baker.topology.triangle_check import face_normal
+from baker.topology.unique_rows import compact, first_equal
+
+
+@dataclass(frozen=True)
+class EditablePrimitive:
+    """A primitive as its file holds it, with what limits its edits.
+
+    Attributes
+    ----------
+    arrays : SourcePrimitive
+        Positions, normals and triangles as numbers, V vertices.
+    column : dict of str to (V, B) uint8
+        Every vertex attribute by its name in the file: the B raw bytes of each vertex.
+    double_sided : bool
+        All its materials (of all variants) are double-sided.
+    blends : bool
+        A material is translucent: two equal faces cover more than one.
+    reads_lightmap_uv : bool
+        A texture of the material uses TEXCOORD_1.
+    locked : str
+        Why the primitive must stay as it is, as the end of a sentence; empty if it may be edited.
+    """
+
+    arrays: SourcePrimitive
+    column: dict[str, NDArray[np.uint8]]
+    double_sided: bool = False
+    blends: bool = False
+    reads_lightmap_uv: bool = False
+    locked: str = ""
+
+
+@dataclass(frozen=True)
+class PrimitiveEdit:
+    """The faces that remain of a primitive, and their new normals.
+
+    Attributes
+    ----------
+    primitive : EditablePrimitive
+    touched : bool
+        False: nothing is fixed, and the primitive stays as it is in the file.
+    triangle : (T, 3) int64, old vertices
+        Faces to be flipped are flipped already.
+    normal : (T, 3, 3) float32, unit, object space, or None
+        New normal of each corner; None keeps those of the file.
+    turned : (T, 3) bool
+        Corners whose normal has changed sign.
+    """
+
+    primitive: EditablePrimitive
+    touched: bool
+    triangle: NDArray[np.int64]
+    normal: NDArray[np.float32] | None
+    turned: NDArray[np.bool_]
+
+
+def edit_with_flips(
+    primitive: EditablePrimitive,
+    triangle: NDArray[np.int64],
+    flip: NDArray[np.bool_],
+    *,
+    touched: bool,
+    normals: NormalChoice | None = None,
+) -> PrimitiveEdit:
+    """Return the edit of a primitive; normals of flipped faces that oppose their new front change sign.
+
+    Parameters
+    ----------
+    primitive : EditablePrimitive
+    triangle : (T, 3) int64
+        The faces that remain, flipped already where `flip` is set.
+    flip : (T,) bool
+    touched : bool
+        Something about the primitive is fixed.
+    normals : NormalChoice or None
+        New normals of the corners, for the winding in the file.
+
+    Returns
+    -------
+    PrimitiveEdit
+    """
+    normals = normals or NormalChoice(None)
+    turned = np.zeros(triangle.shape, bool)
+    corner = normals.corner
+    given = primitive.arrays.normal
+    if flip.any() and given is not None:
+        corner = given[triangle] if corner is None else corner
+        front = face_normal(primitive.arrays.position, triangle)
+        against = np.einsum("tkx,tx->t", np.nan_to_num(corner).astype(np.float64), front) < 0
+        turned[flip & against] = True
+        if turned.any():
+            corner = np.where(turned[..., None], -corner, corner)
+        else:
+            corner = normals.corner
+    return PrimitiveEdit(primitive, touched, triangle, corner, turned)
+
+
+def apply_edit(edit: PrimitiveEdit, uv: NDArray[np.float32] | None = None) -> EditedPrimitive | None:
+    """Make the new vertices of a primitive: equal ones are merged, unused ones are dropped.
+
+    Parameters
+    ----------
+    edit : PrimitiveEdit
+    uv : (T, 3, 2) float32 or None
+        New TEXCOORD_1 of each corner.
+
+    Returns
+    -------
+    EditedPrimitive or None
+        None if the primitive stays as it is in the file.
+    """
+    if not edit.touched and uv is None:
+        return None
+    primitive = edit.primitive
+    replaced = set() if edit.normal is None else {"NORMAL"}
+    replaced |= set() if uv is None else {"TEXCOORD_1"}
+    column = [data for name, data in primitive.column.items() if name not in replaced]
+    row = first_equal(column, len(primitive.arrays.position))[edit.triangle].reshape(-1)
+    own: list[NDArray[np.generic]] = [row.reshape(-1, 1), edit.turned.reshape(-1, 1)]
+    # + 0 turns -0 into 0, which has other bits but is the same number.
+    normal = None if edit.normal is None else edit.normal.reshape(-1, 3) + np.float32(0.0)
+    own += [] if normal is None else [normal]
+    own += [] if uv is None else [uv.reshape(-1, 2)]
+    corner, number = compact(first_equal(own, len(row)))
+    # Sort the new vertices by their old ones, to keep the file's order.
+    order = np.argsort(row[corner], kind="stable")
+    rank = np.zeros(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    corner = corner[order]
+    return EditedPrimitive(
+        row=row[corner],
+        triangle=rank[number].reshape(-1, 3),
+        normal=None if normal is None else normal[corner],
+        turned=edit.turned.reshape(-1)[corner],
+        uv=None if uv is None else uv.reshape(-1, 2)[corner],
+    )
