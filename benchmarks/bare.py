@@ -20,7 +20,7 @@ from baker.kernels.emitters import Emitters
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
 from baker.kernels.surface import N_POINTS
-from baker.pipeline.world import World
+from baker.pipeline.prepare import PreparedScene
 from baker.radiosity.point_cache import points_of
 from baker.trace.packets import (
     DIR_X,
@@ -165,8 +165,8 @@ class BareRays:
 
     Parameters
     ----------
-    world : World
-        See `baker.pipeline.world.prepare`.
+    world : PreparedScene
+        See `baker.pipeline.prepare.prepare_scene`.
     n_samples : int
         Rays per texel.
     occlusion : bool
@@ -179,7 +179,7 @@ class BareRays:
 
     def __init__(
         self,
-        world: World,
+        world: PreparedScene,
         *,
         n_samples: int,
         seed: int,
@@ -206,9 +206,14 @@ class BareRays:
         self.rays = sum(tile.rays for tile in self._tiles)
 
     def _tile(
-        self, world: World, begin: int, end: int, corner: NDArray[np.float32], cumulative: NDArray[np.float32]
+        self,
+        world: PreparedScene,
+        begin: int,
+        end: int,
+        corner: NDArray[np.float32],
+        cumulative: NDArray[np.float32],
     ) -> _Tile:
-        origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
+        origin, normal = points_of(world.job.surface, world.job.valid_points, np.arange(begin, end))
         width, n_samples = self._tracer.width, len(self._net)
         packets = -(-(end - begin) // PACKET_WIDTH) * (PACKET_WIDTH // width) * n_samples
         bank = np.zeros((packets, RAY_ROWS * width), np.float32)

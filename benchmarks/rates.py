@@ -6,6 +6,7 @@ import json
 import statistics
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -16,20 +17,21 @@ from baker.channels.channel import CHANNELS
 from baker.core.parallel import thread_count
 from baker.core.progress import silent
 from baker.core.settings import BakeSettings, make_settings
+from baker.core.stage import Stage
 from baker.io.load import load_scene
+from baker.pipeline.prepare import PreparedScene, prepare_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import trace_transport
-from baker.pipeline.world import World, prepare
-from baker.radiosity.inside_geometry import STAGE as INSIDE_GEOMETRY
+from baker.radiosity.inside_geometry import find_inside_geometry
 from baker.uv.unwrap import unwrap_scene
 
 # Stage of the bake -> kind of bare rays that it is compared with.
 BESIDE = {
-    "final gather": "closest hit",
-    "form factors": "closest hit",
-    INSIDE_GEOMETRY: "closest hit",
-    "direct light": "towards emitters",
-    "ambient occlusion": "occlusion within the AO distance",
+    Stage.FINAL_GATHER: "closest hit",
+    Stage.FORM_FACTORS: "closest hit",
+    Stage.INSIDE_GEOMETRY: "closest hit",
+    Stage.DIRECT_LIGHT: "towards emitters",
+    Stage.AMBIENT_OCCLUSION: "occlusion within the AO distance",
 }
 
 
@@ -62,15 +64,15 @@ def measure(
         values["sky"] = sky
     settings = make_settings(values)
     scene = load_scene(scene_path, up=settings.up, scale=settings.scale)
-    world = prepare(scene, unwrap_scene(scene, settings, silent), settings, Record(silent))
+    world = prepare_scene(scene, unwrap_scene(scene, settings, silent), settings, Record(silent))
     kinds = _kinds(world, settings)
     for rays in kinds.values():
         rays.warm()
-    _turn(scene, world, make_settings({**values, "samples": 1, "light_samples": 1}))
+    _turn(replace(world, settings=make_settings({**values, "samples": 1, "light_samples": 1})))
     turns: list[dict[str, tuple[float, int]]] = []
     bare: dict[str, dict[str, list[float]]] = {kind: {"ready": [], "made": []} for kind in kinds}
     for _ in range(repeat):
-        turns.append(_turn(scene, world, settings))
+        turns.append(_turn(world))
         for kind, rays in kinds.items():
             bare[kind]["ready"].append(rays.rate(ready=True))
             if kind != "towards emitters":
@@ -103,7 +105,7 @@ def measure(
     return result
 
 
-def _kinds(world: World, settings: BakeSettings) -> dict[str, BareRays]:
+def _kinds(world: PreparedScene, settings: BakeSettings) -> dict[str, BareRays]:
     threads, n = thread_count(settings.threads), settings.hemisphere_samples
     same: dict[str, Any] = {"n_samples": n, "seed": settings.seed, "threads": threads}
     kinds = {
@@ -118,20 +120,16 @@ def _kinds(world: World, settings: BakeSettings) -> dict[str, BareRays]:
     return kinds
 
 
-def _turn(scene: Any, world: World, settings: BakeSettings) -> dict[str, tuple[float, int]]:
+def _turn(world: PreparedScene) -> dict[str, tuple[float, int]]:
     """Cast all rays of a bake once; return seconds and rays of each stage."""
     record = Record(silent)
-    trace_transport(scene, world, {"irradiance": CHANNELS.get("irradiance")}, settings, record)
-    trace_transport(scene, world, {"ao": CHANNELS.get("ao")}, settings, record)
-    # `prepare` finds points inside geometry once, outside these turns; cast its rays again to time them.
-    from baker.radiosity.inside_geometry import find_buried
-
+    trace_transport(world, {"irradiance": CHANNELS.get("irradiance")}, record)
+    trace_transport(world, {"ao": CHANNELS.get("ao")}, record)
+    # `prepare_scene` finds points inside geometry once, outside these turns; cast its rays again to time them.
     start = perf_counter()
-    _, cast = find_buried(
-        world.texels, world.surface, world.table, world.tells, world.rays.tracer,
-        seed=settings.seed, threads=thread_count(settings.threads), progress=silent,
-    )  # fmt: skip
-    record.timings[INSIDE_GEOMETRY], record.rays[INSIDE_GEOMETRY] = perf_counter() - start, cast
+    _, cast = find_inside_geometry(world.texels, world.job, world.tells)
+    record.timings[Stage.INSIDE_GEOMETRY] = perf_counter() - start
+    record.rays[Stage.INSIDE_GEOMETRY] = cast
     return {name: (record.timings[name], cast) for name, cast in record.rays.items() if cast}
 
 

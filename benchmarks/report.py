@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from baker.radiosity.inside_geometry import STAGE as INSIDE_GEOMETRY
+from baker.core.stage import Stage
 
 STAGES = (
-    "load", "unwrap", "texels", "ray tree", INSIDE_GEOMETRY, "direct light", "form factors", "solve",
-    "final gather", "finish", "write",
+    Stage.LOAD, Stage.UNWRAP, Stage.TEXELS, Stage.RAY_TREE, Stage.INSIDE_GEOMETRY, Stage.DIRECT_LIGHT,
+    Stage.FORM_FACTORS, Stage.SOLVE, Stage.FINAL_GATHER, Stage.FINISH, Stage.WRITE,
 )  # fmt: skip
 # The stages from texels to gather.
 TRANSPORT = STAGES[2:9]
@@ -146,9 +146,9 @@ def _series(result: dict[str, Any], markdown: bool) -> str:
         timings, rays = best["timings"], best["rays"]
         rows.append(
             (
-                entry["triangles"], entry["resolution"], best["seconds"], float(timings["ray tree"]),
-                1e9 * timings["final gather"] / rays["final gather"], 1e3 / entry["bare"],
-                1e9 * timings["direct light"] / rays["direct light"], float(timings["finish"]),
+                entry["triangles"], entry["resolution"], best["seconds"], float(timings[Stage.RAY_TREE]),
+                1e9 * timings[Stage.FINAL_GATHER] / rays[Stage.FINAL_GATHER], 1e3 / entry["bare"],
+                1e9 * timings[Stage.DIRECT_LIGHT] / rays[Stage.DIRECT_LIGHT], float(timings[Stage.FINISH]),
                 round(max(run["peak"] for run in entry["runs"])),
             )
         )  # fmt: skip
@@ -173,8 +173,9 @@ def _large(result: dict[str, Any], markdown: bool) -> str:
         rows.append(
             (
                 entry["what"], entry["resolution"], entry["samples"], run["seconds"],
-                float(run["timings"]["unwrap"]), float(sum(run["timings"].get(s, 0.0) for s in TRANSPORT)),
-                float(run["timings"]["finish"]), round(run["peak"]), f"{100 * run['peak'] / 6144:.0f} %",
+                float(run["timings"][Stage.UNWRAP]),
+                float(sum(run["timings"].get(s, 0.0) for s in TRANSPORT)),
+                float(run["timings"][Stage.FINISH]), round(run["peak"]), f"{100 * run['peak'] / 6144:.0f} %",
             )
         )  # fmt: skip
     return table(head, rows, markdown=markdown)

@@ -15,8 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from baker.core.stage import Stage
+
 ROOT = Path(__file__).parents[1]
-STAGES = ("direct light", "form factors", "final gather", "ambient occlusion")
+STAGES = (Stage.DIRECT_LIGHT, Stage.FORM_FACTORS, Stage.FINAL_GATHER, Stage.AMBIENT_OCCLUSION)
 SETTINGS: dict[str, Any] = {
     "resolution": 512,
     "samples": 256,

@@ -12,8 +12,8 @@ from baker.core.lightmap import BakeResult
 from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, PunctualLight, Scene, Texture
 from baker.core.settings import make_settings
+from baker.pipeline.prepare import PreparedScene, prepare_scene
 from baker.pipeline.record import Record
-from baker.pipeline.world import World, prepare
 from baker.radiosity.form_factors import FormFactorMatrix, build_form_factors
 from baker.radiosity.patches import PatchSet, build_patches
 from baker.uv.unwrap import unwrap_scene
@@ -243,24 +243,24 @@ def moved(scene: Scene, matrices: list[np.ndarray]) -> Scene:
     return replace(scene, instances=tuple(Instance(k, f"copy{k}", 0, m) for k, m in enumerate(matrices)))
 
 
-def prepared(builder: SceneBuilder, **settings: Any) -> tuple[World, Record]:
+def prepared(builder: SceneBuilder, **settings: Any) -> tuple[PreparedScene, Record]:
     """Return what a bake knows before the first ray of light: texels, ray tree, tables."""
     given = {"resolution": builder.size, "uv": "keep", "padding": GAP, "threads": 2, **settings}
     scene, chosen = builder.build(), make_settings(given)
     record = Record(silent)
-    return prepare(scene, unwrap_scene(scene, chosen), chosen, record), record
+    return prepare_scene(scene, unwrap_scene(scene, chosen), chosen, record), record
 
 
 def form_factors(
     builder: SceneBuilder, *, n_rays: int = 256, seed: int = 0
-) -> tuple[World, PatchSet, FormFactorMatrix]:
+) -> tuple[PreparedScene, PatchSet, FormFactorMatrix]:
     """Return the patches and the balanced form factors of a scene."""
     world, _ = prepared(builder, seed=seed)
     patches = build_patches(world.texels)
     matrix = build_form_factors(
         patches,
         world.sides.seen_patches(patches.patch),
-        world.surface, world.mask, world.table, world.rays.tracer,
-        n_rays=n_rays, seed=seed, threads=2, progress=silent,
-    )  # fmt: skip
+        world.job,
+        n_rays=n_rays,
+    )
     return world, patches, matrix

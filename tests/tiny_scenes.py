@@ -12,8 +12,10 @@ from baker.core.geometry import world_geometry
 from baker.core.progress import silent
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.lights.emissive import build_emitters
+from baker.radiosity.emitter_choice import EmitterSampling
 from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, no_sides
 from baker.radiosity.texels import build_texels
+from baker.radiosity.trace_job import TraceJob
 from baker.radiosity.triangle_lookup import build_triangle_lookup
 from baker.shading.materials import resolve_materials
 from baker.shading.scene_solids import hit_kinds, scene_solids
@@ -33,7 +35,7 @@ class Quad:
 
 @dataclass(frozen=True)
 class World:
-    """What `baker.pipeline.world.prepare` makes, without masks."""
+    """What `baker.pipeline.prepare.prepare_scene` makes, without invalid points and sides."""
 
     scene: Any
     atlas: Any
@@ -49,6 +51,15 @@ class World:
     def free(self):
         """Masks that say that no point is buried."""
         return np.full(self.texels.n, 0xFFFF, np.uint16)
+
+    def job(self, valid=None, threads=1, seed=0):
+        """The job of all texels, with all of their points unless told which are valid."""
+        valid = self.free if valid is None else valid
+        return TraceJob(self.surface, valid, self.table, self.rays.tracer, seed, threads, silent)
+
+    def sampling(self, n_light, n_gather):
+        """The emitters with numbers of rays."""
+        return EmitterSampling(self.emitters, self.shading, n_light, n_gather)
 
     @property
     def tells(self):

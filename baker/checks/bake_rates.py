@@ -10,13 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from baker.core.errors import SettingsError
+from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
 
 # Folders beside a scene that are looked into, and bytes of a manifest that are read.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
 # Stages that grow with texels, and with triangles; the rest grow with rays.
-BY_TEXEL, BY_TRIANGLE = ("texels", "finish", "write", "solve"), ("load", "unwrap", "ray tree")
-RAY_STAGES = ("buried texels", "direct light", "form factors", "final gather", "ambient occlusion")
+BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
+BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
+RAY_STAGES = (
+    Stage.INSIDE_GEOMETRY,
+    Stage.DIRECT_LIGHT,
+    Stage.FORM_FACTORS,
+    Stage.FINAL_GATHER,
+    Stage.AMBIENT_OCCLUSION,
+)
 
 
 @dataclass(frozen=True)
@@ -25,7 +33,7 @@ class Rates:
 
     Attributes
     ----------
-    ray : dict of str to float
+    ray : dict of Stage to float
         Seconds a ray of each stage.
     texel, triangle : float
         Seconds each of the stages that cast no rays.
@@ -33,7 +41,7 @@ class Rates:
         Where this is known from, in words.
     """
 
-    ray: Mapping[str, float]
+    ray: Mapping[Stage, float]
     texel: float
     triangle: float
     basis: str

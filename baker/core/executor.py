@@ -11,6 +11,7 @@ from baker.core.atlas import Atlas
 from baker.core.parallel import TileRunner, run_tiles
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 
 
 class TileExecutor(Protocol):
@@ -19,7 +20,7 @@ class TileExecutor(Protocol):
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Receive the data that all stages of a bake share; called once before the first stage."""
 
-    def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
+    def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return the runner of a stage; `arrays` holds the results of earlier stages that it needs."""
 
     def close(self) -> None:
@@ -32,7 +33,7 @@ class LocalTileExecutor:
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Do nothing: the stages hold the data already."""
 
-    def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
+    def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return `run_tiles`."""
         return run_tiles
 

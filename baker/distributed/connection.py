@@ -15,6 +15,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from baker.core.errors import BakerError, ResourceError, SettingsError
+from baker.core.stage import Stage
 from baker.distributed.tile_worker import Result, Span, TileWorker
 from baker.io.bake.manifest import library_versions
 
@@ -205,7 +206,7 @@ def worker_threads() -> int:
 def work_on_tiles(
     key: str,
     parts: tuple[Any, Any, Any],
-    stage: str,
+    stage: Stage,
     arrays: Mapping[str, NDArray[Any]],
     spans: list[Span],
 ) -> Result:

@@ -9,12 +9,11 @@ from typing import Any
 from baker.core.lightmap import BakeResult
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.distributed.connection import Cluster, Waiting, worker_threads
 from baker.jobs.executor import Event
 from baker.jobs.jobs_file import Job
 from baker.jobs.worker import describe
-
-STAGE = "on the cluster"
 
 
 class ClusterBakery:
@@ -79,7 +78,7 @@ class ClusterBakery:
             write_bake(whole, job.out, force=force)
         except KeyError:
             self._send(ticket, job, scene, force)
-            return Event(ticket, STAGE)
+            return Event(ticket, Stage.CLUSTER)
         except Exception as error:
             return Event(ticket, ended=True, error=describe(error))
         return Event(ticket, ended=True)

@@ -16,6 +16,7 @@ from baker.core.parallel import Part, TileRunner
 from baker.core.progress import Progress, report
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.distributed.connection import Cluster, Waiting, work_on_tiles
 from baker.distributed.tile_worker import Span
 
@@ -47,7 +48,7 @@ class DistributedTileExecutor:
         self._key = hashlib.sha256(pickle.dumps(self._parts, 5)).hexdigest()
         self._sent = self.cluster.send(self._parts)
 
-    def runner(self, stage: str, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
+    def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return what has the tiles of a stage worked on by the cluster."""
 
         def run(
@@ -63,7 +64,7 @@ class DistributedTileExecutor:
         ) -> None:
             report(progress, stage, 0.0)
             spans = [(begin, min(begin + tile, n)) for begin in range(0, n, tile)]
-            _Stage(self.cluster, self._submitter(stage, dict(arrays))).run(
+            _Stage(self.cluster, self._submitter(Stage(stage), dict(arrays))).run(
                 spans, n, keep, stage, progress, rays_per_item
             )
 
@@ -73,7 +74,7 @@ class DistributedTileExecutor:
         """Let the workers forget the scene."""
         self._parts = self._sent = None
 
-    def _submitter(self, stage: str, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:
+    def _submitter(self, stage: Stage, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:
         sent = self.cluster.send(arrays)
 
         def submit(spans: list[Span], again: bool) -> Any:

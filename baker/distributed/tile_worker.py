@@ -1,7 +1,7 @@
-"""What a worker does for a bake that is spread over many: it holds the scene and works on tiles.
+"""Works on tiles of a bake that is distributed over several workers; runs in a worker.
 
-The worker builds texels, ray tree and tables from scene, atlas and settings as the one that asks does, so it
-gives the same bytes; only what earlier stages found has to be sent.
+The worker builds texels, ray tree and tables from the same scene, atlas and settings as the process that
+started the bake, so both have the same bytes. Only results of earlier stages have to be sent.
 """
 
 from __future__ import annotations
@@ -9,22 +9,34 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
 from baker.core.parallel import Part, TileRunner
-from baker.core.progress import Progress, silent
+from baker.core.progress import silent
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
-
-if TYPE_CHECKING:
-    from baker.pipeline.world import World
+from baker.core.stage import Stage
+from baker.pipeline.prepare import PreparedScene, prepare_scene
+from baker.pipeline.record import Record
+from baker.pipeline.transport import (
+    patch_rays,
+    trace_ambient_occlusion,
+    trace_direct_light,
+    trace_final_gather,
+)
+from baker.radiosity.form_factors import cast_rows
+from baker.radiosity.patches import build_patches
 
 Span = tuple[int, int]
 Result = list[tuple[int, int, Part]]
+# Results of earlier stages, by name.
+Arrays = Mapping[str, NDArray[Any]]
+# Runs a stage with a tile runner.
+StageWork = Callable[[TileRunner], object]
 
 
 @dataclass
@@ -33,116 +45,85 @@ class TileWorker:
 
     Parameters
     ----------
-    scene, atlas, settings : what the bake is made of
+    scene : Scene
+        What is baked.
+    atlas : Atlas
+        Its lightmap uv.
+    settings : BakeSettings
+        Of the bake.
     """
 
     scene: Scene
     atlas: Atlas
     settings: BakeSettings
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _world: World | None = None
-    _made: dict[str, Any] = field(default_factory=dict)
+    _prepared: PreparedScene | None = None
+    _ready: tuple[Stage, StageWork] | None = None
 
-    def work(self, stage: str, arrays: Mapping[str, NDArray[Any]], spans: list[Span]) -> Result:
-        """Return what the tiles of a stage give.
+    def work(self, stage: Stage, arrays: Arrays, spans: list[Span]) -> Result:
+        """Return the results of some tiles of a stage.
 
         Parameters
         ----------
-        stage : str
-            A name in `STAGES`.
-        arrays : mapping of name to array
-            What earlier stages found, the same for all tiles of a stage.
+        stage : Stage
+            A key of `STAGES`.
+        arrays : mapping of str to array
+            Results of earlier stages, the same for all tiles of a stage.
         spans : list of (begin, end)
             Tiles as the stage itself cuts them.
+
+        Returns
+        -------
+        list of (begin, end, part)
+            Of each tile.
         """
-        with self._lock:
-            # Once for all tiles; other threads of this worker wait for it.
-            if self._world is None:
-                self._world = self._build(arrays["inside"])
-            if stage not in self._made:
-                self._made = {stage: PREPARE[stage](self._world, arrays)}
-            world, made = self._world, self._made[stage]
+        run_stage = self._stage(stage, arrays)
         found: Result = []
 
         def run(n: int, tile: int, work: Callable[[int, int], Part], **rest: Any) -> None:
             found.extend((begin, end, work(begin, end)) for begin, end in spans)
 
-        STAGES[stage](self.scene, world, made, self.settings, run)
+        run_stage(run)
         return found
 
-    def _build(self, inside: NDArray[np.uint16]) -> World:
-        from baker.pipeline.record import Record
-        from baker.pipeline.world import prepare
-
-        world = prepare(self.scene, self.atlas, self.settings, Record(silent), inside)
-        # Points kept for later stages would be those of other tiles.
-        return replace(world, kept=None)
-
-
-def _no_more(world: World, arrays: Mapping[str, NDArray[Any]]) -> None:
-    return None
-
-
-def _make_patches(world: World, arrays: Mapping[str, NDArray[Any]]) -> Any:
-    from baker.radiosity.patches import build_patches
-
-    patches = build_patches(world.texels, arrays["depth"], link=world.sides.link)
-    return patches, world.sides.seen_patches(patches.patch)
+    def _stage(self, stage: Stage, arrays: Arrays) -> StageWork:
+        """Return the stage, prepared once for all tiles; other threads of this worker wait for it."""
+        with self._lock:
+            if self._prepared is None:
+                record = Record(silent)
+                prepared = prepare_scene(self.scene, self.atlas, self.settings, record, arrays["outside"])
+                # No point cache here: it is complete only where one process works on every tile.
+                self._prepared = replace(prepared, job=replace(prepared.job, point_cache=None))
+            if self._ready is None or self._ready[0] != stage:
+                self._ready = stage, STAGES[stage](self._prepared, arrays)
+            return self._ready[1]
 
 
-def _make_image(world: World, arrays: Mapping[str, NDArray[Any]]) -> Any:
-    return world.sides.seen_light(np.array(arrays["exitance"])), arrays["exact"]
+def _direct_light(prepared: PreparedScene, arrays: Arrays) -> StageWork:
+    return lambda run: trace_direct_light(prepared, run)
 
 
-def _direct(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
-    from baker.pipeline.transport import light_directly
-
-    light_directly(scene, world, settings, silent, run)
-
-
-def _form_factors(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
-    from baker.pipeline.transport import patch_rays
-    from baker.radiosity.form_factors import cast_rows
-
-    patches, seen = made
-    quiet: Progress = silent
-    cast_rows(
-        patches,
-        seen,
-        world.surface,
-        world.mask,
-        world.table,
-        world.rays.tracer,
-        n_rays=patch_rays(settings),
-        seed=settings.seed,
-        threads=1,
-        progress=quiet,
-        run=run,
-    )
+def _form_factors(prepared: PreparedScene, arrays: Arrays) -> StageWork:
+    patches = build_patches(prepared.texels, arrays["level"], link=prepared.sides.link)
+    seen = prepared.sides.seen_patches(patches.patch)
+    n_rays = patch_rays(prepared.settings)
+    return lambda run: cast_rows(patches, seen, prepared.job.on(run), n_rays=n_rays)
 
 
-def _gather(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
-    from baker.pipeline.transport import gather_light
-
-    gather_light(world, made, settings, silent, run)
-
-
-def _open(scene: Scene, world: World, made: Any, settings: BakeSettings, run: TileRunner) -> None:
-    from baker.pipeline.transport import open_sky
-
-    open_sky(world, settings, silent, run)
+def _final_gather(prepared: PreparedScene, arrays: Arrays) -> StageWork:
+    # Arrays of a task are read-only, and `seen_light` writes a column.
+    seen = prepared.sides.seen_light(np.array(arrays["exitance"]))
+    return lambda run: trace_final_gather(prepared, seen, arrays["analytic"], run)
 
 
-# What a stage needs beyond the world, made once, and the stage itself, for some tiles.
-PREPARE: dict[str, Callable[[World, Mapping[str, NDArray[Any]]], Any]] = {
-    "direct light": _no_more,
-    "form factors": _make_patches,
-    "final gather": _make_image,
-    "ambient occlusion": _no_more,
-}
-STAGES: dict[str, Callable[[Scene, World, Any, BakeSettings, TileRunner], None]] = {
-    "direct light": _direct,
-    "form factors": _form_factors,
-    "final gather": _gather,
-    "ambient occlusion": _open,
+def _ambient_occlusion(prepared: PreparedScene, arrays: Arrays) -> StageWork:
+    return lambda run: trace_ambient_occlusion(prepared, run)
+
+
+# Of each stage with tiles, the function that prepares it from results of earlier stages.
+STAGES: dict[Stage, Callable[[PreparedScene, Arrays], StageWork]] = {
+    Stage.DIRECT_LIGHT: _direct_light,
+    Stage.FORM_FACTORS: _form_factors,
+    Stage.FINAL_GATHER: _final_gather,
+    Stage.AMBIENT_OCCLUSION: _ambient_occlusion,
 }

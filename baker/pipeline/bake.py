@@ -1,6 +1,6 @@
 """The stages of a bake, in order; the only place that wires them together.
 
-scene -> atlas -> texels -> buried points -> direct light -> patches -> form factors -> solve
+scene -> atlas -> texels -> valid points -> texel sides -> direct light -> patches -> form factors -> solve
 -> final gather -> finished pages -> output folder
 """
 
@@ -20,13 +20,14 @@ from baker.core.precision import coarse_warnings
 from baker.core.progress import Progress, silent
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.io.load import load_for_bake
 from baker.kernels.not_kept import cache_warnings
 from baker.pipeline import precompile
 from baker.pipeline.pages import finish_pages
+from baker.pipeline.prepare import prepare_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import trace_transport
-from baker.pipeline.world import prepare
 from baker.uv.unwrap import unwrap_scene
 
 
@@ -68,32 +69,33 @@ def bake(
     record, executor = Record(progress), executor or LocalTileExecutor()
     compiling = precompile.start()
     try:
-        with record.stage("load"):
+        with record.stage(Stage.LOAD):
             if isinstance(scene, Scene):
                 check_lights(scene)
             else:
                 scene = load_for_bake(scene, settings)
         compiling = precompile.suit(compiling, scene)
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
-        with record.stage("unwrap"):
+        with record.stage(Stage.UNWRAP):
             atlas = unwrap_scene(scene, settings, progress)
         record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
         executor.open(scene, atlas, settings)
-        world = prepare(scene, atlas, settings, record)
+        prepared = prepare_scene(scene, atlas, settings, record)
         if any(channel.needs_light for channel in channels.values()):
             precompile.wait_for_rays(compiling, progress)
-        transport = trace_transport(scene, world, channels, settings, record, executor)
-        world.rays.close()
+        transport = trace_transport(prepared, channels, record, executor)
+        prepared.rays.close()
         executor.close()
         # Finishing needs where texels are, not what they are made of: a gigabyte at 4096 texels a side.
-        texels, good = world.texels.without_surface(), world.mask[: world.texels.n_front] != 0
-        del world
+        texels = prepared.texels.without_surface()
+        valid = prepared.job.valid_points[: texels.n_front] != 0
+        del prepared
         precompile.finish(compiling, progress)
-        result = finish_pages(scene, atlas, texels, good, transport, channels, settings, record)
+        result = finish_pages(scene, atlas, texels, valid, transport, channels, settings, record)
         if folder is not None:
             from baker.io.bake.write_bake import write_bake
 
-            with record.stage("write"):
+            with record.stage(Stage.WRITE):
                 manifest = write_bake(result, folder, force=force, progress=progress)
             result = replace(result, out=folder, manifest=manifest)
     except MemoryError:

@@ -13,6 +13,7 @@ from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import thread_count
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
 from baker.finish.oidn import LightmapDenoiser
@@ -49,7 +50,7 @@ def finish_pages(
     layers = {name: channel.layers(transport) for name, channel in channels.items()}
     value = {name: np.zeros((*shape, channel.components), np.float32) for name, channel in channels.items()}
     threads = thread_count(settings.threads)
-    with record.stage("finish"), LightmapDenoiser(threads) as lightmap_denoiser:
+    with record.stage(Stage.FINISH), LightmapDenoiser(threads) as lightmap_denoiser:
         for page in range(atlas.n_pages):
             plan = PagePlan(region[page], valid[page], centroid[page])
             for name, channel in channels.items():

@@ -19,8 +19,8 @@ import numpy as np
 
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Instance, Material, Mesh, Scene
+from baker.core.stage import Stage
 
-STAGE = "compile"
 _LOOK = 0.1
 _PAGE = 48
 _TEXELS = 16
@@ -81,7 +81,7 @@ def _wait(process: subprocess.Popen[bytes] | None, progress: Progress, enough: C
         try:
             process.wait(_LOOK)
         except subprocess.TimeoutExpired:
-            report(progress, STAGE, 0.5, "first run only")
+            report(progress, Stage.COMPILE, 0.5, "first run only")
         else:
             process = None
 

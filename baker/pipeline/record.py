@@ -10,6 +10,7 @@ from typing import Any
 
 from baker.core.progress import Progress, report
 from baker.core.scene import SceneWarning
+from baker.core.stage import Stage
 
 
 @dataclass
@@ -23,7 +24,7 @@ class Record:
     warnings: list[SceneWarning] = field(default_factory=list)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: Stage) -> Iterator[None]:
         """Time a stage; several visits add up."""
         report(self.progress, name, 0.0)
         start = time.perf_counter()

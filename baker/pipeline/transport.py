@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +10,17 @@ from numpy.typing import NDArray
 
 from baker.channels.channel import Channel, Transport
 from baker.core.executor import LocalTileExecutor, TileExecutor
-from baker.core.parallel import TileRunner, thread_count
-from baker.core.progress import Progress
-from baker.core.scene import Scene, SceneWarning
+from baker.core.parallel import TileRunner
+from baker.core.scene import SceneWarning
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
+from baker.pipeline.prepare import PreparedScene
 from baker.pipeline.record import Record
-from baker.pipeline.world import World
 from baker.radiosity.direct import DirectLight, direct_light
 from baker.radiosity.final_gather import Gathered, ambient_occlusion, final_gather
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.kernels.side_table import SeenLight
-from baker.radiosity.narrow_gaps import gap_depth
+from baker.radiosity.narrow_gaps import gap_level
 from baker.radiosity.patches import NARROW, build_patches
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.trapped_light import light_warnings
@@ -29,190 +30,195 @@ MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
 
 def trace_transport(
-    scene: Scene,
-    world: World,
-    channels: dict[str, Channel],
-    settings: BakeSettings,
+    prepared: PreparedScene,
+    channels: Mapping[str, Channel],
     record: Record,
     executor: TileExecutor | None = None,
 ) -> Transport:
-    """Cast the rays of all stages that the channels need."""
+    """Run all ray stages that the channels need.
+
+    Parameters
+    ----------
+    prepared : PreparedScene
+        The scene and the settings of the bake.
+    channels : mapping of str to Channel
+        What is baked.
+    record : Record
+        Takes timings, ray counts, figures of the solve, and warnings.
+    executor : TileExecutor, optional
+        Works on the tiles; None is this process.
+
+    Returns
+    -------
+    Transport
+        Of the front texels; None in what no channel needs.
+    """
     executor = executor or LocalTileExecutor()
     transport = Transport()
-    n_samples = settings.hemisphere_samples
-    ao_samples = settings.ao_samples or n_samples
+    n_samples = prepared.settings.hemisphere_samples
+    ao_samples = prepared.settings.ao_samples or n_samples
     if any(channel.needs_light for channel in channels.values()):
-        transport = _light(scene, world, settings, record, executor)
+        transport = _light(prepared, record, executor)
     if any(channel.needs_open for channel in channels.values()):
-        share = transport.gathered
-        if share is not None and ao_samples == n_samples:
-            return replace(transport, open=share.open, ao_samples=ao_samples)
-        with record.stage("ambient occlusion"):
-            run = executor.runner("ambient occlusion", {"inside": world.inside})
-            opened = open_sky(world, settings, record.progress, run)
-            record.rays["ambient occlusion"] = world.texels.n_front * ao_samples
+        gathered = transport.gathered
+        if gathered is not None and ao_samples == n_samples:
+            return replace(transport, open=gathered.open, ao_samples=ao_samples)
+        with record.stage(Stage.AMBIENT_OCCLUSION):
+            run = executor.runner(Stage.AMBIENT_OCCLUSION, {"outside": prepared.outside})
+            opened = trace_ambient_occlusion(prepared, run)
+            record.rays[Stage.AMBIENT_OCCLUSION] = prepared.texels.n_front * ao_samples
         transport = replace(transport, open=opened, ao_samples=ao_samples)
     return transport
 
 
-def _light(
-    scene: Scene, world: World, settings: BakeSettings, record: Record, executor: TileExecutor
-) -> Transport:
+def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> Transport:
     """Direct light, radiosity and final gather."""
-    texels, sky = world.texels, np.array(settings.sky_radiance)
-    if not scene.lights and not len(world.emitters.power) and not sky.any():
+    texels, sky = prepared.texels, np.array(prepared.settings.sky_radiance)
+    if not prepared.scene.lights and not len(prepared.emitters.power) and not sky.any():
         record.warnings.append(
             SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use `sky`")
         )
-    with record.stage("direct light"):
-        run = executor.runner("direct light", {"inside": world.inside})
-        direct = light_directly(scene, world, settings, record.progress, run)
-        record.rays["direct light"] = direct.rays
-    with record.stage("form factors"):
-        depth, cast = gap_depth(
-            texels,
-            world.surface,
-            world.mask,
-            world.rays.tracer,
-            seed=settings.seed,
-            threads=thread_count(settings.threads),
-            progress=record.progress,
-            kept=world.kept,
+    with record.stage(Stage.DIRECT_LIGHT):
+        direct = trace_direct_light(
+            prepared, executor.runner(Stage.DIRECT_LIGHT, {"outside": prepared.outside})
         )
-        record.rays["form factors"] = cast
+        record.rays[Stage.DIRECT_LIGHT] = direct.rays
+    with record.stage(Stage.FORM_FACTORS):
+        level, cast = gap_level(texels, prepared.job)
+        record.rays[Stage.FORM_FACTORS] = cast
     exitance = np.zeros((texels.n, 4), np.float32)
-    if settings.bounces != 0:
-        exitance[:, :3] = _reflected(world, direct.complete, depth, settings, record, executor)
-    # It has done its part.
+    if prepared.settings.bounces != 0:
+        exitance[:, :3] = _reflected(prepared, direct.complete, level, record, executor)
+    # Free it: unused from here on.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
-    with record.stage("final gather"):
+    with record.stage(Stage.FINAL_GATHER):
         run = executor.runner(
-            "final gather", {"inside": world.inside, "exitance": exitance, "exact": direct.exact}
+            Stage.FINAL_GATHER,
+            {"outside": prepared.outside, "exitance": exitance, "analytic": direct.analytic},
         )
-        seen = world.sides.seen_light(exitance)
+        seen = prepared.sides.seen_light(exitance)
         del exitance
-        gathered = gather_light(world, (seen, direct.exact), settings, record.progress, run)
-        record.rays["final gather"] = gathered.rays
-    return Transport(direct=direct, gathered=gathered, gap=depth[: texels.n_front] >= NARROW)
+        gathered = trace_final_gather(prepared, seen, direct.analytic, run)
+        record.rays[Stage.FINAL_GATHER] = gathered.rays
+    return Transport(direct=direct, gathered=gathered, gap=level[: texels.n_front] >= NARROW)
 
 
-def light_directly(
-    scene: Scene, world: World, settings: BakeSettings, progress: Progress, run: TileRunner
-) -> DirectLight:
-    """Direct light of all texels, or of the tiles that `run` works on."""
-    return direct_light(
-        world.surface,
-        world.mask,
-        world.table,
-        scene.local_lights,
-        world.emitters,
-        world.shading,
-        world.rays.tracer,
-        n_light=settings.light_samples or settings.hemisphere_samples,
-        n_gather=settings.hemisphere_samples,
-        seed=settings.seed,
-        threads=thread_count(settings.threads),
-        progress=progress,
-        chart=world.texels.chart,
-        kept=world.kept,
-        run=run,
-    )
+def trace_direct_light(prepared: PreparedScene, run: TileRunner) -> DirectLight:
+    """Return the direct light of all texels.
 
+    Parameters
+    ----------
+    prepared : PreparedScene
+        The scene and the settings of the bake.
+    run : TileRunner
+        Works on the tiles; what it leaves out stays 0.
 
-def gather_light(
-    world: World,
-    found: tuple[SeenLight, NDArray[np.uint8]],
-    settings: BakeSettings,
-    progress: Progress,
-    run: TileRunner,
-) -> Gathered:
-    """Final gather of all texels, or of the tiles that `run` works on.
-
-    `found` is what hits send back, and which entries have all light of emitters.
+    Returns
+    -------
+    DirectLight
+        Of all n entries.
     """
+    return direct_light(prepared.job.on(run), prepared.scene.local_lights, prepared.sampling)
+
+
+def trace_final_gather(
+    prepared: PreparedScene, seen: SeenLight, analytic: NDArray[np.uint8], run: TileRunner
+) -> Gathered:
+    """Return the gathered light and ambient occlusion of the front texels.
+
+    Parameters
+    ----------
+    prepared : PreparedScene
+        The scene and the settings of the bake.
+    seen : SeenLight
+        Light that entries reflect, as rays find it.
+    analytic : (n,) uint8
+        1 for entries that have all light of emitters already.
+    run : TileRunner
+        Works on the tiles; what it leaves out stays 0.
+
+    Returns
+    -------
+    Gathered
+        Of all front texels.
+    """
+    settings = prepared.settings
     return final_gather(
-        world.texels.n_front,
-        world.surface,
-        world.mask,
-        world.table,
-        *found,
-        world.emitters,
-        world.shading,
-        world.rays.tracer,
-        n_samples=settings.hemisphere_samples,
-        n_light=settings.light_samples or settings.hemisphere_samples,
+        prepared.job.on(run),
+        prepared.texels.n_front,
+        seen,
+        analytic,
+        prepared.sampling,
         sky=settings.sky_radiance,
-        ao_distance=settings.ao_reach(world.geometry.diagonal),
-        seed=settings.seed,
-        threads=thread_count(settings.threads),
-        progress=progress,
-        chart=world.texels.chart,
-        kept=world.kept,
-        run=run,
+        ao_distance=settings.ao_reach(prepared.geometry.diagonal),
     )
 
 
-def open_sky(
-    world: World, settings: BakeSettings, progress: Progress, run: TileRunner
-) -> NDArray[np.float32]:
-    """Ambient occlusion of all texels, or of the tiles that `run` works on."""
+def trace_ambient_occlusion(prepared: PreparedScene, run: TileRunner) -> NDArray[np.float32]:
+    """Return the ambient occlusion of the front texels, from rays of its own.
+
+    Parameters
+    ----------
+    prepared : PreparedScene
+        The scene and the settings of the bake.
+    run : TileRunner
+        Works on the tiles; what it leaves out stays 0.
+
+    Returns
+    -------
+    (n_front,) float32
+        From 0, closed, to 1, open.
+    """
+    settings = prepared.settings
     return ambient_occlusion(
-        world.texels.n_front,
-        world.surface,
-        world.mask,
-        world.rays.tracer,
+        prepared.job.on(run),
+        prepared.texels.n_front,
         n_samples=settings.ao_samples or settings.hemisphere_samples,
-        distance=settings.ao_reach(world.geometry.diagonal),
-        seed=settings.seed,
-        threads=thread_count(settings.threads),
-        progress=progress,
-        kept=world.kept,
-        run=run,
+        distance=settings.ao_reach(prepared.geometry.diagonal),
     )
 
 
 def patch_rays(settings: BakeSettings) -> int:
-    """Count the rays from each patch for its form factors."""
+    """Return the number of rays from each patch for its form factors.
+
+    Parameters
+    ----------
+    settings : BakeSettings
+        Of the bake.
+
+    Returns
+    -------
+    int
+        The hemisphere samples of a texel, from `MIN_PATCH_RAYS` to `MAX_PATCH_RAYS`.
+    """
     return min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS)
 
 
 def _reflected(
-    world: World,
+    prepared: PreparedScene,
     complete: NDArray[np.float32],
-    depth: NDArray[np.uint8],
-    settings: BakeSettings,
+    level: NDArray[np.uint8],
     record: Record,
     executor: TileExecutor,
 ) -> NDArray[np.float32]:
-    """Return (n, 3) float32, lx: light that each texel reflects, after all bounces but the gather's own.
+    """Return (n, 3) float32, lx: light that each entry reflects, after all bounces but that of the gather.
 
-    depth : (n,) uint8, of each entry in gaps, see `gap_depth`
+    complete : (n, 3) float32, lx, direct light; level : (n,) uint8, of each entry in gaps, see `gap_level`
     """
-    texels = world.texels
+    texels, settings = prepared.texels, prepared.settings
     sky: NDArray[np.float64] = np.array(settings.sky_radiance, np.float64)
-    with record.stage("form factors"):
-        patches = build_patches(texels, depth, link=world.sides.link)
-        matrix = build_form_factors(
-            patches,
-            world.sides.seen_patches(patches.patch),
-            world.surface,
-            world.mask,
-            world.table,
-            world.rays.tracer,
-            n_rays=patch_rays(settings),
-            seed=settings.seed,
-            threads=thread_count(settings.threads),
-            progress=record.progress,
-            kept=world.kept,
-            run=executor.runner("form factors", {"inside": world.inside, "depth": depth}),
-        )
-        record.rays["form factors"] += matrix.rays
-    with record.stage("solve"):
+    with record.stage(Stage.FORM_FACTORS):
+        patches = build_patches(texels, level, link=prepared.sides.link)
+        seen = prepared.sides.seen_patches(patches.patch)
+        run = executor.runner(Stage.FORM_FACTORS, {"outside": prepared.outside, "level": level})
+        matrix = build_form_factors(patches, seen, prepared.job.on(run), n_rays=patch_rays(settings))
+        record.rays[Stage.FORM_FACTORS] += matrix.rays
+    with record.stage(Stage.SOLVE):
         weight = np.maximum(texels.area, 1e-12)
         albedo = patches.mean(texels.albedo, weight)
         from_sky = np.pi * matrix.open * sky
         direct = patches.mean(complete, weight) + from_sky
-        # Direct light meets the albedo of its own texel; the sky's share is known per patch.
+        # Direct light is multiplied by the albedo of its own texel; the sky's share is known per patch.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
         solution = solve_radiosity(
             matrix,
@@ -221,7 +227,7 @@ def _reflected(
             patches.area,
             bounces=settings.bounces,
             progress=record.progress,
-            threads=thread_count(settings.threads),
+            threads=prepared.job.threads,
         )
         record.solve.update(
             patches=patches.n,

@@ -7,31 +7,31 @@ the second is complete and lights the surfaces that later bounces start from.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.light_kind import kind_of
-from baker.core.parallel import Part, TileRunner, run_tiles
-from baker.core.progress import Progress
+from baker.core.parallel import Part
 from baker.core.scene import PunctualLight
-from baker.kernels.emitters import Emitters, needed_shading
+from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shading import Shading
-from baker.kernels.surface import N_POINTS, Surface
+from baker.kernels.surface import N_POINTS
 from baker.kernels.triangle_lookup import TriangleLookup
-from baker.radiosity.emitter_choice import Choice, LampChooser
+from baker.radiosity.emitter_choice import Choice, EmitterSampling, LampChooser
 from baker.radiosity.kernels.area_light import light_samples
 from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.radiosity.kernels.shadow import add_visible
 from baker.radiosity.kernels.side_table import nothing_seen
-from baker.radiosity.point_cache import PointCache, tile_points
-from baker.trace.embree import Tracer
-from baker.trace.packets import PacketBuffers, new_packet_buffers
+from baker.radiosity.trace_job import TraceJob
+from baker.trace.packets import PacketBuffers
 
 # Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
 TILE = 512
-STAGE = "direct light"
+# Columns of the light of a tile: RGB of both estimates.
+WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
 # Hemisphere rays that complete the second estimate close to emitters: where a cluster's radius is more than
 # this share of its distance. Further away shadow rays alone are as good.
 N_HEMISPHERE = 4
@@ -47,131 +47,185 @@ class DirectLight:
     weighted : (n, 3) float32, lx, without what gather rays find at emitters
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
-    exact : (n,) uint8, 1 where `weighted` is complete, too
+    analytic : (n,) uint8, 1 where `weighted` is complete, too
     rays : int, shadow rays cast at lamps; of other rays those that may be needed
     """
 
     weighted: NDArray[np.float32]
     complete: NDArray[np.float32]
     variance: NDArray[np.float32]
-    exact: NDArray[np.uint8]
+    analytic: NDArray[np.uint8]
     rays: int
 
 
-def direct_light(
-    surface: Surface,
-    mask: NDArray[np.uint16],
-    table: TriangleLookup,
-    lights: tuple[PunctualLight, ...],
-    emitters: Emitters,
-    shading: Shading,
-    tracer: Tracer,
-    *,
-    n_light: int,
-    n_gather: int,
-    seed: int,
-    threads: int,
-    progress: Progress,
-    chart: NDArray[np.int32] | None = None,
-    kept: PointCache | None = None,
-    run: TileRunner = run_tiles,
-) -> DirectLight:
+def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: EmitterSampling) -> DirectLight:
     """Light every texel entry directly.
 
     Parameters
     ----------
-    mask : (n,) uint16
-        Bit k is set if point k of the texel is not buried.
-    n_light, n_gather : int
-        Shadow rays per texel, and the final gather's hemisphere rays that they are weighed against.
-    kept : PointCache, optional
-        Where points are left for later stages with the same tiles.
-    chart : (n,) int32, optional
-        Of each entry: lights are chosen for each chart of a tile.
-    run : TileRunner
-        Works on the tiles.
+    job : TraceJob
+        Where rays start; points stay in its cache for later stages with the same tiles.
+    lights : tuple of PunctualLight
+        Lights without area.
+    sampling : EmitterSampling
+        Emitters, shadow rays to them, and the hemisphere rays that these are weighted against.
+
+    Returns
+    -------
+    DirectLight
+        Both estimates of all n entries.
     """
-    n = len(surface.pixel)
+    n = job.n
     weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
-    variance, exact = np.zeros(n, np.float32), np.zeros(n, np.uint8)
-    net = sobol_reversed(n_light, seed, 1)
-    chooser = LampChooser.build(emitters, n_light, chart)
-    hidden_net = sobol_reversed(chooser.n_hidden, seed, 3)
-    few = sobol_reversed(N_HEMISPHERE, seed, 2)
-    weigh = {near: np.array([n_gather, N_HEMISPHERE * near], np.float64) for near in (True, False)}
+    variance, analytic = np.zeros(n, np.float32), np.zeros(n, np.uint8)
     punctual = [(light, kind) for light in lights for kind in [kind_of(light)] if max(light.intensity) > 0]
-
-    dark, black = nothing_seen(), np.zeros(3, np.float32)
-    limits = np.array([0.0, n_light], np.float64)
-    few_shared = shared_bits_mask(N_HEMISPHERE)
-
+    emitter_light = _EmitterLight.build(job, sampling)
     cast = np.zeros(-(-n // TILE), np.int64)
-    needed = needed_shading(emitters, shading)
-
-    def from_emitters(
-        choice: Choice,
-        origin: NDArray[np.float32],
-        normal: NDArray[np.float32],
-        begin: int,
-        buffers: PacketBuffers,
-        out: NDArray[np.float32],
-        spread: NDArray[np.float32],
-        done: NDArray[np.uint8],
-    ) -> int:
-        near, n_cast = choice.view > CLOSE, 0
-        for lamps, own_net in ((choice.seen, net), (choice.hidden, hidden_net)):
-            if lamps is None or not lamps.chance.any():
-                continue
-            own, second = np.zeros_like(out), np.zeros(len(out), np.float32)
-            complete = done if lamps is choice.seen else np.zeros(len(out), np.uint8)
-            n_cast += light_samples(
-                origin, normal, lamps, needed, buffers, begin, own_net, shared_bits_mask(len(own_net)),
-                weigh[near], complete, own, second,
-            )  # fmt: skip
-            out += own
-            spread += batch_variance(own[:, :3].sum(axis=1), second)
-        if near and (choice.hidden is not None or not done.all()):
-            n_cast += N_HEMISPHERE * len(out)
-            found = np.zeros((len(out), N_COLUMNS), np.float32)
-            gather(
-                origin, normal, table, dark, choice.found, needed, buffers, begin, few, few_shared,
-                black, limits, done, found,
-            )  # fmt: skip
-            out[:, 3:] += found[:, DIRECT : DIRECT + 3]
-        return n_cast
 
     def work(begin: int, end: int) -> Part:
-        buffers = new_packet_buffers(tracer)
-        origin, normal = tile_points(surface, mask, begin, end, kept)
-        out, spread = np.zeros((end - begin, 6), np.float32), np.zeros(end - begin, np.float32)
-        done, n_cast = np.zeros(end - begin, np.uint8), 0
-        for choice in chooser.choose(begin, origin, normal, buffers):
-            part = choice.part
-            n_cast += from_emitters(
-                choice,
-                origin[part],
-                normal[part],
-                begin + part.start,
-                buffers,
-                out[part],
-                spread[part],
-                done[part],
-            )
+        buffers = job.packet_buffers()
+        origin, normal = job.tile_points(begin, end)
+        tile = _Tile.zeros(end - begin)
+        n_cast = emitter_light.add(begin, origin, normal, buffers, tile)
         if punctual:
             ray = np.zeros((end - begin, N_POINTS, 4), np.float32)
             weight = np.zeros((end - begin, N_POINTS), np.float32)
             for light, kind in punctual:
                 kind.fill(light, origin, normal, ray, weight)
-                add_visible(buffers, origin, ray, weight, np.array(light.intensity, np.float32), out)
-        return out[:, :3], out[:, 3:], spread, done, n_cast
+                add_visible(buffers, origin, ray, weight, np.array(light.intensity, np.float32), tile.light)
+        return tile.light[:, WEIGHTED], tile.light[:, COMPLETE], tile.variance, tile.analytic, n_cast
 
     def keep(begin: int, end: int, part: Part) -> None:
-        weighted[begin:end], complete[begin:end], variance[begin:end], exact[begin:end] = part[:4]
+        weighted[begin:end], complete[begin:end], variance[begin:end], analytic[begin:end] = part[:4]
         cast[begin // TILE] = part[4]
 
-    rays = n_light * bool(len(emitters.power)) + N_POINTS * len(punctual)
-    run(n, TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=rays)
-    return DirectLight(weighted, complete, variance, exact, int(cast.sum()) + N_POINTS * len(punctual) * n)
+    rays = sampling.n_light * bool(len(sampling.emitters.power)) + N_POINTS * len(punctual)
+    job.run(Stage.DIRECT_LIGHT, n, TILE, work, keep, rays_per_item=rays)
+    return DirectLight(weighted, complete, variance, analytic, int(cast.sum()) + N_POINTS * len(punctual) * n)
+
+
+class _Tile(NamedTuple):
+    """Results of the m entries of a tile, or of a part of it.
+
+    light : (m, 6) float32, lx, columns `WEIGHTED` and `COMPLETE`
+    variance : (m,) float32, lx2; analytic : (m,) uint8, see `DirectLight`
+    """
+
+    light: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    analytic: NDArray[np.uint8]
+
+    @classmethod
+    def zeros(cls, m: int) -> _Tile:
+        """Return a tile of m entries without light."""
+        return cls(np.zeros((m, 6), np.float32), np.zeros(m, np.float32), np.zeros(m, np.uint8))
+
+    def part(self, own: slice) -> _Tile:
+        """Return views of some entries."""
+        return _Tile(self.light[own], self.variance[own], self.analytic[own])
+
+
+@dataclass(frozen=True)
+class _EmitterLight:
+    """Light of emissive triangles, tile by tile.
+
+    Attributes
+    ----------
+    lookup : TriangleLookup
+    chooser : LampChooser
+    shading : Shading or None, from `emitters.needed_shading`
+    sobol_points : (n_light, 2) uint32, hidden_points : (n_hidden, 2) uint32, of shadow rays
+    near_points : (N_HEMISPHERE, 2) uint32, of hemisphere rays close to emitters
+    n_gather, n_light : int, see `EmitterSampling`
+    """
+
+    lookup: TriangleLookup
+    chooser: LampChooser
+    shading: Shading | None
+    sobol_points: NDArray[np.uint32]
+    hidden_points: NDArray[np.uint32]
+    near_points: NDArray[np.uint32]
+    n_gather: int
+    n_light: int
+
+    @classmethod
+    def build(cls, job: TraceJob, sampling: EmitterSampling) -> _EmitterLight:
+        """Return what all tiles of a job share."""
+        chooser = sampling.chooser(job.chart)
+        return cls(
+            lookup=job.lookup,
+            chooser=chooser,
+            shading=sampling.needed_shading(),
+            sobol_points=sobol_reversed(sampling.n_light, job.seed, 1),
+            hidden_points=sobol_reversed(chooser.n_hidden, job.seed, 3),
+            near_points=sobol_reversed(N_HEMISPHERE, job.seed, 2),
+            n_gather=sampling.n_gather,
+            n_light=sampling.n_light,
+        )
+
+    def add(
+        self,
+        begin: int,
+        origin: NDArray[np.float32],
+        normal: NDArray[np.float32],
+        buffers: PacketBuffers,
+        tile: _Tile,
+    ) -> int:
+        """Add the light of emitters to the tile that begins at an entry; return the number of rays cast.
+
+        origin, normal : (m, 16, 3) float32, world
+        """
+        n_cast = 0
+        for choice in self.chooser.choose(begin, origin, normal, buffers):
+            own = choice.part
+            points, out = (origin[own], normal[own]), tile.part(own)
+            n_cast += self._sample(choice, points, begin + own.start, buffers, out)
+            if choice.view > CLOSE and (choice.hidden is not None or not out.analytic.all()):
+                n_cast += self._gather(choice, points, begin + own.start, buffers, out)
+        return n_cast
+
+    def _sample(
+        self,
+        choice: Choice,
+        points: tuple[NDArray[np.float32], ...],
+        begin: int,
+        buffers: PacketBuffers,
+        out: _Tile,
+    ) -> int:
+        """Add light found by shadow rays; return their number."""
+        n_cast = 0
+        # Hemisphere rays that find the same emitters: of the final gather, and of `_gather`.
+        hemisphere = np.array([self.n_gather, N_HEMISPHERE * (choice.view > CLOSE)], np.float64)
+        for lamps, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
+            if lamps is None or not lamps.chance.any():
+                continue
+            light, square = np.zeros_like(out.light), np.zeros(len(out.light), np.float32)
+            analytic = out.analytic if lamps is choice.seen else np.zeros(len(out.light), np.uint8)
+            n_cast += light_samples(
+                *points, lamps, self.shading, buffers, begin, sobol_points,
+                shared_bits_mask(len(sobol_points)), hemisphere, analytic, light, square,
+            )  # fmt: skip
+            out.light[:] += light
+            out.variance[:] += batch_variance(light[:, WEIGHTED].sum(axis=1), square)
+        return n_cast
+
+    def _gather(
+        self,
+        choice: Choice,
+        points: tuple[NDArray[np.float32], ...],
+        begin: int,
+        buffers: PacketBuffers,
+        out: _Tile,
+    ) -> int:
+        """Complete the second estimate with hemisphere rays; return their number."""
+        found = np.zeros((len(out.light), N_COLUMNS), np.float32)
+        limits, black = np.array([0.0, self.n_light], np.float64), np.zeros(3, np.float32)
+        gather(
+            *points, self.lookup, nothing_seen(), choice.found, self.shading, buffers, begin,
+            self.near_points, shared_bits_mask(N_HEMISPHERE), black, limits, out.analytic, found,
+        )  # fmt: skip
+        out.light[:, COMPLETE] += found[:, DIRECT : DIRECT + 3]
+        return N_HEMISPHERE * len(out.light)
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:

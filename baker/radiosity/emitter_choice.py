@@ -27,9 +27,11 @@ from baker.kernels.emitters import (
     TEXTURED,
     Emitters,
     TileEmitters,
+    needed_shading,
     tile_emitters,
     widest_view,
 )
+from baker.kernels.shading import Shading
 from baker.radiosity.kernels.emitter_probe import probe_clusters
 from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
@@ -48,6 +50,36 @@ _TURN = 0.5
 _ALIKE = 4.0
 # Samples of what no ray reached, as a share of the others.
 _HIDDEN_SHARE = 1.0 / 8.0
+
+
+@dataclass(frozen=True)
+class EmitterSampling:
+    """Emitters, and the sample numbers of both strategies that find them, combined by the balance heuristic.
+
+    Attributes
+    ----------
+    emitters : Emitters
+        Emissive triangles in clusters.
+    shading : Shading
+        Materials of all triangles: textured emission, alpha.
+    n_light : int
+        Shadow rays to emitters from each texel.
+    n_gather : int
+        Hemisphere rays of the final gather from each texel.
+    """
+
+    emitters: Emitters
+    shading: Shading
+    n_light: int
+    n_gather: int
+
+    def needed_shading(self) -> Shading | None:
+        """Return the shading that kernels need; see `emitters.needed_shading`."""
+        return needed_shading(self.emitters, self.shading)
+
+    def chooser(self, chart: NDArray[np.int32] | None) -> LampChooser:
+        """Return what chooses emitters for tiles; `chart` (n,) int32 is that of each texel entry."""
+        return LampChooser.build(self.emitters, self.n_light, chart)
 
 
 class Choice(NamedTuple):

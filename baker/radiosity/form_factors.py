@@ -14,11 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import Part, TileRunner, run_tiles
-from baker.core.progress import Progress
+from baker.core.parallel import Part
+from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.surface import N_POINTS, Surface
-from baker.kernels.triangle_lookup import TriangleLookup
+from baker.kernels.surface import N_POINTS
 from baker.radiosity.kernels.form_factor import (
     SKY,
     cast_form_factors,
@@ -28,11 +27,8 @@ from baker.radiosity.kernels.form_factor import (
 )
 from baker.radiosity.kernels.side_table import SeenPatch
 from baker.radiosity.patches import PatchSet
-from baker.radiosity.point_cache import PointCache, some_points
-from baker.trace.embree import Tracer
-from baker.trace.packets import new_packet_buffers
+from baker.radiosity.trace_job import TraceJob
 
-STAGE = "form factors"
 _TILE = 256
 _BALANCE_STEPS = 30
 # How many rays' worth of its own measurement a row sum may give way to what other patches saw.
@@ -85,59 +81,39 @@ class FormFactorMatrix:
         return sums
 
 
-def build_form_factors(
-    patches: PatchSet,
-    seen: SeenPatch,
-    surface: Surface,
-    mask: NDArray[np.uint16],
-    table: TriangleLookup,
-    tracer: Tracer,
-    *,
-    n_rays: int,
-    seed: int,
-    threads: int,
-    progress: Progress,
-    kept: PointCache | None = None,
-    run: TileRunner = run_tiles,
-) -> FormFactorMatrix:
+def build_form_factors(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int) -> FormFactorMatrix:
     """Cast `n_rays` from every patch and build the matrix.
 
     Parameters
     ----------
+    patches : PatchSet
+        The P patches of all texel entries.
     seen : SeenPatch
         Patches that hits lie on, `Sides.seen_patches` of `patches.patch`.
-    kept : PointCache, optional
-        Points of an earlier stage.
-    run : TileRunner
-        Works on tiles of patches.
+    job : TraceJob
+        Where rays start and what works on tiles of patches.
+    n_rays : int
+        Rays from each patch.
+
+    Returns
+    -------
+    FormFactorMatrix
+        Merged from both estimates of each pair, and balanced.
     """
-    n = patches.n
-    rows = cast_rows(
-        patches,
-        seen,
-        surface,
-        mask,
-        table,
-        tracer,
-        n_rays=n_rays,
-        seed=seed,
-        threads=threads,
-        progress=progress,
-        kept=kept,
-        run=run,
-    )
+    rows = cast_rows(patches, seen, job, n_rays=n_rays)
     ordered = [rows[begin] for begin in sorted(rows)]
     if ordered:
         column, count, length, tally = (np.concatenate([row[k] for row in ordered]) for k in range(4))
     else:
         column, count, length = (np.zeros(0, np.int32) for _ in range(3))
         tally = np.zeros((0, 2), np.int32)
+    n = patches.n
     first = np.zeros(n + 1, np.int64)
     np.cumsum(length, out=first[1:])
     value = (count / np.float32(n_rays)).astype(np.float32)
     sky, lost = (np.asarray(count / n_rays, np.float32) for count in tally.T)
     merged = _merged(first, column, value, patches.area)
-    if not tracer.coloured or not ordered:
+    if not job.tracer.coloured or not ordered:
         return _balanced(merged, patches.area, sky, lost, n * n_rays)
     passed, sky_passed = (np.concatenate([row[k] for row in ordered]) for k in (4, 5))
     # The mean over the rays of both estimates; balancing changes how much light arrives, not its colour.
@@ -150,22 +126,19 @@ def build_form_factors(
     return replace(matrix, tint=np.minimum(tint, 1.0), sky_tint=sky_tint.astype(np.float32))
 
 
-def cast_rows(
-    patches: PatchSet,
-    seen: SeenPatch,
-    surface: Surface,
-    mask: NDArray[np.uint16],
-    table: TriangleLookup,
-    tracer: Tracer,
-    *,
-    n_rays: int,
-    seed: int,
-    threads: int,
-    progress: Progress,
-    kept: PointCache | None = None,
-    run: TileRunner = run_tiles,
-) -> dict[int, Part]:
-    """Cast the rays; see `build_form_factors`.
+def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int) -> dict[int, Part]:
+    """Cast the rays of `build_form_factors`, which has the same parameters.
+
+    Parameters
+    ----------
+    patches : PatchSet
+        The P patches of all texel entries.
+    seen : SeenPatch
+        Patches that hits lie on.
+    job : TraceJob
+        Where rays start and what works on tiles of patches.
+    n_rays : int
+        Rays from each patch.
 
     Returns
     -------
@@ -175,31 +148,34 @@ def cast_rows(
         light, also (k, 3) and (m, 3) float32: its colours summed over an entry's rays, and those that left.
     """
     n = patches.n
-    net = sobol_reversed(n_rays, seed, 5)
-    shared = shared_bits_mask(n_rays)
+    sobol_points, shared = sobol_reversed(n_rays, job.seed, 5), shared_bits_mask(n_rays)
     tally = np.zeros((n, 2), np.int32)
-    rows: dict[int, Part] = {}
-
-    # Each ray starts from the texel where its share of the patch's area lies, at a point of its own: the
-    # first share c of the area has those rays whose (k + 0.5) / R is at most c.
-    owner = np.repeat(np.arange(n), np.diff(patches.first))
-    running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)
-    running[patches.first[1:] - 1] = n_rays * np.arange(1, n + 1)
-    starts_of = np.diff(running.astype(np.int64), prepend=0)
-    shuffle = np.random.Generator(np.random.PCG64(seed)).permuted(
+    starts_of = _starts_of(patches, n_rays)
+    shuffle = np.random.Generator(np.random.PCG64(job.seed)).permuted(
         np.resize(np.arange(N_POINTS, dtype=np.uint8), (64, n_rays)), axis=1
     )
+    rows: dict[int, Part] = {}
 
     def work(begin: int, end: int) -> Part:
         own = slice(patches.first[begin], patches.first[end])
         start = np.repeat(patches.member[own].astype(np.int64), starts_of[own])
         wanted = shuffle[np.arange(begin, end) % len(shuffle)]
-        points = some_points(surface, mask, start, wanted.reshape(-1), kept)
+        points = job.some_points(start, wanted.reshape(-1))
         origin, normal = (p.reshape(end - begin, n_rays, 3) for p in points)
         target = np.full((end - begin, n_rays), -1, np.int32)
-        colour = np.zeros((end - begin if tracer.coloured else 0, n_rays, 3), np.float32)
+        colour = np.zeros((end - begin if job.tracer.coloured else 0, n_rays, 3), np.float32)
         cast_form_factors(
-            origin, normal, table, seen, new_packet_buffers(tracer), begin, net, shared, target, tally, colour
+            origin,
+            normal,
+            job.lookup,
+            seen,
+            job.packet_buffers(),
+            begin,
+            sobol_points,
+            shared,
+            target,
+            tally,
+            colour,
         )
         passed = sum_colours(target, colour) if len(colour) else ()
         column, count, length = count_targets(target)
@@ -208,8 +184,21 @@ def cast_rows(
     def keep(begin: int, end: int, part: Part) -> None:
         rows[begin] = part
 
-    run(n, _TILE, work, keep=keep, threads=threads, stage=STAGE, progress=progress, rays_per_item=n_rays)
+    job.run(Stage.FORM_FACTORS, n, _TILE, work, keep, rays_per_item=n_rays)
     return rows
+
+
+def _starts_of(patches: PatchSet, n_rays: int) -> NDArray[np.int64]:
+    """Return how many of its patch's rays start from each entry of `patches.member`, (n,).
+
+    Rays are distributed by area: the entries that cover the first share c of a patch's area get the rays k
+    whose (k + 0.5) / n_rays is at most c.
+    """
+    owner = np.repeat(np.arange(patches.n), np.diff(patches.first))
+    running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)
+    running[patches.first[1:] - 1] = n_rays * np.arange(1, patches.n + 1)
+    starts: NDArray[np.int64] = np.diff(running.astype(np.int64), prepend=0)
+    return starts
 
 
 def count_targets(

@@ -10,83 +10,98 @@ half under a box keeps its free half.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import run_tiles
-from baker.core.progress import Progress
+from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
 from baker.kernels.probe import BLACK_BACK, ELSEWHERE, PROOF, inside_hits
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.kernels.surface import N_POINTS, Surface
-from baker.kernels.triangle_lookup import TriangleLookup
+from baker.kernels.surface import N_POINTS
 from baker.radiosity.point_cache import points_of
-from baker.trace.embree import Tracer
-from baker.trace.packets import new_packet_buffers
+from baker.radiosity.trace_job import TraceJob
 
-STAGE = "buried texels"
 _TILE = 2048
-# First look: every 4th of the 16 points, one ray each. Second look: every point.
+# First pass: every 4th of the 16 points, one ray each. Second pass: every point.
 _STRIDE = 4
 _RAYS_PER_POINT = 8
 
 
-def find_buried(
-    texels: TexelBuffer,
-    surface: Surface,
-    table: TriangleLookup,
-    tells: NDArray[np.uint8],
-    tracer: Tracer,
-    *,
-    seed: int,
-    threads: int,
-    progress: Progress,
+def find_inside_geometry(
+    texels: TexelBuffer, job: TraceJob, tells: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint16], int]:
-    """Return (n,) uint16 masks of good points (bit k: point k is free), and the rays cast.
+    """Find the valid points of texels: those that do not lie inside geometry.
 
-    tells : (T,) uint8, what each triangle says about who sees it, see `kernels.probe`
+    Parameters
+    ----------
+    texels : TexelBuffer
+        The n entries of the job.
+    job : TraceJob
+        Its `valid_points` are not read: all points are tested.
+    tells : (T,) uint8
+        Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
+
+    Returns
+    -------
+    valid_points : (n,) uint16
+        Bit k is set where point k does not lie inside geometry.
+    rays : int
+        Number of rays cast.
     """
     n = texels.n
-    mask = np.full(n, 0xFFFF, np.uint16)
+    valid = np.full(n, 0xFFFF, np.uint16)
     if not n or not tells.any():
-        return mask, 0
+        return valid, 0
 
-    # Without solids only points that see nothing but black are buried.
+    # Without solids a point is invalid only if all its rays meet black backs.
     proof = PROOF if (tells > BLACK_BACK).any() else ELSEWHERE
-    cast = 0
+    first, rays = _test_points(job, tells, np.arange(n), _Pass(1, _STRIDE, 3, 1))
+    suspect: NDArray[np.bool_] = np.any(first, axis=1)
+    chosen = np.flatnonzero(_with_neighbours(texels, suspect))
+    inside, more = _test_points(job, tells, chosen, _Pass(_RAYS_PER_POINT, 1, 4, proof))
+    bits = (~inside).astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)
+    valid[chosen] = bits.sum(axis=1).astype(np.uint16)
+    return valid, rays + more
 
-    def look(
-        chosen: NDArray[np.int64], rays_per_point: int, stride: int, pair: int, proof: int
-    ) -> NDArray[np.bool_]:
-        wanted = np.arange(0, N_POINTS, stride, dtype=np.uint8)[None]
-        hits = np.zeros((len(chosen), wanted.size), np.uint8)
-        net = sobol_reversed(wanted.size * rays_per_point, seed, pair)
-        shared = shared_bits_mask(len(net))
-        rays = np.zeros(-(-len(chosen) // _TILE), np.int64)
 
-        def work(begin: int, end: int) -> None:
-            points = points_of(surface, mask, chosen[begin:end], wanted)
-            buffers = new_packet_buffers(tracer.without_transmittance())
-            rays[begin // _TILE] = inside_hits(
-                *points, table, tells, buffers, begin, net, shared, rays_per_point, proof, hits
-            )
+class _Pass(NamedTuple):
+    """One of the two passes.
 
-        run_tiles(
-            len(chosen), _TILE, work, threads=threads, stage=STAGE, progress=progress, rays_per_item=len(net)
-        )
-        nonlocal cast
-        cast += int(rays.sum())
-        found: NDArray[np.bool_] = (hits % ELSEWHERE >= proof) | (hits < ELSEWHERE)
-        return found
+    rays_per_point : int, rays from each tested point
+    stride : int, every how many of the 16 points are tested
+    pair : int, pair of dimensions of the Sobol sequence
+    proof : int, rays from the inside of solids that prove a point to be inside
+    """
 
-    first: NDArray[np.bool_] = np.any(look(np.arange(n), 1, _STRIDE, 3, 1), axis=1)
-    suspect = _with_neighbours(texels, first)
-    chosen = np.flatnonzero(suspect)
-    good = ~look(chosen, _RAYS_PER_POINT, 1, 4, proof)
-    mask[chosen] = (
-        (good.astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)).sum(axis=1).astype(np.uint16)
-    )
-    return mask, cast
+    rays_per_point: int
+    stride: int
+    pair: int
+    proof: int
+
+
+def _test_points(
+    job: TraceJob, tells: NDArray[np.uint8], chosen: NDArray[np.int64], test: _Pass
+) -> tuple[NDArray[np.bool_], int]:
+    """Return (m, w) bool, whether points of the chosen entries (m,) lie inside, and the rays cast."""
+    every = np.full(job.n, 0xFFFF, np.uint16)
+    wanted = np.arange(0, N_POINTS, test.stride, dtype=np.uint8)[None]
+    hits = np.zeros((len(chosen), wanted.size), np.uint8)
+    sobol_points = sobol_reversed(wanted.size * test.rays_per_point, job.seed, test.pair)
+    shared = shared_bits_mask(len(sobol_points))
+    rays = np.zeros(-(-len(chosen) // _TILE), np.int64)
+
+    def work(begin: int, end: int) -> None:
+        points = points_of(job.surface, every, chosen[begin:end], wanted)
+        rays[begin // _TILE] = inside_hits(
+            *points, job.lookup, tells, job.occlusion_buffers(), begin, sobol_points, shared,
+            test.rays_per_point, test.proof, hits,
+        )  # fmt: skip
+
+    job.run_here(Stage.INSIDE_GEOMETRY, len(chosen), _TILE, work, rays_per_item=len(sobol_points))
+    inside: NDArray[np.bool_] = (hits % ELSEWHERE >= test.proof) | (hits < ELSEWHERE)
+    return inside, int(rays.sum())
 
 
 def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -19,12 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.parallel import run_tiles
-from baker.core.progress import Progress
+from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface, place_points
-from baker.kernels.triangle_lookup import TriangleLookup
 from baker.radiosity.kernels.form_factor import SPLIT
 from baker.radiosity.kernels.regions import join_linked, neighbour_pairs
 from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
@@ -38,10 +36,9 @@ from baker.radiosity.kernels.sides import (
 )
 from baker.radiosity.lent_regions import lend_regions
 from baker.radiosity.point_cache import points_of
-from baker.trace.embree import Tracer
-from baker.trace.packets import PacketBuffers, new_packet_buffers
+from baker.radiosity.trace_job import TraceJob
+from baker.trace.packets import PacketBuffers
 
-STAGE = "texel sides"
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
 # Pairs of neighbours are examined with one point of each, then with all.
@@ -62,8 +59,8 @@ class Sides:
     texels : TexelBuffer
         With `region`.
     surface : Surface
-    mask : (n,) uint16
-        Points of each entry: outside geometry and on its own side.
+    valid_points : (n,) uint16
+        Bit k is set where point k of an entry is outside geometry and on the entry's side.
     owner : (S,) int32
         Entries of fronts and backs that were split, rising.
     member : (K,) int32
@@ -77,7 +74,7 @@ class Sides:
 
     texels: TexelBuffer
     surface: Surface
-    mask: NDArray[np.uint16]
+    valid_points: NDArray[np.uint16]
     owner: NDArray[np.int32]
     member: NDArray[np.int32]
     table: SideTable
@@ -102,7 +99,7 @@ class _Entries(NamedTuple):
 
     texels: TexelBuffer
     surface: Surface
-    mask: NDArray[np.uint16]
+    valid_points: NDArray[np.uint16]
     side: NDArray[np.float32]
 
 
@@ -138,57 +135,41 @@ class _Groups:
         return np.asarray(entry, np.int64)
 
 
-def split_texels(
-    texels: TexelBuffer,
-    surface: Surface,
-    mask: NDArray[np.uint16],
-    table: TriangleLookup,
-    tracer: Tracer,
-    *,
-    seed: int,
-    threads: int,
-    progress: Progress,
-) -> Sides:
+def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
     """Cut the texels that some surface passes through.
 
     Parameters
     ----------
     texels : TexelBuffer
-        Fronts and backs.
-    surface : Surface
-        The same entries.
-    mask : (n,) uint16
-        Bit k is set where point k is outside geometry.
-    table : TriangleLookup
-    tracer : Tracer
-    seed, threads : int
-    progress : Progress
+        Fronts and backs, the entries of the job.
+    job : TraceJob
+        Its `valid_points` are those outside geometry.
 
     Returns
     -------
     Sides
+        The entries after the cut.
     """
-    tracer = tracer.without_transmittance()
+    surface, valid = job.surface, job.valid_points
     n = texels.n
     crossed, side = np.zeros(n, np.uint8), np.zeros(n, np.float32)
     cast = np.zeros(-(-n // _TILE), np.int64)
 
-    def look(begin: int, end: int) -> None:
-        cast[begin // _TILE] = crossed_texels(
-            surface, begin, end, new_packet_buffers(tracer, solid=True), crossed, side
-        )
+    def find_crossed(begin: int, end: int) -> None:
+        buffers = job.occlusion_buffers(solid=True)
+        cast[begin // _TILE] = crossed_texels(surface, begin, end, buffers, crossed, side)
 
-    run_tiles(n, _TILE, look, threads=threads, stage=STAGE, progress=progress, rays_per_item=4)
+    job.run_here(Stage.TEXEL_SIDES, n, _TILE, find_crossed, rays_per_item=4)
     suspect = np.flatnonzero(crossed)
-    groups, rays = _group(surface, mask, suspect[mask[suspect] != 0], side, tracer, threads, progress)
+    groups, rays = _group(job, suspect[valid[suspect] != 0], side)
     rays += int(cast.sum())
-    entries = _cut(texels, surface, mask, side, groups)
+    entries = _cut(texels, surface, valid, side, groups)
     pair = _of_sides(neighbours(texels, crossed != 0), groups)
     # A surface between two whole texels is met from both.
     doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
     doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
     connected: NDArray[np.bool_] = np.logical_not(doubtful)
-    connected[doubtful], more = _see(entries, pair[doubtful], tracer, threads, progress)
+    connected[doubtful], more = _see(job, entries, pair[doubtful])
     rays += more
     if connected.all() and not len(groups.owner):
         return Sides(*entries[:3], groups.owner, groups.owner, no_sides(), pair[:0], rays)
@@ -196,34 +177,29 @@ def split_texels(
     quiet = np.isin(texels.chart, cut) & (crossed == 0)
     seen = pair[connected & np.isin(entries.texels.chart[pair[:, 0]], cut)]
     link = np.concatenate([seen, neighbours(texels, quiet, both=True)])
-    backs, more = _back_share(entries, groups, table, tracer, seed)
+    backs, more = _back_share(job, entries, groups)
     return _keep_largest(entries, groups, link, cut, backs, rays + more)
 
 
-def _group(
-    surface: Surface,
-    mask: NDArray[np.uint16],
-    chosen: NDArray[np.int64],
-    side: NDArray[np.float32],
-    tracer: Tracer,
-    threads: int,
-    progress: Progress,
-) -> tuple[_Groups, int]:
-    """Group the points of the chosen entries; return those with several groups, and the rays cast."""
-    n = len(mask)
+def _group(job: TraceJob, chosen: NDArray[np.int64], side: NDArray[np.float32]) -> tuple[_Groups, int]:
+    """Group the points of the chosen entries (m,); return those with several groups, and the rays cast.
+
+    side : (n,) float32, metres, of each entry's texel
+    """
+    surface, valid, n = job.surface, job.valid_points, job.n
     parts: dict[int, tuple[_Groups, int]] = {}
 
     def work(begin: int, end: int) -> None:
         own = chosen[begin:end]
-        point, normal = points_of(surface, mask, own)
-        buffers, label = new_packet_buffers(tracer, solid=True), np.zeros(point.shape[:2], np.int8)
+        point, normal = points_of(surface, valid, own)
+        buffers, label = job.occlusion_buffers(solid=True), np.zeros(point.shape[:2], np.int8)
         height = _with_heights(point, normal, side[own], buffers)[2].reshape(label.shape)
-        cast = group_points(point, normal, height, mask[own], buffers, label)
+        cast = group_points(point, normal, height, valid[own], buffers, label)
         several = label.max(axis=1, initial=0) > 0
         whole = np.flatnonzero(~several)
         one, hidden = own[whole], np.zeros(len(whole), np.uint8)
         cast += hidden_corners(
-            surface, one, point[whole], normal[whole], height[whole], mask[one], side[one], buffers, hidden
+            surface, one, point[whole], normal[whole], height[whole], valid[one], side[one], buffers, hidden
         )
         several[whole] = hidden != 0
         found = _Groups(
@@ -231,7 +207,7 @@ def _group(
         )
         parts[begin] = found, cast + N_POINTS * len(own)
 
-    run_tiles(len(chosen), _SUSPECTS, work, threads=threads, stage=STAGE, progress=progress)
+    job.run_here(Stage.TEXEL_SIDES, len(chosen), _SUSPECTS, work)
     ordered = [parts[begin] for begin in sorted(parts)]
     table = no_sides()
     none = _Groups(
@@ -261,7 +237,7 @@ def _with_heights(
 def _cut(
     texels: TexelBuffer,
     surface: Surface,
-    mask: NDArray[np.uint16],
+    valid_points: NDArray[np.uint16],
     side: NDArray[np.float32],
     groups: _Groups,
 ) -> _Entries:
@@ -270,12 +246,12 @@ def _cut(
     row, label = np.nonzero(groups.label >= 0)
     entry = groups.entry(row, groups.label[row, label].astype(np.int64))
     bits = np.bincount(entry, _BITS[label], texels.n + len(extra)).astype(np.uint16)
-    mask = np.concatenate([mask, np.zeros(len(extra), np.uint16)])
-    mask[entry] = bits[entry]
+    valid_points = np.concatenate([valid_points, np.zeros(len(extra), np.uint16)])
+    valid_points[entry] = bits[entry]
     texels = texels.with_copies(extra)
     front = np.concatenate([surface.front, surface.front[extra]])
     surface = surface._replace(pixel=texels.pixel, back=texels.back, front=front)
-    return _Entries(texels, surface, mask, np.concatenate([side, side[extra]]))
+    return _Entries(texels, surface, valid_points, np.concatenate([side, side[extra]]))
 
 
 def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = False) -> NDArray[np.int32]:
@@ -323,25 +299,23 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
     return np.concatenate(found).astype(np.int32)
 
 
-def _see(
-    entries: _Entries, pair: NDArray[np.int32], tracer: Tracer, threads: int, progress: Progress
-) -> tuple[NDArray[np.bool_], int]:
+def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
     """Return (m,) bool: which pairs of entries have points that see each other, and the rays cast."""
     connected = np.zeros(len(pair), np.uint8)
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
         def work(begin: int, end: int) -> None:
-            own, buffers = chosen[begin:end], new_packet_buffers(tracer, solid=True)
+            own, buffers = chosen[begin:end], job.occlusion_buffers(solid=True)
             ends: list[NDArray[np.float32]] = []
             for k in range(2):
                 entry = pair[own, k].astype(np.int64)
-                points = points_of(entries.surface, entries.mask, entry, wanted)
+                points = points_of(entries.surface, entries.valid_points, entry, wanted)
                 ends += _with_heights(*points, entries.side[entry], buffers)
             free = np.zeros(len(own) * wanted.size, np.uint8)
             free_segments(*ends, buffers, free)
             connected[own] = free.reshape(len(own), -1).max(axis=1)
 
-        run_tiles(len(chosen), _PAIRS, work, threads=threads, stage=STAGE, progress=progress)
+        job.run_here(Stage.TEXEL_SIDES, len(chosen), _PAIRS, work)
 
     examine(np.arange(len(pair)), _ONE)
     left = np.flatnonzero(connected == 0)
@@ -362,39 +336,41 @@ def _keep_largest(
     link : (m, 2) int32, neighbouring entries that see each other, in the charts `cut`
     backs : (S, groups) float64, see `_back_share`
     """
-    root = np.arange(len(entries.mask), dtype=np.int32)
+    root = np.arange(len(entries.valid_points), dtype=np.int32)
     join_linked(link, root)
     member, table, order = _order_sides(entries, groups, root, backs)
     # The entry in place k is the one that had number order[k] before.
-    texels, surface, mask, _ = entries
+    texels, surface, valid_points, _ = entries
     rank = np.zeros_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
     link, root = rank[link], root[order]
-    mask = mask[order]
-    texels = _measure(texels, surface, mask, member)
+    valid_points = valid_points[order]
+    texels = _measure(texels, surface, valid_points, member)
     n_front = texels.n_front
     region = np.array(texels.region)
     own = np.isin(region, cut)
     region[own] = int(region.max(initial=0)) + 1 + np.unique(root[:n_front][own], return_inverse=True)[1]
-    lend_regions(texels, surface, region, mask[:n_front])
-    return Sides(replace(texels, region=region), surface, mask, groups.owner, member, table, link, rays)
+    lend_regions(texels, surface, region, valid_points[:n_front])
+    return Sides(
+        replace(texels, region=region), surface, valid_points, groups.owner, member, table, link, rays
+    )
 
 
-def _back_share(
-    entries: _Entries, groups: _Groups, table: TriangleLookup, tracer: Tracer, seed: int
-) -> tuple[NDArray[np.float64], int]:
+def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDArray[np.float64], int]:
     """Return the share (S, groups) of rays of each side that meet backs of one-sided surfaces; rays cast."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
-    net = sobol_reversed(N_POINTS, seed, 9)
+    sobol_points = sobol_reversed(N_POINTS, job.seed, 9)
     cast = 0
     for group in range(share.shape[1]):
         row = np.flatnonzero(groups.count > group)
         chosen = groups.entry(row, np.int64(group))
         for begin in range(0, len(chosen), _SUSPECTS):
             own = chosen[begin : begin + _SUSPECTS]
-            points = points_of(entries.surface, entries.mask, own)
+            points = points_of(entries.surface, entries.valid_points, own)
             count = np.zeros(len(own), np.int32)
-            count_backs(*points, table, new_packet_buffers(tracer), net, shared_bits_mask(N_POINTS), count)
+            count_backs(
+                *points, job.lookup, job.occlusion_buffers(), sobol_points, shared_bits_mask(N_POINTS), count
+            )
             cast += N_POINTS * len(own)
             share[row[begin : begin + _SUSPECTS], group] = count / N_POINTS
     return share, cast
@@ -424,7 +400,7 @@ def _order_sides(
     score = np.zeros(backs.shape)
     np.add.at(score, (row, group), 1.0)
     score[backs > _MANY_BACKS] *= _OUTSIDE
-    whole = entries.mask != 0
+    whole = entries.valid_points != 0
     whole[entry] = groups.count[row] == 1
     settled = np.zeros(len(root), bool)
     settled[root[whole]] = True
@@ -440,7 +416,7 @@ def _order_sides(
 
 
 def _measure(
-    texels: TexelBuffer, surface: Surface, mask: NDArray[np.uint16], member: NDArray[np.int32]
+    texels: TexelBuffer, surface: Surface, valid_points: NDArray[np.uint16], member: NDArray[np.int32]
 ) -> TexelBuffer:
     """Return the texels with area, position, normal and centroid of each side of those that are split."""
     area, position, normal = (np.array(v) for v in (texels.area, texels.position, texels.normal))
@@ -448,9 +424,9 @@ def _measure(
     shape = (len(member), N_POINTS)
     point, shading = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
     triangle, bary = np.zeros(shape, np.int32), np.zeros((*shape, 2), np.float32)
-    every = np.full(len(mask), 0xFFFF, np.uint16)
+    every = np.full(len(valid_points), 0xFFFF, np.uint16)
     place_points(surface, every, member.astype(np.int64), _EVERY, point, shading, triangle, bary)
-    share = (mask[member, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(np.float64)
+    share = (valid_points[member, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(np.float64)
     area[member] *= share.mean(axis=1).astype(np.float32)
     share /= share.sum(axis=1, keepdims=True)
     position[member] = (share[..., None] * point).sum(axis=1)

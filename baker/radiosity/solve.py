@@ -30,11 +30,11 @@ from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
 from baker.core.scene import SceneWarning
+from baker.core.stage import Stage
 from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.kernels.conjugate_gradients import conjugate_step
 from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
-STAGE = "solve"
 # Largest error of a patch's light, as a share of that light, at which the solve stops.
 TOLERANCE = 3e-5
 MAX_ITERATIONS = 1000
@@ -103,7 +103,7 @@ def solve_radiosity(
     threads : int
         Work on the products; each row is one thread's, so the result does not depend on their number.
     """
-    report(progress, STAGE, 0.0)
+    report(progress, Stage.SOLVE, 0.0)
     albedo = np.clip(albedo, MIN_ALBEDO, MAX_ALBEDO)
     if bounces is not None:
         irradiance = np.zeros_like(source)
@@ -111,7 +111,7 @@ def solve_radiosity(
         with _Product(matrix, threads) as product:
             for step in range(steps):
                 irradiance = product(source + albedo * irradiance)
-                report(progress, STAGE, (step + 1) / steps)
+                report(progress, Stage.SOLVE, (step + 1) / steps)
         return Solution(irradiance, steps, 0.0, 0.0)
     with _Product(matrix, threads) as product:
         return _converge(product, source, albedo, area[:, None], progress)
@@ -250,7 +250,7 @@ def _conjugate_gradients(
     worst = goal.share(rest, exitance).max(axis=0, initial=0.0)
     active = np.ones(3, np.uint8)
     while iteration < MAX_ITERATIONS:
-        report(progress, STAGE, min(iteration / 50, 0.99))
+        report(progress, Stage.SOLVE, min(iteration / 50, 0.99))
         active[(worst <= goal.MARGIN) | (size <= enough)] = 0
         if not active.any():
             break

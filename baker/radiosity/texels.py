@@ -9,6 +9,7 @@ from baker.core.atlas import Atlas
 from baker.core.geometry import Geometry
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
+from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
 from baker.kernels.sampling import sobol_reversed
 from baker.kernels.shading import Shading
@@ -17,7 +18,6 @@ from baker.kernels.texel_info import texel_albedo, texel_geometry
 from baker.radiosity.kernels.texel_raster import keep_main_chart, list_overlaps, morton_keys
 
 _TILE = 4096
-STAGE = "texels"
 
 
 def build_texels(
@@ -73,7 +73,7 @@ def build_texels(
         if varied:
             texel_albedo(surface, shading, free, begin, end, albedo, area)
 
-    run_tiles(n_front, _TILE, work, threads=threads, stage=STAGE, progress=progress)
+    run_tiles(n_front, _TILE, work, threads=threads, stage=Stage.TEXELS, progress=progress)
     back_entry = np.full(n_front, -1, np.int32)
     back_entry[front[n_front:]] = np.arange(n_front, len(front), dtype=np.int32)
     main = geometry.instance[entry[first[:-1]]] if n_front else np.zeros(0, np.int32)

@@ -19,7 +19,6 @@ from baker.checks.settings import CheckSettings
 from baker.core import light_kind
 from baker.core.errors import InputError
 from baker.core.light_kind import LIGHT_KINDS, kind_of
-from baker.core.progress import silent
 from baker.core.scene import PunctualLight
 from baker.core.settings import make_settings
 from baker.io.gltf.build_document import new_document
@@ -119,10 +118,7 @@ def reference(scene):
 
 def direct(scene):
     world = world_of(scene, unwrap_scene(scene, SETTINGS))
-    direct_light(
-        world.surface, world.free, world.table, scene.lights, world.emitters, world.shading,
-        world.rays.tracer, n_light=16, n_gather=16, seed=0, threads=1, progress=silent,
-    )  # fmt: skip
+    direct_light(world.job(), scene.lights, world.sampling(16, 16))
 
 
 REFUSERS = {

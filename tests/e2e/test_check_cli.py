@@ -196,7 +196,7 @@ def test_cost_by_the_speed_of_a_bake(tmp_path):
     cost = next(f for f in result["findings"] if f["code"] == "cost")
     texels = round(0.8 * 64 * 64)
     assert cost["texels"] == texels
-    assert cost["rays"] == {"buried texels": 4 * texels, "ambient occlusion": 10 * texels}
+    assert cost["rays"] == {"inside geometry": 4 * texels, "ambient occlusion": 10 * texels}
     # 2 s a million rays, 1 s ten thousand texels.
     assert cost["seconds"] == pytest.approx(14 * texels * 2e-6 + texels * 1e-4, abs=0.01)
 

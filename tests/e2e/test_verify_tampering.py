@@ -298,7 +298,7 @@ def test_an_emitter_that_both_finders_forget_is_missed_all_the_same(tmp_path, mo
         emission[emission.max(axis=1) < 1] = 0
         return real(geometry, shading._replace(emission=emission), *rest)
 
-    for place in ("baker.pipeline.world", "baker.pathtracer.light_table"):
+    for place in ("baker.pipeline.prepare", "baker.pathtracer.light_table"):
         monkeypatch.setattr(f"{place}.build_emitters", forgetful)
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
     found = verify(tmp_path / "out", SETTINGS.changed(texels=300, spp=256))

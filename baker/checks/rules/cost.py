@@ -13,6 +13,7 @@ from baker.checks.bake_rates import RAY_STAGES, Rates
 from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
+from baker.core.stage import Stage
 
 # Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024.
 FILLED = 0.8
@@ -35,7 +36,7 @@ class Cost:
 
     texels: int
     pages: int
-    rays: dict[str, int]
+    rays: dict[Stage, int]
     bytes: int
     triangles: int
     shares: list[dict[str, Any]]
@@ -72,22 +73,22 @@ def estimate_cost(context: CheckContext) -> Cost:
     return Cost(n, pages, _rays(context, n), need, len(world.triangle), shares)
 
 
-def _rays(context: CheckContext, texels: int) -> dict[str, int]:
+def _rays(context: CheckContext, texels: int) -> dict[Stage, int]:
     settings = context.settings
     hemisphere = settings.hemisphere_samples
     light = settings.light_samples or hemisphere
     occlusion = settings.ao_samples or hemisphere
-    rays = {"buried texels": _BURIED * texels}
+    rays = {Stage.INSIDE_GEOMETRY: _BURIED * texels}
     if context.wants_light:
         lamps = sum(max(x.intensity) > 0 for x in context.scene.lights)
         glows = context.glows
-        rays["direct light"] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
+        rays[Stage.DIRECT_LIGHT] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
         if settings.bounces != 0:
             each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)
-            rays["form factors"] = min(texels, _PATCHES) * each
-        rays["final gather"] = texels * hemisphere
+            rays[Stage.FORM_FACTORS] = min(texels, _PATCHES) * each
+        rays[Stage.FINAL_GATHER] = texels * hemisphere
     if "ao" in settings.channels and not (context.wants_light and occlusion == hemisphere):
-        rays["ambient occlusion"] = texels * occlusion
+        rays[Stage.AMBIENT_OCCLUSION] = texels * occlusion
     return rays
 
 

@@ -28,7 +28,7 @@ def world_of(radiance, wall=True, texels=16):
 def choices(world, chosen, n_light=64):
     """Choose for some texel entries of a world, taken as one tile that begins at the first."""
     begin, end = int(chosen[0]), int(chosen[-1]) + 1
-    origin, normal = points_of(world.surface, world.mask, np.arange(begin, end))
+    origin, normal = points_of(world.job.surface, world.job.valid_points, np.arange(begin, end))
     chooser = LampChooser.build(world.emitters, n_light, world.texels.chart)
     return chooser, chooser.choose(begin, origin, normal, new_packet_buffers(world.rays.tracer))
 
@@ -56,7 +56,7 @@ def test_hidden_clusters_are_set_apart_and_the_rest_is_as_if_alone(bright):
         assert choice.found.chance[~own].sum() == pytest.approx(chooser.n_hidden / chooser.n_light)
         assert (choice.found.cumulative == 1.0).all()
     begin = int(side(world, True)[0])
-    points = points_of(world.surface, world.mask, np.arange(begin, begin + 64))
+    points = points_of(world.job.surface, world.job.valid_points, np.arange(begin, begin + 64))
     (single,) = alone.choose(begin, *points, new_packet_buffers(world.rays.tracer))
     if len(made) == 1:
         np.testing.assert_allclose(made[0].seen.chance, single.seen.chance, rtol=1e-6)

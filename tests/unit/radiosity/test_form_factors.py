@@ -7,7 +7,6 @@ import pytest
 from scipy.sparse import csr_matrix
 from tiny_scenes import Quad, box_quads, grey, quad_world, seen_patches
 
-from baker.core.progress import silent
 from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.patches import build_patches
 
@@ -16,14 +15,8 @@ def factors(world, patches, mask=None, threads=1, n_rays=256):
     return build_form_factors(
         patches,
         seen_patches(world.texels, patches.patch if patches.n else np.full(world.texels.n, -1, np.int32)),
-        world.surface,
-        world.free if mask is None else mask,
-        world.table,
-        world.rays.tracer,
+        world.job(mask, threads),
         n_rays=n_rays,
-        seed=0,
-        threads=threads,
-        progress=silent,
     )
 
 

@@ -8,7 +8,6 @@ import pytest
 from inner import compiled
 from tiny_scenes import Quad, box_quads, grey, quad_world, seen_light
 
-from baker.core.progress import silent
 from baker.core.scene import PunctualLight
 from baker.kernels.emitters import emitter_density, tile_emitters
 from baker.kernels.rays import lane_seeds
@@ -137,23 +136,16 @@ def test_gather_is_the_sum_over_its_rays(room, rays_of):
 
 def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
     net, _, begin, origin, _, exitance, _, n_light, truth = rays_of
-    options = {"n_samples": len(net), "seed": 0, "progress": silent}
+    n_front, n_samples = room.texels.n_front, len(net)
     runs = [
         final_gather(
-            room.texels.n_front,
-            room.surface,
-            room.free,
-            room.table,
+            room.job(threads=threads),
+            n_front,
             exitance,
             np.zeros(room.texels.n, np.uint8),
-            room.emitters,
-            room.shading,
-            room.rays.tracer,
-            n_light=n_light,
+            room.sampling(n_light, n_samples),
             sky=tuple(SKY.tolist()),
             ao_distance=REACH,
-            threads=threads,
-            **options,
         )
         for threads in (1, 2)
     ]
@@ -162,20 +154,10 @@ def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
         assert len(getattr(runs[0], name)) == room.texels.n_front
     assert runs[0].rays == room.texels.n_front * len(net)
     np.testing.assert_allclose(runs[0].open[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
-    alone = ambient_occlusion(
-        room.texels.n_front, room.surface, room.free, room.rays.tracer, distance=REACH, threads=1, **options
-    )
+    alone = ambient_occlusion(room.job(), n_front, n_samples=n_samples, distance=REACH)
     # The same rays, whichever stage casts them.
     np.testing.assert_array_equal(alone, runs[0].open)
-    near = ambient_occlusion(
-        room.texels.n_front,
-        room.surface,
-        room.free,
-        room.rays.tracer,
-        distance=float("inf"),
-        threads=1,
-        **options,
-    )
+    near = ambient_occlusion(room.job(), n_front, n_samples=n_samples, distance=float("inf"))
     assert (near <= alone).all()
     assert near.mean() < 0.8 * alone.mean()
 
@@ -227,34 +209,16 @@ def lit_floor(pieces, n_light, seed=0, n_gather=64):
         for k in range(pieces)
     ]
     world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0), grey(0.5)), *strips], 32, inset=0.3)
-    options = {"seed": seed, "threads": 1, "progress": silent}
-    direct = direct_light(
-        world.surface,
-        world.free,
-        world.table,
-        (),
-        world.emitters,
-        world.shading,
-        world.rays.tracer,
-        n_light=n_light,
-        n_gather=n_gather,
-        **options,
-    )
+    sampling = world.sampling(n_light, n_gather)
+    direct = direct_light(world.job(seed=seed), (), sampling)
     gathered = final_gather(
+        world.job(seed=seed),
         world.texels.n_front,
-        world.surface,
-        world.free,
-        world.table,
         seen_light(world.texels, np.zeros((world.texels.n, 4), np.float32)),
-        direct.exact,
-        world.emitters,
-        world.shading,
-        world.rays.tracer,
-        n_samples=n_gather,
-        n_light=n_light,
+        direct.analytic,
+        sampling,
         sky=(0, 0, 0),
         ao_distance=1.0,
-        **options,
     )
     own = np.flatnonzero(world.texels.instance == 0)
     corners = [(0.3, 0.4, 0.3), (0.8, 0.4, 0.3), (0.8, 0.4, 0.9), (0.3, 0.4, 0.9)]
@@ -272,7 +236,7 @@ def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
     found = {"whole": [], "complete": [], "part": []}
     for seed in range(6):
         world, direct, gathered, own, truth = lit_floor(5, n_light, seed)
-        assert not direct.exact[own].any()
+        assert not direct.analytic[own].any()
         area = world.texels.area[own]
         light = np.average(truth, weights=area)
         whole = direct.weighted[own, 0] + gathered.direct[own, 0]
@@ -300,7 +264,7 @@ def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
 def test_a_lamp_with_nothing_in_the_way_shines_by_lamberts_formula(n_light):
     world, direct, gathered, own, truth = lit_floor(1, n_light)
     # The last texel's fifteen neighbours in its packet are the lamp's: too few rays to tell.
-    sure = own[direct.exact[own] != 0]
+    sure = own[direct.analytic[own] != 0]
     assert len(own) - len(sure) <= 1
     np.testing.assert_array_equal(direct.weighted[sure], direct.complete[sure])
     assert (gathered.direct[sure] == 0).all()
@@ -313,20 +277,7 @@ def test_a_lamp_with_nothing_in_the_way_shines_by_lamberts_formula(n_light):
 def test_dark_lights_cast_nothing(room):
     lights = (PunctualLight("point", "off", 0, (0, 0, 0)),)
     world = quad_world([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))])
-    direct = direct_light(
-        world.surface,
-        world.free,
-        world.table,
-        lights,
-        world.emitters,
-        world.shading,
-        world.rays.tracer,
-        n_light=4,
-        n_gather=4,
-        seed=0,
-        threads=2,
-        progress=silent,
-    )
+    direct = direct_light(world.job(threads=2), lights, world.sampling(4, 4))
     assert not direct.complete.any()
     assert not direct.weighted.any()
     assert not direct.variance.any()

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
-from baker.core.progress import silent
-from baker.radiosity.inside_geometry import find_buried
+from baker.radiosity.inside_geometry import find_inside_geometry
 from baker.radiosity.point_cache import points_of
 
 
 def find(world, threads=1):
-    return find_buried(
-        world.texels, world.surface, world.table, world.tells, world.rays.tracer,
-        seed=0, threads=threads, progress=silent,
-    )  # fmt: skip
+    return find_inside_geometry(world.texels, world.job(threads=threads), world.tells)
 
 
 def sunk_crate(double_sided=False, inward=False):

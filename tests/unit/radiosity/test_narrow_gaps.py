@@ -8,7 +8,7 @@ from tiny_scenes import Quad, quad_world, seen_patches
 
 from baker.core.progress import silent
 from baker.radiosity.form_factors import build_form_factors
-from baker.radiosity.narrow_gaps import gap_depth
+from baker.radiosity.narrow_gaps import gap_level
 from baker.radiosity.patches import build_patches
 from baker.radiosity.solve import solve_radiosity
 
@@ -25,9 +25,7 @@ def world():
 
 
 def depth(world, threads=1):
-    return gap_depth(
-        world.texels, world.surface, world.free, world.rays.tracer, seed=0, threads=threads, progress=silent
-    )
+    return gap_level(world.texels, world.job(threads=threads))
 
 
 def test_depth_follows_the_height_of_the_gap(world):
@@ -92,10 +90,7 @@ def test_in_a_narrow_gap_each_texel_is_a_patch_and_light_does_not_cross_it():
         assert patches.block == 4
         assert members[used == 0].max() == 16
         assert (members[deep].max() == 1) == (name == "texels")
-        matrix = build_form_factors(
-            patches, seen_patches(texels, patches.patch), world.surface, world.free, world.table,
-            world.rays.tracer, n_rays=64, seed=0, threads=1, progress=silent,
-        )  # fmt: skip
+        matrix = build_form_factors(patches, seen_patches(texels, patches.patch), world.job(), n_rays=64)
         source, albedo = patches.mean(light, texels.area), np.full((patches.n, 3), 0.7)
         solution = solve_radiosity(matrix, source, albedo, patches.area, bounces=None, progress=silent)
         indirect[name] = solution.irradiance[patches.patch[deep], 0].mean()

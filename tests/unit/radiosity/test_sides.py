@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
-from baker.core.progress import silent
 from baker.radiosity.kernels.form_factor import SPLIT
 from baker.radiosity.patches import build_patches
 from baker.radiosity.point_cache import points_of
@@ -25,15 +24,11 @@ def wall(x, *, low=0.0, high=1.0, z=(-3.0, 3.0)):
 
 
 def cut(world, mask=None, threads=1):
-    mask = world.free if mask is None else mask
-    return split_texels(
-        world.texels, world.surface, mask, world.table, world.rays.tracer,
-        seed=0, threads=threads, progress=silent,
-    )  # fmt: skip
+    return split_texels(world.texels, world.job(mask, threads))
 
 
 def points(sides, entry):
-    return points_of(sides.surface, sides.mask, np.asarray(entry, np.int64))[0]
+    return points_of(sides.surface, sides.valid_points, np.asarray(entry, np.int64))[0]
 
 
 @pytest.mark.parametrize("x", [0.031, 0.52, -1.3])
@@ -48,16 +43,16 @@ def test_points_of_an_entry_lie_on_one_side_of_a_wall(x):
     split = np.unique(sides.surface.front[n:])
     for front in split:
         own = np.flatnonzero((sides.surface.front == front) & ~sides.texels.back)
-        bits = sides.mask[own].astype(int)
+        bits = sides.valid_points[own].astype(int)
         assert np.bitwise_or.reduce(bits) == 0xFFFF
         assert sum(bits) == 0xFFFF
         assert sides.texels.area[own].sum() == pytest.approx(world.texels.area[front], rel=1e-5)
         # The page keeps the larger side.
-        assert int(sides.mask[front]).bit_count() >= 8
+        assert int(sides.valid_points[front]).bit_count() >= 8
     assert len(split) >= 10
     # Nothing else changed.
     rest = np.setdiff1d(np.arange(n), split)
-    assert (sides.mask[rest] == 0xFFFF).all()
+    assert (sides.valid_points[rest] == 0xFFFF).all()
     assert sides.texels.area[rest].tobytes() == world.texels.area[rest].tobytes()
 
 
@@ -68,7 +63,7 @@ def test_a_lookup_finds_the_centroid_of_the_side_that_is_kept():
     # The floor's u runs along x: 4 m are SIZE / 2 - 1 - 0.6 texels.
     metres = 4.0 / (SIZE // 2 - 1.6)
     for entry in front:
-        free = (int(sides.mask[entry]) >> np.arange(16)) & 1 == 1
+        free = (int(sides.valid_points[entry]) >> np.arange(16)) & 1 == 1
         every, _ = points_of(world.surface, world.free, np.array([entry], np.int64))
         mean = every[0][free].mean(axis=0)
         np.testing.assert_allclose(sides.texels.position[entry], mean, atol=1e-5)
@@ -114,7 +109,7 @@ def test_points_inside_geometry_stay_out_of_every_side():
     member = sides.member
     for entry in member:
         front = int(sides.surface.front[entry])
-        assert int(sides.mask[entry]) & ~int(mask[front]) == 0
+        assert int(sides.valid_points[entry]) & ~int(mask[front]) == 0
     kept = points(sides, member)[..., 0]
     assert ((kept <= 0.5) | (kept >= 0.58)).all()
 
@@ -148,14 +143,14 @@ def test_values_of_sides_are_found_behind_the_numbers_in_the_images():
         for k in range(16):
             m = sides.table.member[s, k]
             assert m >= 0
-            assert int(sides.mask[sides.member[m]]) >> k & 1
+            assert int(sides.valid_points[sides.member[m]]) >> k & 1
             assert sides.surface.front[sides.member[m]] == sides.surface.front[owner]
 
 
 def test_the_same_for_any_number_of_threads():
     world = floor_and(wall(0.031), wall(-0.8, z=(-1.0, 0.3)))
     one, three = (cut(world, threads=threads) for threads in (1, 3))
-    for name in ("mask", "owner", "member", "link"):
+    for name in ("valid_points", "owner", "member", "link"):
         assert getattr(one, name).tobytes() == getattr(three, name).tobytes()
     assert one.texels.region.tobytes() == three.texels.region.tobytes()
 

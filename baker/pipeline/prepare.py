@@ -1,0 +1,148 @@
+"""Prepares a scene for the ray stages: texels with their valid points and sides, ray tree, lookup tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.atlas import Atlas
+from baker.core.geometry import Geometry, world_geometry
+from baker.core.parallel import thread_count
+from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
+from baker.core.texels import TexelBuffer
+from baker.kernels.emitters import Emitters
+from baker.kernels.shading import Shading
+from baker.lights.emissive import build_emitters
+from baker.pipeline.record import Record
+from baker.radiosity.emitter_choice import EmitterSampling
+from baker.radiosity.inside_geometry import find_inside_geometry
+from baker.radiosity.point_cache import new_point_cache
+from baker.radiosity.sides import Sides, split_texels
+from baker.radiosity.texels import build_texels
+from baker.radiosity.trace_job import TraceJob
+from baker.radiosity.triangle_lookup import build_triangle_lookup
+from baker.shading.materials import resolve_materials
+from baker.shading.ray_tree import build_ray_tree
+from baker.shading.scene_solids import hide_backs
+from baker.trace.embree import RayScene
+
+
+@dataclass(frozen=True)
+class PreparedScene:
+    """A scene in the form that the ray stages of its bake read.
+
+    Attributes
+    ----------
+    scene : Scene
+    settings : BakeSettings
+    geometry : Geometry
+        Triangles, world space.
+    shading : Shading
+        Materials of all triangles.
+    texels : TexelBuffer
+        The n texel entries: fronts, backs, and further sides of split texels.
+    rays : RayScene
+        Ray tree; whoever prepared the scene closes it.
+    emitters : Emitters
+        Emissive triangles in clusters.
+    tells : (T,) uint8
+        Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
+    outside : (n_uncut,) uint16
+        Bit k is set where point k is outside geometry, of the entries before texels were split into sides.
+    sides : Sides
+        Result of the split.
+    job : TraceJob
+        What all ray stages share, for the n entries.
+    """
+
+    scene: Scene
+    settings: BakeSettings
+    geometry: Geometry
+    shading: Shading
+    texels: TexelBuffer
+    rays: RayScene
+    emitters: Emitters
+    tells: NDArray[np.uint8]
+    outside: NDArray[np.uint16]
+    sides: Sides
+    job: TraceJob
+
+    @property
+    def sampling(self) -> EmitterSampling:
+        """Return the emitters with the numbers of rays that find them."""
+        settings = self.settings
+        n_light = settings.light_samples or settings.hemisphere_samples
+        return EmitterSampling(self.emitters, self.shading, n_light, settings.hemisphere_samples)
+
+
+def prepare_scene(
+    scene: Scene,
+    atlas: Atlas,
+    settings: BakeSettings,
+    record: Record,
+    outside: NDArray[np.uint16] | None = None,
+) -> PreparedScene:
+    """Build texels, ray tree and tables, and find the valid points and sides of texels.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is baked.
+    atlas : Atlas
+        Its lightmap uv.
+    settings : BakeSettings
+        Of the bake.
+    record : Record
+        Takes timings and ray counts.
+    outside : (n_uncut,) uint16, optional
+        Points outside geometry if they are known already, see `PreparedScene`.
+
+    Returns
+    -------
+    PreparedScene
+        To be closed by `rays.close()`.
+    """
+    threads = thread_count(settings.threads)
+    with record.stage(Stage.TEXELS):
+        geometry = world_geometry(scene, atlas)
+        shading = resolve_materials(scene, geometry)
+        geometry, tells = hide_backs(scene, geometry, shading)
+        texels, surface = build_texels(
+            geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
+        )
+    with record.stage(Stage.RAY_TREE):
+        rays = build_ray_tree(geometry, shading, threads=threads)
+        emitters = build_emitters(geometry, shading)
+        lookup = build_triangle_lookup(geometry, texels, emitters)
+    every = np.full(texels.n, 0xFFFF, np.uint16)
+    job = TraceJob(surface, every, lookup, rays.tracer, settings.seed, threads, record.progress)
+    if outside is None:
+        with record.stage(Stage.INSIDE_GEOMETRY):
+            outside, cast = find_inside_geometry(texels, job, tells)
+            record.rays[Stage.INSIDE_GEOMETRY] = cast
+    with record.stage(Stage.TEXEL_SIDES):
+        sides = split_texels(texels, replace(job, valid_points=outside))
+        record.rays[Stage.TEXEL_SIDES] = sides.rays
+    return PreparedScene(
+        scene=scene,
+        settings=settings,
+        geometry=geometry,
+        shading=shading,
+        texels=sides.texels,
+        rays=rays,
+        emitters=emitters,
+        tells=tells,
+        outside=outside,
+        sides=sides,
+        job=replace(
+            job,
+            surface=sides.surface,
+            valid_points=sides.valid_points,
+            chart=sides.texels.chart,
+            point_cache=new_point_cache(sides.texels.n),
+        ),
+    )

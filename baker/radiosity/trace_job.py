@@ -1,0 +1,122 @@
+"""Arguments that all ray stages of a bake share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.parallel import Part, TileRunner, run_tiles
+from baker.core.progress import Progress
+from baker.core.stage import Stage
+from baker.kernels.surface import Surface
+from baker.kernels.triangle_lookup import TriangleLookup
+from baker.radiosity.point_cache import PointCache, some_points, tile_points
+from baker.trace.embree import Tracer
+from baker.trace.packets import PacketBuffers, new_packet_buffers
+
+
+@dataclass(frozen=True)
+class TraceJob:
+    """Where rays start, what they are traced against, and who works on the tiles of a stage.
+
+    Attributes
+    ----------
+    surface : Surface
+        Triangles and the n texel entries from which rays start.
+    valid_points : (n,) uint16
+        Bit k is set where point k of an entry is valid: not inside geometry, and on the entry's side.
+    lookup : TriangleLookup
+        From hits to texels.
+    tracer : Tracer
+        Embree scene that rays are traced against.
+    seed : int
+        Start of all random sequences.
+    threads : int
+        Threads of this process that work on tiles.
+    progress : Progress
+        Called between tiles.
+    chart : (n,) int32, optional
+        Chart of each entry. None treats all entries as one chart when emitters are chosen.
+    point_cache : PointCache, optional
+        Points shared by stages with tiles of the same size; None computes them for each tile.
+    runner : TileRunner
+        Works on the tiles of a stage, in this process or in others.
+    """
+
+    surface: Surface
+    valid_points: NDArray[np.uint16]
+    lookup: TriangleLookup
+    tracer: Tracer
+    seed: int
+    threads: int
+    progress: Progress
+    chart: NDArray[np.int32] | None = None
+    point_cache: PointCache | None = None
+    runner: TileRunner = run_tiles
+
+    @property
+    def n(self) -> int:
+        """Return the number of texel entries."""
+        return len(self.surface.pixel)
+
+    def on(self, runner: TileRunner) -> TraceJob:
+        """Return the job with another tile runner."""
+        return replace(self, runner=runner)
+
+    def packet_buffers(self) -> PacketBuffers:
+        """Return new packet buffers for one thread."""
+        return new_packet_buffers(self.tracer)
+
+    def occlusion_buffers(self, *, solid: bool = False) -> PacketBuffers:
+        """Return packet buffers for rays of which only the end counts, not the transmittance.
+
+        Parameters
+        ----------
+        solid : bool
+            Whether rays end at BLEND surfaces wherever alpha is above 0, see `new_packet_buffers`.
+        """
+        return new_packet_buffers(self.tracer.without_transmittance(), solid=solid)
+
+    def tile_points(self, begin: int, end: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return origins and normals (m, 16, 3) float32 of all points of entries begin to end."""
+        return tile_points(self.surface, self.valid_points, begin, end, self.point_cache)
+
+    def some_points(
+        self, entry: NDArray[np.int64], point: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return origins and normals (m, 1, 3) float32 of one `point` (m,) of each `entry` (m,)."""
+        return some_points(self.surface, self.valid_points, entry, point, self.point_cache)
+
+    def run(
+        self,
+        stage: Stage,
+        n: int,
+        tile: int,
+        work: Callable[[int, int], Part],
+        keep: Callable[[int, int, Part], object],
+        *,
+        rays_per_item: float,
+    ) -> None:
+        """Call `keep(begin, end, work(begin, end))` for each tile of n items; see `run_tiles`."""
+        self.runner(
+            n, tile, work, keep=keep, threads=self.threads,
+            stage=stage, progress=self.progress, rays_per_item=rays_per_item,
+        )  # fmt: skip
+
+    def run_here(
+        self,
+        stage: Stage,
+        n: int,
+        tile: int,
+        work: Callable[[int, int], object],
+        *,
+        rays_per_item: float = 0.0,
+    ) -> None:
+        """Call `work(begin, end)` for each tile in this process, whatever the runner; see `run_tiles`."""
+        run_tiles(
+            n, tile, work, threads=self.threads,
+            stage=stage, progress=self.progress, rays_per_item=rays_per_item,
+        )  # fmt: skip
