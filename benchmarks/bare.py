@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import run_tiles
 from baker.core.progress import silent
+from baker.core.stage import Stage
 from baker.kernels.emitters import Emitters
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble, triangle_barycentric
@@ -250,7 +251,7 @@ class BareRays:
                     )  # fmt: skip
 
         start = perf_counter()
-        run_tiles(len(self._tiles), 4, work, threads=self._threads, stage="bare", progress=silent)
+        run_tiles(len(self._tiles), 4, work, threads=self._threads, stage=Stage.FINAL_GATHER, progress=silent)
         return self.rays / (perf_counter() - start) / 1e6
 
     def warm(self) -> None:

@@ -125,7 +125,7 @@ def _turn(world: PreparedScene) -> dict[str, tuple[float, int]]:
     record = Record(silent)
     trace_transport(world, {"irradiance": CHANNELS.get("irradiance")}, record)
     trace_transport(world, {"ao": CHANNELS.get("ao")}, record)
-    # `prepare_scene` finds points inside geometry once, outside these turns; cast its rays again to time them.
+    # `prepare_scene` finds points inside geometry once, outside these turns; cast its rays again.
     start = perf_counter()
     _, cast = find_inside_geometry(world.texels, world.job, world.tells)
     record.timings[Stage.INSIDE_GEOMETRY] = perf_counter() - start

@@ -137,7 +137,7 @@ def _rates(result: dict[str, Any], markdown: bool) -> str:
 
 def _series(result: dict[str, Any], markdown: bool) -> str:
     head = (
-        "triangles", "page", "second run", "ray tree", "gather ns/ray", "bare ns/ray", "light ns/ray",
+        "triangles", "page", "second run", Stage.RAY_TREE, "gather ns/ray", "bare ns/ray", "light ns/ray",
         "finish", "peak MiB",
     )  # fmt: skip
     rows = []

@@ -15,6 +15,7 @@ from baker.cli.commands import COMMANDS
 from baker.cli.fields import flag_of, help_of, is_repeated, is_switch, metavar_of
 from baker.cli.flags import FlagStream
 from baker.core.settings_model import Settings
+from baker.core.stage import Stage
 
 if TYPE_CHECKING:
     from baker.cli.progress import Reporter
@@ -53,7 +54,7 @@ class Run:
     def progress(self) -> Iterator[Reporter]:
         """Show progress; begins with the stage "start", since importing the kernels takes a moment."""
         with self.session.reporter(quiet=self.quiet) as reporter:
-            reporter("start", 0.0)
+            reporter(Stage.START, 0.0)
             yield reporter
 
     @property

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from baker.core.stage import Stage
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
 # Libraries that are slow to import or that a file should hide behind an interface.
@@ -139,6 +141,79 @@ def test_uninitialised_arrays_are_for_kernels():
             if isinstance(node, ast.Attribute) and node.attr in {"empty", "empty_like"}:
                 found.append(f"{name_of(path)}:{node.lineno}")
     assert found == []
+
+
+def stage_literals(tree):
+    """Yield strings of a file that name a stage: where stages are passed, looked up, compared or listed."""
+    stages = {str(stage) for stage in Stage}
+
+    def text(node):
+        return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+    for node in ast.walk(tree):
+        found = []
+        if isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            # `report(progress, stage, ...)`, `progress(stage, ...)`, `record.stage(stage)`.
+            if name in {
+                "report",
+                "tell_progress",
+                "report_progress",
+                "progress",
+                "reporter",
+                "stage",
+                "runner",
+            }:
+                found += node.args[:2]
+            if name == "get" and getattr(node.func, "attr", "") == "get":
+                owner = ast.unparse(node.func.value)
+                found += node.args[:1] if re.search(r"timings|rays", owner) else []
+            found += [word.value for word in node.keywords if word.arg == "stage"]
+        elif isinstance(node, ast.Subscript) and re.search(r"timings|rays", ast.unparse(node.value)):
+            found.append(node.slice)
+        elif isinstance(node, ast.Compare) and "stage" in ast.unparse(node).lower():
+            found += [node.left, *node.comparators]
+        elif isinstance(node, ast.Assign) and "STAGE" in ast.unparse(node.targets[0]):
+            found += [node.value, *getattr(node.value, "elts", [])]
+        elif isinstance(node, ast.List | ast.Tuple | ast.Set | ast.Dict):
+            parts = node.keys if isinstance(node, ast.Dict) else node.elts
+            # Lists of stages; one of their names alone may be a key of something else.
+            if len(parts) > 1 and all(part is not None and text(part) in stages for part in parts):
+                found += parts
+        elif text(node) in stages and " " in node.value and node.value != Stage.AMBIENT_OCCLUSION:
+            # Nothing but a stage has such a name; ambient occlusion is a quantity as well.
+            found.append(node)
+        yield from (part for part in found if part is not None and text(part) in stages)
+
+
+def test_names_of_stages_have_one_home():
+    found = {
+        f"{name_of(path)}:{part.lineno} {part.value}"
+        for path in sources("baker", "cli", "benchmarks")
+        if path != ROOT / "baker" / "core" / "stage.py"
+        for part in stage_literals(tree_of(path))
+    }
+    assert found == set()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'report(progress, "solve", 0.5)',
+        'progress("load", 0.0)',
+        'with record.stage("texels"): pass',
+        'run_tiles(n, 8, work, stage="unwrap", progress=silent)',
+        'seconds = best["timings"]["finish"]',
+        'seconds = timings.get("write", 0.0)',
+        'STAGE = "finish"',
+        'BY_TEXEL = ("texels", "finish")',
+        'cost = {"direct light": 1}',
+        'if stage == "solve": pass',
+    ],
+)
+def test_a_stage_literal_is_found(line):
+    assert [part.value for part in stage_literals(ast.parse(line))]
+    assert not list(stage_literals(ast.parse(re.sub(r'"[a-z ]+"', "Stage.SOLVE", line))))
 
 
 def test_no_variable_of_the_environment_is_read():

@@ -17,6 +17,7 @@ from baker.core.progress import Progress, silent
 from baker.core.progress import report as tell_progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.io.load import load_for_bake
 
 
@@ -80,7 +81,7 @@ def check_scene(
     except IndexRangeError as error:
         found = [_index_range(error)]
     else:
-        timings["load"] = time.perf_counter() - start
+        timings[Stage.LOAD] = time.perf_counter() - start
         settings = with_extras(settings, scene)
         found = _run(path, scene, settings, bake_settings, progress, timings)
     found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
@@ -104,7 +105,7 @@ def _run(
     found: list[Finding] = []
     entries = all_checks()
     for k, entry in enumerate(entries):
-        tell_progress(progress, "checks", k / len(entries))
+        tell_progress(progress, Stage.CHECKS, k / len(entries))
         begin = time.perf_counter()
         found += run_check(entry, context)
         timings[entry.code] = time.perf_counter() - begin

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from baker.checks.mesh_facts import MeshFacts
 from baker.core.scene import Material
 from baker.core.source_mesh import SourceInstance
+from baker.core.stage import Stage
 
 if TYPE_CHECKING:
     from baker.trace.embree import RayScene, Tracer
@@ -149,5 +150,5 @@ def cast(
     def work(i: int, j: int) -> None:
         first_hits(new_packet_buffers(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
 
-    run_tiles(n, _TILE, work, threads=threads, stage="rays", progress=silent)
+    run_tiles(n, _TILE, work, threads=threads, stage=Stage.CHECKS, progress=silent)
     return triangle, distance

@@ -24,6 +24,7 @@ from baker.core.geometry import world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
+from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
 from baker.metrics.error_metrics import FIGURES, dark_floor, figures
 from baker.metrics.limits import Verdict, judge, parse_limits
@@ -120,7 +121,7 @@ def compare(
     """
     settings = settings or DiffSettings()
     start = time.monotonic()
-    report(progress, "load", 0.0)
+    report(progress, Stage.LOAD, 0.0)
     first, second = read_bake(a), read_bake(b)
     names = [n for n in first.maps if n in second.maps and first.maps[n].shape[3] == second.maps[n].shape[3]]
     if not names:
@@ -133,7 +134,7 @@ def compare(
     origin = first.scene.origin
     surfaces = [world_geometry(bake.scene, bake.atlas, origin) for bake in (first, second)]
     sides = make_sides(surfaces[0], surfaces[1], first.scene, second.scene, pairs)
-    report(progress, "compare", 0.0)
+    report(progress, Stage.COMPARE, 0.0)
     owners = _owners(first, sides)
     pixel, points, other, lost = _choose(first, sides, owners, names[0], settings)
     if not len(pixel):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from baker.comparison.match import Sides, SurfacePoints, match
 from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import look_up_uv, texel_points
@@ -67,7 +68,7 @@ def page_flip(
         row, column, points, other = row[met], column[met], points[met], other[met]
         owner = sides.a.instance[points.triangle]
         for i, name in enumerate(names):
-            report(progress, "pictures", (number + i / len(names)) / pages)
+            report(progress, Stage.PICTURES, (number + i / len(names)) / pages)
             side = -(-size // step)
             stored = np.zeros((side, side, a.maps[name].shape[3]), np.float32)
             reference = np.zeros((side, side, b.maps[name].shape[3]), np.float32)

@@ -14,6 +14,7 @@ from itertools import islice
 from typing import Any, Protocol
 
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 
 # Seconds between two progress reports, at which the caller may cancel.
 _REPORT_SECONDS = 0.1
@@ -54,7 +55,7 @@ class TileRunner(Protocol):
         *,
         keep: Callable[[int, int, Part], object],
         threads: int,
-        stage: str,
+        stage: Stage,
         progress: Progress,
         rays_per_item: float = 0.0,
     ) -> None:
@@ -68,7 +69,7 @@ def run_tiles(
     *,
     keep: Callable[[int, int, Any], object] | None = None,
     threads: int,
-    stage: str,
+    stage: Stage,
     progress: Progress,
     rays_per_item: float = 0.0,
 ) -> None:
@@ -86,7 +87,7 @@ def run_tiles(
         `keep(begin, end, part)` stores the result of a tile; None if `work` stores it itself.
     threads : int
         Number of threads.
-    stage : str
+    stage : Stage
         Name shown by `progress`.
     progress : Progress
         Receives reports, and may cancel.

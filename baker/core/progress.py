@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from baker.core.errors import Cancelled
+from baker.core.stage import Stage
 
 
 class Progress(Protocol):
@@ -34,15 +35,15 @@ def silent(stage: str, fraction: float, detail: str = "", /) -> object:
     return None
 
 
-def report(progress: Progress, stage: str, fraction: float, detail: str = "") -> None:
+def report(progress: Progress, stage: Stage, fraction: float, detail: str = "") -> None:
     """Report to `progress`, and stop the work if it asks for that.
 
     Parameters
     ----------
     progress : Progress
         Receives the report.
-    stage : str
-        Name of the stage.
+    stage : Stage
+        Its value is the name that users see.
     fraction : float
         Share of the stage that is done, 0 to 1.
     detail : str

@@ -34,6 +34,7 @@ class Stage(StrEnum):
     CLUSTER = "on the cluster"
     # Other commands.
     CHECKS = "checks"
+    FIX = "fix"
     REPAIR = "repair"
     RENDERING = "rendering"
     PATH_TRACING = "path tracing"

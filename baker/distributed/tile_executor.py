@@ -58,13 +58,13 @@ class DistributedTileExecutor:
             *,
             keep: Callable[[int, int, Part], object],
             threads: int,
-            stage: str = stage,
+            stage: Stage = stage,
             progress: Progress,
             rays_per_item: float = 0.0,
         ) -> None:
             report(progress, stage, 0.0)
             spans = [(begin, min(begin + tile, n)) for begin in range(0, n, tile)]
-            _Stage(self.cluster, self._submitter(Stage(stage), dict(arrays))).run(
+            _Stage(self.cluster, self._submitter(stage, dict(arrays))).run(
                 spans, n, keep, stage, progress, rays_per_item
             )
 
@@ -99,7 +99,7 @@ class _Stage:
         spans: list[Span],
         n: int,
         keep: Callable[[int, int, Part], object],
-        stage: str,
+        stage: Stage,
         progress: Progress,
         rays_per_item: float,
     ) -> None:

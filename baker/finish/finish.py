@@ -19,7 +19,6 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-STAGE = "finish"
 # A layer is left as it was sampled if the noise of all texels of about one brightness is below this share of
 # their light (RMS): filtering it costs a second pass and gained nothing (Cornell, 64 samples: 0.33 % median
 # error with, 0.35 % without).

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 from baker.core.progress import Progress, report, silent
+from baker.core.stage import Stage
 
-STAGE = "denoise"
 # Scratch memory the filter may use, MB. Larger tiles were not faster; 4096 pages must fit beside the bake.
 MEMORY_MB = 1000
 
@@ -191,7 +191,7 @@ class _Monitor:
         # No exception can pass through the C library: keep it and stop. A Ctrl-C arrives here as well.
         try:
             if self._caught is None:
-                report(self._progress, STAGE, float(fraction))
+                report(self._progress, Stage.DENOISE, float(fraction))
         except BaseException as error:
             self._caught = error
         return self._caught is None

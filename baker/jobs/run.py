@@ -13,13 +13,13 @@ from baker.core.error_mapping import explain
 from baker.core.errors import BakerError, ResourceError
 from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 from baker.io.bake.lock import OutputLock, dead_writers, sweep
 from baker.io.scene_hash import scene_sha256
 from baker.jobs.executor import Bakery, Event
 from baker.jobs.jobs_file import Job
 from baker.jobs.up_to_date import Freshness, check_output
 
-STAGE = "batch"
 # Seconds between two looks at locks held by other runs, and at the wish to stop.
 _LOOK = 0.1
 
@@ -83,7 +83,7 @@ class _Ticket:
     lock: OutputLock | None = None
     announced: bool = False
     started: float = 0.0
-    stage: str = "start"
+    stage: str = Stage.START
     fraction: float = 0.0
 
 
@@ -166,7 +166,7 @@ class _Run:
                     self.outcomes[number] = Outcome(found.job, "baked", found.seen.why)
                 else:
                     self.waiting.append(found)
-                report(self.progress, STAGE, 0.0, f"looked at {number + 1} of {len(self.jobs)}")
+                report(self.progress, Stage.BATCH, 0.0, f"looked at {number + 1} of {len(self.jobs)}")
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -276,7 +276,7 @@ class _Run:
         if blocked:
             names = ["waiting for another run that bakes the same"]
         detail = "  ".join([f"{len(self.outcomes)} of {n}", *names])
-        report(self.progress, STAGE, len(self.outcomes) / max(n, 1), detail)
+        report(self.progress, Stage.BATCH, len(self.outcomes) / max(n, 1), detail)
 
 
 def _release(ticket: _Ticket) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress
 from baker.core.scene import Camera
+from baker.core.stage import Stage
 from baker.pathtracer.bidirectional import trace_both_ways
 from baker.pathtracer.bidirectional_weights import MOST_FROM_LAMP
 from baker.pathtracer.camera import camera_rays
@@ -90,7 +91,7 @@ def picture_pass(
         def told(stage: str, fraction: float, detail: str = "", block: int = block, span: int = span) -> Any:
             return progress(stage, (block + fraction * span) / n, detail)
 
-        run_tiles(span, _TILE, work, threads=reference.threads, stage="path tracing", progress=told)
+        run_tiles(span, _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=told)
         # The order of tiles, not that of threads.
         for splat_pixel, splat, cast, shadows in found:
             for c in range(3):

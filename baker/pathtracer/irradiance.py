@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
+from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.pathtracer.estimators import Estimator, estimator_named
 from baker.pathtracer.occlusion import alike_within, are_dense, near_together, open_rays
@@ -82,7 +83,9 @@ def irradiance_pass(
             counted[begin // _TILE] = cast
         add_pass(estimate, rows, out * (math.pi / samples))
 
-    run_tiles(len(picked), _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
+    run_tiles(
+        len(picked), _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=progress
+    )
     estimate.rounds += 1
     estimate.rays += int(counted.sum())
     estimate.segments += int(counted[:, 0].sum())
@@ -131,7 +134,9 @@ def openness_pass(
 
     # Large tiles hold more neighbours, but few of them keep threads waiting at the end.
     tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
-    run_tiles(len(position), tile, work, threads=reference.threads, stage="openness", progress=progress)
+    run_tiles(
+        len(position), tile, work, threads=reference.threads, stage=Stage.AMBIENT_OCCLUSION, progress=progress
+    )
     estimate.rounds += 1
     estimate.rays += len(position) * samples
 

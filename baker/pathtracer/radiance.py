@@ -7,6 +7,7 @@ import numpy as np
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
 from baker.core.scene import Camera
+from baker.core.stage import Stage
 from baker.kernels.sampling import sobol_reversed
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.estimators import estimator_named
@@ -71,7 +72,9 @@ def radiance_pass(
         counted[begin // _TILE] = cast
         add_pass(estimate, slice(begin, end), out / samples)
 
-    run_tiles(width * height, _TILE, work, threads=reference.threads, stage="path tracing", progress=progress)
+    run_tiles(
+        width * height, _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=progress
+    )
     estimate.rounds += 1
     estimate.rays += int(counted.sum())
     estimate.segments += int(counted[:, 0].sum())

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera
+from baker.core.stage import Stage
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.first_hit import FirstHits, first_hits
 from baker.pathtracer.irradiance import openness_pass
@@ -25,7 +26,6 @@ from baker.pathtracer.scene import Reference
 from baker.rendering.baked import BakedLight
 from baker.rendering.settings import RenderSettings
 
-STAGE = "rendering"
 # Samples of a pixel in one pass.
 _PASS, _OPENNESS_PASS = 4, 16
 # Samples that a slow machine makes in a second: passes are small where time is short.
@@ -90,7 +90,7 @@ class Run:
         done = estimate.rounds * estimate.samples
         by_samples = 0.0 if goal is None else (done + part * estimate.samples) / goal
         by_time = 0.0 if limit is None else (time.monotonic() - self.start) / limit
-        report(self.progress, STAGE, min(max(by_samples, by_time), 1.0), f"{done} samples a pixel")
+        report(self.progress, Stage.RENDERING, min(max(by_samples, by_time), 1.0), f"{done} samples a pixel")
 
     def within(self, estimate: PointEstimate) -> Progress:
         """Return what a pass may report to: its share counts as a share of the picture."""
@@ -109,7 +109,14 @@ class Run:
 
     def blocks(self, work: Callable[[int, int], None], progress: Progress) -> None:
         """Call `work(begin, end)` for all pixels, on all threads."""
-        run_tiles(self.pixels, _BLOCK, work, threads=self.reference.threads, stage=STAGE, progress=progress)
+        run_tiles(
+            self.pixels,
+            _BLOCK,
+            work,
+            threads=self.reference.threads,
+            stage=Stage.RENDERING,
+            progress=progress,
+        )
 
 
 def traced(run: Run) -> PointEstimate:

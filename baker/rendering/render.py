@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera, Scene, SceneWarning
+from baker.core.stage import Stage
 from baker.io.load import load_scene
 from baker.kernels.not_kept import cache_warnings
 from baker.pathtracer.camera import parse_camera
@@ -65,7 +66,7 @@ def render(
     """
     settings = settings or RenderSettings()
     start = time.monotonic()
-    report(progress, "load", 0.0)
+    report(progress, Stage.LOAD, 0.0)
     # Seven numbers are judged before anything is loaded; a name needs the file.
     text = settings.camera
     camera = parse_camera(text) if text is not None and ("," in text or not text) else None

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Scene, SourceDocument
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
+from baker.core.stage import Stage
 from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
@@ -27,8 +28,6 @@ from baker.repairs.meshlab import require_meshlab
 from baker.repairs.primitive_edit import EditablePrimitive, apply_edit
 from baker.repairs.settings import RepairSettings
 from baker.topology.triangle_check import face_normal, in_range
-
-STAGE = "fix"
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def _fix(
     fixed: list[Fix] = []
     left: list[LeftAlone] = []
     for number, mesh, shown in _shown_meshes(source_scene):
-        report(progress, STAGE, number / len(source_scene.meshes), mesh.name)
+        report(progress, Stage.FIX, number / len(source_scene.meshes), mesh.name)
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
         plan = plan_mesh(
@@ -187,7 +186,7 @@ def _fix(
                 edited[index, edit.primitive.arrays.index] = made
         fixed += [Fix(name, node, change) for change in plan.changes]
         left += [LeftAlone(name, node, reason) for reason in plan.left]
-    report(progress, STAGE, 1.0)
+    report(progress, Stage.FIX, 1.0)
     if edited or data is None:
         data = write_mended(source, edited)
     return FixResult(data, tuple(fixed), tuple(left))
@@ -199,7 +198,7 @@ def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
     made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
     for number, mesh, shown in _shown_meshes(source_scene):
-        report(progress, "repair", number / len(source_scene.meshes), mesh.name)
+        report(progress, Stage.REPAIR, number / len(source_scene.meshes), mesh.name)
         name, node = shown[0].name, shown[0].node
         index = source.json["nodes"][node]["mesh"]
         primitives = source.json["meshes"][index]["primitives"]
@@ -208,7 +207,7 @@ def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
         made |= {(index, primitive): new for primitive, new in repair.made.items()}
         fixed += [Fix(name, node, change) for change in repair.changes]
         left += [LeftAlone(name, node, reason) for reason in repair.left]
-    report(progress, "repair", 1.0)
+    report(progress, Stage.REPAIR, 1.0)
     return FixResult(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
 
 
@@ -237,7 +236,7 @@ def _read_glb(path: Path, data: bytes) -> Scene:
 
 def _within(progress: Progress, number: int, count: int) -> Progress:
     """Return the progress of a stage inside the work on mesh `number` of `count`."""
-    return lambda stage, fraction, detail="": progress(STAGE, (number + fraction) / count, detail)
+    return lambda stage, fraction, detail="": progress(Stage.FIX, (number + fraction) / count, detail)
 
 
 def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 
-STAGE = "unwrap"
 # Items times texels of the page to place between two looks at the cancel flag: well under a second.
 _CHUNK_WORK = 1 << 29
 
@@ -126,7 +126,7 @@ def pack(
     placed = 0
     step = max(16, _CHUNK_WORK // resolution**2)
     for start in range(0, len(order), step):
-        report(progress, STAGE, fraction)
+        report(progress, Stage.UNWRAP, fraction)
         chunk = order[start : start + step]
         count = place(
             next_used, next_free, chunk, item_shape, first_row, low, high, gap, margin, lowest, position

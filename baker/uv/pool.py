@@ -11,12 +11,12 @@ import numpy as np
 
 from baker.core.child_process import start_module
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
 # Fewer triangles than this take less time here than a process takes to start (0.2 s).
 IN_PROCESS_TRIANGLES = 3000
-STAGE = "unwrap"
 
 
 def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: float) -> list[FlatCharts]:
@@ -42,7 +42,7 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     """
     total = sum(len(job.triangle) for job in jobs)
     if total < IN_PROCESS_TRIANGLES:
-        report(progress, STAGE, 0.0)
+        report(progress, Stage.UNWRAP, 0.0)
         return [cut_charts(job) for job in jobs]
     return _Pool(jobs, min(threads, len(jobs)), total).run(progress, until)
 
@@ -70,7 +70,10 @@ class _Pool:
                 thread.start()
             while any(thread.is_alive() for thread in self.threads):
                 report(
-                    progress, STAGE, until * self.done / self.total, f"{self.done} of {self.total} triangles"
+                    progress,
+                    Stage.UNWRAP,
+                    until * self.done / self.total,
+                    f"{self.done} of {self.total} triangles",
                 )
                 for thread in self.threads:
                     thread.join(0.1 / len(self.threads))

@@ -13,13 +13,13 @@ from baker.core.errors import InputError
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import Instance, Mesh, Scene, SceneWarning
 from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
 from baker.uv.charts import MeshCharts, chart_meshes
 from baker.uv.check import PAGE_TOLERANCE, page_overlap, uv_area
 from baker.uv.density_share import density_shares
 from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.uv.pages import fill_pages
-from baker.uv.pool import STAGE
 
 # Relative difference of the axes' scales up to which an instance counts as evenly scaled.
 _EVEN_SCALE = 1e-4
@@ -60,7 +60,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     """
     if scene.n_triangles == 0:
         raise InputError("the scene has no triangles to bake", file=str(scene.path) if scene.path else None)
-    report(progress, STAGE, 0.0)
+    report(progress, Stage.UNWRAP, 0.0)
     kept = choose_kept(scene, settings.resolution, settings.uv)
     if kept.together:
         atlas = _keep_all(scene, settings, kept.warnings)
@@ -74,7 +74,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
                 file=error.file or (str(scene.path) if scene.path else None),
                 object=error.object,
             ) from None
-    report(progress, STAGE, 1.0, f"{atlas.n_charts} charts, {atlas.n_pages} pages")
+    report(progress, Stage.UNWRAP, 1.0, f"{atlas.n_charts} charts, {atlas.n_pages} pages")
     return atlas
 
 
@@ -194,7 +194,7 @@ def _verify(
     """Check the finished pages for overlap and range, whatever made them."""
     found: list[SceneWarning] = []
     for page in range(n_pages):
-        report(progress, STAGE, 0.95 + 0.05 * page / n_pages)
+        report(progress, Stage.UNWRAP, 0.95 + 0.05 * page / n_pages)
         here = [layout for layout in layouts if layout.page == page and len(layout.triangle)]
         uv = np.concatenate([layout.uv[layout.triangle] for layout in here])
         group = np.concatenate([np.full(len(layout.triangle), k) for k, layout in enumerate(here)])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import texel_places
@@ -80,7 +81,7 @@ def trace_crops(
         corner = _corner(entry["row"], bake.atlas.resolution), _corner(entry["column"], bake.atlas.resolution)
         if any(_overlap(crop, entry, corner) for crop in crops):
             continue
-        report(progress, "crops", len(crops) / _MOST)
+        report(progress, Stage.CROPS, len(crops) / _MOST)
         crops.append(_trace(bake, geometry, reference, entry, corner, bounces, seed, end))
     return crops
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
+from baker.core.stage import Stage
 from baker.metrics.error_metrics import dark_floor
 from baker.metrics.texel_area import TexelPlaces
 from baker.pathtracer.first_hit import first_hits
@@ -124,7 +125,7 @@ def trace_openness(
             reference, estimate, places.position, places.normal, places.face_normal,
             distance=distance, seed=effort.seed,
         )  # fmt: skip
-        report(progress, "ambient occlusion", (number + 1) / (goal or _MOST_OPENNESS))
+        report(progress, Stage.AMBIENT_OCCLUSION, (number + 1) / (goal or _MOST_OPENNESS))
         if goal is not None or number + 1 < _FIRST:
             continue
         late = effort.deadline is not None and time.monotonic() > started + _OPENNESS_TIME * (
@@ -149,7 +150,7 @@ def trace_irradiance(
             max_bounces=bounces, seed=effort.seed, chosen=chosen,
         )  # fmt: skip
         if goal is not None:
-            report(progress, "path tracing", estimate.rounds / goal)
+            report(progress, Stage.PATH_TRACING, estimate.rounds / goal)
             if estimate.rounds >= goal:
                 break
         elif estimate.rounds >= _FIRST:
@@ -161,7 +162,7 @@ def trace_irradiance(
                 share = max(share, late)
                 if late > _EVEN:
                     chosen = _nearest_to_done(estimate, error, chosen)
-            report(progress, "path tracing", min(share, 1.0), f"{len(error) - len(chosen)} texels done")
+            report(progress, Stage.PATH_TRACING, min(share, 1.0), f"{len(error) - len(chosen)} texels done")
             if not len(chosen):
                 break
         if effort.deadline is not None and estimate.rounds >= 2 and time.monotonic() > effort.deadline:

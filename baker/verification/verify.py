@@ -20,6 +20,7 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
+from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
 from baker.kernels.not_kept import cache_warnings
 from baker.metrics.groups import Compared
@@ -160,7 +161,7 @@ def verify(
     """
     settings = settings or VerifySettings()
     start = time.monotonic()
-    report(progress, "load", 0.0)
+    report(progress, Stage.LOAD, 0.0)
     bake = read_bake(out)
     names = [name for name in CHANNELS if name in bake.maps]
     if not names:
@@ -217,9 +218,9 @@ def _trace(
     progress: Progress,
 ) -> _Traced:
     """Choose points and path-trace them."""
-    report(progress, "start", 0.0, "kernels")
+    report(progress, Stage.START, 0.0, "kernels")
     compiled = first_rays(reference, geometry, names)
-    report(progress, "start", 0.5, "points")
+    report(progress, Stage.START, 0.5, "points")
     points, air = choose_points(reference, bake, geometry, pages, names, settings)
     unjudged = measure_unjudged(reference, bake, geometry, pages, air, settings.seed)
     deadline = None if settings.seconds is None else time.monotonic() + settings.seconds

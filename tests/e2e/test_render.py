@@ -15,10 +15,10 @@ from gltf_builder import GltfBuilder, quad_builder, write
 from baker.cli.app import run
 from baker.core.errors import Cancelled, InputError, ResourceError
 from baker.core.settings import make_settings
+from baker.core.stage import Stage
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.png import decode_png
 from baker.pipeline.bake import bake
-from baker.rendering.passes import STAGE
 from baker.rendering.render import render
 from baker.rendering.settings import RenderSettings
 
@@ -366,7 +366,7 @@ def test_a_time_limit_ends_it(more):
 def test_progress_rises_to_the_end_and_can_cancel(tmp_path):
     told = []
     render(CORNELL, RenderSettings(width=64, height=48, spp=16), lambda *a: told.append(a) and None)
-    shares = [fraction for stage, fraction, *_ in told if stage == STAGE]
+    shares = [fraction for stage, fraction, *_ in told if stage == Stage.RENDERING]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0, 1)
     assert len(set(shares)) > 8

@@ -14,6 +14,7 @@ from baker.core.export import EXPORTS
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
+from baker.core.stage import Stage
 from baker.io.bake.manifest import make_manifest, manifest_text
 from baker.io.bake.output_folder import MANIFEST_NAME, OutputFolder, check_out
 from baker.io.gltf.write_baked import make_glb
@@ -104,18 +105,18 @@ def _write_files(
             warnings += found
             pages.append(entry)
             files += [{"file": e["file"], "sha256": e["sha256"]} for e in (entry, *entry["encodings"])]
-            report(progress, "write", len(pages) / steps, entry["file"])
+            report(progress, Stage.WRITE, len(pages) / steps, entry["file"])
     for page in range(n_pages):
         legend = ", ".join(f"{status.value} {status.name.lower()}" for status in TexelStatus)
         colours = {status.value: colour for status, colour in STATUS_COLOURS.items()}
         data = encode_palette_png(result.status[page], colours, {"Legend": legend, "Software": _signature()})
         files.append(_write_data(folder.path, f"status_{page}.png", data))
-        report(progress, "write", (len(pages) + page + 1) / steps, files[-1]["file"])
+        report(progress, Stage.WRITE, (len(pages) + page + 1) / steps, files[-1]["file"])
     ao = result.lightmaps.get("ao")
     ao_png = {p: encode_png(grey_levels(ao.value[p, :, :, 0])) for p in range(len(ao.value))} if ao else None
     glb = make_glb(result.scene, result.atlas, ao_png)
     files.append(_write_data(folder.path, "scene.glb", glb.data))
-    report(progress, "write", 1.0, "scene.glb")
+    report(progress, Stage.WRITE, 1.0, "scene.glb")
     manifest = make_manifest(
         result,
         folder.out,
@@ -128,7 +129,7 @@ def _write_files(
     _write_manifest(folder.path, manifest)
     # An export reads a bake that is whole but for the exports themselves.
     for name in result.settings.export:
-        report(progress, "write", 1.0, f"export {name}")
+        report(progress, Stage.WRITE, 1.0, f"export {name}")
         manifest["files"] += _write_export(folder.path, name)
     if result.settings.export:
         _write_manifest(folder.path, manifest)
