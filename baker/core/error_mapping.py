@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+from collections.abc import Iterator
 
 from baker.core.errors import BakerError, Cancelled, ResourceError
 
+_OUT_OF_MEMORY = (
+    "out of memory; try a smaller `resolution`, a lower `density`, fewer `samples` or fewer `threads`"
+)
 # Messages for error numbers of the operating system: a resource ran out, or access is denied.
 _RESOURCE_ERRNO = {
     errno.ENOSPC: "the disk is full; free some space, or write elsewhere with `out`",
@@ -13,7 +18,7 @@ _RESOURCE_ERRNO = {
     errno.EACCES: "no permission; change it, or write elsewhere with `out`",
     errno.EPERM: "no permission; change it, or write elsewhere with `out`",
     errno.EROFS: "the file system is read-only; write elsewhere with `out`",
-    errno.ENOMEM: "out of memory; try a smaller `resolution` or fewer `threads`",
+    errno.ENOMEM: _OUT_OF_MEMORY,
     errno.EMFILE: "too many open files; raise the limit (ulimit -n)",
 }
 
@@ -36,13 +41,36 @@ def explain(error: BaseException) -> BakerError | None:
     if isinstance(error, KeyboardInterrupt):
         return Cancelled("interrupted")
     if isinstance(error, MemoryError):
-        return ResourceError(
-            "out of memory; try a smaller `resolution`, a lower `density` or fewer `threads`"
-        )
+        return ResourceError(_OUT_OF_MEMORY)
     if isinstance(error, OSError):
         reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))
         return ResourceError(reason, file=None if error.filename is None else str(error.filename))
     return None
+
+
+@contextlib.contextmanager
+def memory_errors(*, file: str | None = None) -> Iterator[None]:
+    """Turn a `MemoryError` of the body into a `ResourceError`.
+
+    Parameters
+    ----------
+    file : str, optional
+        File that the body reads.
+
+    Yields
+    ------
+    None
+        Nothing; the body runs.
+
+    Raises
+    ------
+    ResourceError
+        If the body raises `MemoryError`.
+    """
+    try:
+        yield
+    except MemoryError:
+        raise ResourceError(_OUT_OF_MEMORY, file=file) from None
 
 
 def bug(error: BaseException) -> ResourceError:

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from baker.core.errors import InputError, ResourceError, SettingsError
+from baker.core.error_mapping import memory_errors
+from baker.core.errors import InputError, SettingsError
 from baker.core.light_kind import check_lights
 from baker.core.registry import Registry
 from baker.core.scene import Scene
@@ -110,10 +111,8 @@ def load_scene(
         raise InputError(f"{what}; known are {known}", file=str(path))
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
-    try:
+    with memory_errors(file=str(path)):
         scene = importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
-    except MemoryError:
-        raise ResourceError("the scene does not fit into memory", file=str(path)) from None
     if not lenient:
         check_lights(scene)
     return scene

@@ -2,106 +2,147 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.channels.channel import Channel, Transport
+from baker.channels.channel import Channel, Layer, Transport
 from baker.core.atlas import Atlas
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.parallel import thread_count
+from baker.core.progress import Progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
 from baker.finish.finish import PageLayer, PagePlan, finish_page
-from baker.finish.oidn import LightmapDenoiser
+from baker.finish.oidn import LightmapDenoiser, denoiser_name
 from baker.pipeline.record import Record
 
 # A texel counts as not converged if its standard error before denoising exceeds this share of its value.
 UNCONVERGED = 0.25
 
 
+class TracedTexels(NamedTuple):
+    """Result of the ray stages.
+
+    texels : TexelBuffer
+    valid : (n_front,) bool, texels with a valid point
+    transport : Transport
+    """
+
+    texels: TexelBuffer
+    valid: NDArray[np.bool_]
+    transport: Transport
+
+
 def finish_pages(
     scene: Scene,
     atlas: Atlas,
-    texels: TexelBuffer,
-    good: NDArray[np.bool_],
-    transport: Transport,
-    channels: dict[str, Channel],
+    traced: TracedTexels,
+    channels: Mapping[str, Channel],
     settings: BakeSettings,
     record: Record,
 ) -> BakeResult:
-    """Turn texel values into finished pages and gather what is to be told about them.
+    """Turn texel values into finished pages, with status and statistics.
 
-    good : (n_front,) bool, texels that are not buried
+    Parameters
+    ----------
+    scene : Scene
+        What was baked.
+    atlas : Atlas
+        Its lightmap uv.
+    traced : TracedTexels
+        Texels and their light.
+    channels : mapping of str to Channel
+        Maps to make.
+    settings : BakeSettings
+        Of the bake.
+    record : Record
+        Timings, ray counts and warnings, which the result takes over.
+
+    Returns
+    -------
+    BakeResult
+        Not written yet.
     """
+    texels, valid = traced.texels, traced.valid
     n_front = texels.n_front
     chart = texels.page_image(texels.chart[:n_front], fill=-1)
-    region = texels.page_image(texels.region, fill=-1)
-    valid = texels.page_image(good, fill=False)
-    centroid = texels.page_image(texels.centroid)
     status = np.where(chart >= 0, np.uint8(TexelStatus.COVERED), np.uint8(TexelStatus.EMPTY))
-    noisy = np.zeros(n_front, bool)
-    lightmaps: dict[str, Lightmap] = {}
-    statistics: dict[str, dict[str, Any]] = {}
-    shape = (atlas.n_pages, atlas.resolution, atlas.resolution)
-    layers = {name: channel.layers(transport) for name, channel in channels.items()}
-    value = {name: np.zeros((*shape, channel.components), np.float32) for name, channel in channels.items()}
-    threads = thread_count(settings.threads)
-    with record.stage(Stage.FINISH), LightmapDenoiser(threads) as lightmap_denoiser:
-        for page in range(atlas.n_pages):
-            plan = PagePlan(region[page], valid[page], centroid[page])
-            for name, channel in channels.items():
-                images = [
-                    PageLayer(
-                        texels.page_image(part.value, page=page),
-                        texels.page_image(part.error, page=page),
-                        part.bound,
-                        None if part.kept is None else texels.page_image(part.kept, fill=False, page=page),
-                    )
-                    for part in layers[name]
-                ]
-                value[name][page], grown = finish_page(
-                    plan,
-                    images,
-                    upper=channel.upper,
-                    denoiser=lightmap_denoiser if settings.denoise else None,
-                    dilation=max(2 * settings.padding, 8),
-                    threads=threads,
-                    progress=record.progress,
-                )
-                status[page][grown] = TexelStatus.DILATED
-        for name, channel in channels.items():
+    layers = {name: channel.layers(traced.transport) for name, channel in channels.items()}
+    with record.stage(Stage.FINISH):
+        value = _finished(traced, channels, layers, settings, record.progress, status)
+        noisy = np.zeros(n_front, bool)
+        for name in channels:
             noisy |= _unconverged(layers[name], texels.chart[:n_front])
-            lightmaps[name] = Lightmap(name, channel.unit, value[name])
-            statistics[name] = _statistics(value[name][chart >= 0], int((~good).sum()))
+        invalid = int((~valid).sum())
+        statistics = {name: _statistics(value[name][chart >= 0], invalid) for name in channels}
     flat = status.reshape(-1)
-    flat[texels.pixel[:n_front][noisy & good]] = TexelStatus.UNCONVERGED
-    flat[texels.pixel[:n_front][~good]] = TexelStatus.INVALID
-    denoiser: dict[str, Any] = {}
-    if settings.denoise:
-        from baker.finish.denoise import denoiser_name
-
-        denoiser = denoiser_name()
+    flat[texels.pixel[:n_front][noisy & valid]] = TexelStatus.UNCONVERGED
+    flat[texels.pixel[:n_front][~valid]] = TexelStatus.INVALID
     return BakeResult(
         scene=scene,
         atlas=atlas,
         settings=settings,
-        lightmaps=lightmaps,
+        lightmaps={name: Lightmap(name, channel.unit, value[name]) for name, channel in channels.items()},
         status=status,
         texel_count=np.bincount(texels.instance[:n_front], minlength=len(scene.instances)).astype(np.int64),
         statistics=statistics,
         timings=record.timings,
         rays=record.rays,
         solve=record.solve,
-        denoise=denoiser,
+        denoise=denoiser_name() if settings.denoise else {},
         warnings=tuple(record.warnings),
     )
 
 
-def _unconverged(layers: tuple[Any, ...], chart: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _finished(
+    traced: TracedTexels,
+    channels: Mapping[str, Channel],
+    layers: Mapping[str, tuple[Layer, ...]],
+    settings: BakeSettings,
+    progress: Progress,
+    status: NDArray[np.uint8],
+) -> dict[str, NDArray[np.float32]]:
+    """Return pages (n_pages, H, W, C) of each channel; mark dilated texels in `status` (n_pages, H, W)."""
+    texels, threads = traced.texels, thread_count(settings.threads)
+    region = texels.page_image(texels.region, fill=-1)
+    valid = texels.page_image(traced.valid, fill=False)
+    centroid = texels.page_image(texels.centroid)
+    value = {
+        name: np.zeros((*status.shape, channel.components), np.float32) for name, channel in channels.items()
+    }
+    with LightmapDenoiser(threads) as denoiser:
+        for page in range(len(status)):
+            plan = PagePlan(region[page], valid[page], centroid[page])
+            for name, channel in channels.items():
+                value[name][page], grown = finish_page(
+                    plan,
+                    [_page_layer(texels, layer, page) for layer in layers[name]],
+                    upper=channel.upper,
+                    denoiser=denoiser if settings.denoise else None,
+                    dilation=max(2 * settings.padding, 8),
+                    threads=threads,
+                    progress=progress,
+                )
+                status[page][grown] = TexelStatus.DILATED
+    return value
+
+
+def _page_layer(texels: TexelBuffer, layer: Layer, page: int) -> PageLayer:
+    """Return one page of a layer."""
+    return PageLayer(
+        texels.page_image(layer.value, page=page),
+        texels.page_image(layer.error, page=page),
+        layer.bound,
+        None if layer.kept is None else texels.page_image(layer.kept, fill=False, page=page),
+    )
+
+
+def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Return the texels whose summed standard error exceeds a share of their value.
 
     Dark ones count as a twentieth of the geometric mean of their `chart`, (n_front,) int32.

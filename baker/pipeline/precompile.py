@@ -1,9 +1,11 @@
-"""Compiles kernels in a second process while the first bake after an install begins its work.
+"""Compiles kernels in a second process while the first bake after an install reads its scene.
 
-Numba compiles one function at a time in a process, and keeps what it compiled on disk: what this process
-compiles, the bake finds. It is run as `python -m baker.pipeline.precompile`, lights and gathers from a single
-lamp, finishes a small page, and writes nothing but that cache. The bake itself compiles uv, texels and the
-rest.
+Numba compiles one function at a time per process, and stores machine code on disk, where other processes find
+it. Run as `python -m baker.pipeline.precompile`: computes light from a single emitter at a few points and
+finishes a small page, so that these kernels are compiled and stored; it writes nothing else. The bake itself
+compiles the kernels of uv and texels meanwhile.
+
+Kernels are imported inside functions: the process calls `skip_blas` first.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,24 +22,45 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.stage import Stage
 
-_LOOK = 0.1
+# Seconds between two looks at the process.
+_POLL = 0.1
+# Pixels along the side of the page, and number of texels lit.
 _PAGE = 48
 _TEXELS = 16
+# The process, or None where nothing has to be compiled.
+Process = subprocess.Popen[bytes] | None
 
 
-def start() -> subprocess.Popen[bytes] | None:
-    """Start compiling in the background, if the kernels are not on disk yet."""
+def start() -> Process:
+    """Start compiling in the background.
+
+    Returns
+    -------
+    Process
+        None if the kernels are on disk already, or if they cannot be stored there.
+    """
     from baker.finish.kernels.page_guard import hold_to_samples
+    from baker.trace.kernel_cache import is_stored
 
-    folder = hold_to_samples._cache.cache_path
-    # Where nothing can be kept, another process cannot help.
-    if folder is None or any(Path(folder).glob("page_guard.hold_to_samples-*.nbi")):
-        return None
-    return _run()
+    # A kernel of the last step, `finish_pages`.
+    return _run() if is_stored(hold_to_samples) is False else None
 
 
-def suit(process: subprocess.Popen[bytes] | None, scene: Scene) -> subprocess.Popen[bytes] | None:
-    """Start anew where the scene has surfaces that let light through: its kernels are others."""
+def restart_for_materials(process: Process, scene: Scene) -> Process:
+    """Restart if the scene has surfaces that let light through: their kernels are compiled differently.
+
+    Parameters
+    ----------
+    process : Process
+        From `start`.
+    scene : Scene
+        What is baked.
+
+    Returns
+    -------
+    Process
+        The same one if no surface lets light through.
+    """
     passing = [material for material in scene.materials if _passes(material)]
     if process is None or not passing:
         return process
@@ -48,7 +70,7 @@ def suit(process: subprocess.Popen[bytes] | None, scene: Scene) -> subprocess.Po
 
 
 def _passes(material: Material) -> bool:
-    """Tell whether light passes a surface of the material, if its vertices have no alpha of their own."""
+    """Return whether light passes a surface of the material, vertex colours aside."""
     lowest = material.base_colour[3]
     if material.base_colour_texture is not None:
         alpha = material.base_colour_texture.image[..., 3]
@@ -56,50 +78,73 @@ def _passes(material: Material) -> bool:
     return material.alpha_mode != "OPAQUE" and lowest < 1.0
 
 
-def _run(*kind: str) -> subprocess.Popen[bytes]:
+def _run(*kind: str) -> Process:
     command = [sys.executable, "-m", "baker.pipeline.precompile", *kind]
     silence = subprocess.DEVNULL
     return subprocess.Popen(command, stdin=silence, stdout=silence, stderr=silence)
 
 
-def wait_for_rays(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
-    """Wait until the background compilation has its ray kernels: else both processes compiled the same."""
+def wait_for_rays(process: Process, progress: Progress) -> None:
+    """Wait until the ray kernels are compiled, so that both processes do not compile the same ones.
+
+    Parameters
+    ----------
+    process : Process
+        From `start` or `restart_for_materials`.
+    progress : Progress
+        Called while waiting.
+    """
     from baker.radiosity.kernels.gather import gather
+    from baker.trace.kernel_cache import is_stored
 
-    # The last one that `cast_rays` compiles.
-    folder, name = gather._cache.cache_path, "gather.gather-*.nbc"
-    _wait(process, progress, lambda: folder is None or any(Path(folder).glob(name)))
+    # The last kernel that `cast_rays` compiles.
+    _wait(process, progress, lambda: is_stored(gather) is not False)
 
 
-def finish(process: subprocess.Popen[bytes] | None, progress: Progress) -> None:
-    """Wait for the background compilation; if it failed, the kernels are compiled where they are used."""
+def finish(process: Process, progress: Progress) -> None:
+    """Wait for the process to end. If it failed, kernels are compiled where they are used.
+
+    Parameters
+    ----------
+    process : Process
+        From `start` or `restart_for_materials`.
+    progress : Progress
+        Called while waiting.
+    """
     _wait(process, progress, lambda: False)
 
 
-def _wait(process: subprocess.Popen[bytes] | None, progress: Progress, enough: Callable[[], bool]) -> None:
+def _wait(process: Process, progress: Progress, enough: Callable[[], bool]) -> None:
+    """Wait until the process ends or `enough` is true."""
     while process is not None and not enough():
         try:
-            process.wait(_LOOK)
+            process.wait(_POLL)
         except subprocess.TimeoutExpired:
             report(progress, Stage.COMPILE, 0.5, "first run only")
         else:
             process = None
 
 
-def stop(process: subprocess.Popen[bytes] | None) -> None:
-    """End the background compilation."""
+def stop(process: Process) -> None:
+    """Kill the process if it runs.
+
+    Parameters
+    ----------
+    process : Process
+        From `start` or `restart_for_materials`.
+    """
     if process is not None and process.poll() is None:
         process.kill()
         process.wait()
 
 
 def cast_rays(kind: str = "") -> None:
-    """Light texels by one lamp that shines into the open, and gather from them.
+    """Compute the light of one emitter in empty space at a few texels: by shadow rays, then by gathering.
 
     Parameters
     ----------
     kind : str
-        "holes" for a lamp with a MASK material, "glass" for one with a BLEND material.
+        "holes" for an emitter with a MASK material, "glass" for one with a BLEND material.
     """
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
@@ -115,44 +160,58 @@ def cast_rays(kind: str = "") -> None:
     from baker.shading.ray_tree import build_ray_tree
     from baker.trace.packets import new_packet_buffers
 
-    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
-    face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
-    up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
-    mesh = Mesh("lamp", corner, up, face, zero, zero, np.zeros(3, np.int32), np.arange(3, dtype=np.int32))
-    material = Material(emission=(1.0, 1.0, 1.0))
-    if kind:
-        mode = "BLEND" if kind == "glass" else "MASK"
-        material = replace(material, base_colour=(0.5, 1.0, 1.0, 0.4), alpha_mode=mode)
-    scene = Scene("lamp", None, (mesh,), (material,), (Instance(0, "lamp", 0, np.eye(4)),))
-    layout = InstanceLayout(0, 0, np.arange(3, dtype=np.int32), corner[:, :2], face, zero, False, 1.0)
+    scene = _one_emitter(kind)
+    mesh = scene.meshes[0]
+    chart, uv = np.zeros(1, np.int32), mesh.position[:, :2]
+    layout = InstanceLayout(0, 0, np.arange(3, dtype=np.int32), uv, mesh.triangle, chart, False, 1.0)
     geometry = world_geometry(scene, Atlas(16, 1, (layout,), 1, 2))
     shading = resolve_materials(scene, geometry)
     emitters = build_emitters(geometry, shading)
     rays = build_ray_tree(geometry, shading, threads=1)
-    table = TriangleLookup(np.zeros((1, 16), np.float32), 16, 256)
+    lookup = TriangleLookup(np.zeros((1, 16), np.float32), 16, 256)
 
+    # Points a metre in front of the emitter, facing it.
     origin, normal = np.zeros((_TEXELS, 16, 3), np.float32), np.zeros((_TEXELS, 16, 3), np.float32)
     origin[..., 2], normal[..., 2] = 1.0, -1.0
-    buffers, net, shared = new_packet_buffers(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
-    lamps, exact = tile_emitters(emitters, origin), np.zeros(_TEXELS, np.uint8)
+    buffers, points, shared = new_packet_buffers(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
+    seen, analytic = tile_emitters(emitters, origin), np.zeros(_TEXELS, np.uint8)
     needed = needed_shading(emitters, shading)
-    # In the order in which a bake needs them. As long again takes what it compiles itself: everything before
-    # direct light, the rays of gaps and form factors, and the matrix.
-    weigh, two = np.array([16.0, 4.0]), np.array([1.0, 16.0])
+
+    # Compile in the order in which a bake calls: choice of emitters, shadow rays, gather. In about
+    # the same time the bake compiles everything before direct light, the rays of gaps and form factors, and
+    # the matrix.
     widest_view(emitters, origin)
     counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
     bounds = np.array([0, _TEXELS])
     probe_clusters(origin, normal, emitters.row, emitters.first, buffers, bounds, every, 16, *counts)
+    hemisphere, limits = np.array([16.0, 4.0]), np.array([1.0, 16.0])
     sums, squares = np.zeros((_TEXELS, 6), np.float32), np.zeros(_TEXELS, np.float32)
-    light_samples(origin, normal, lamps, needed, buffers, 0, net, shared, weigh, exact, sums, squares)
+    light_samples(
+        origin, normal, seen, needed, buffers, 0, points, shared, hemisphere, analytic, sums, squares
+    )  # fmt: skip
     dark, black = nothing_seen(), np.zeros(3, np.float32)
     out = np.zeros((_TEXELS, N_COLUMNS), np.float32)
-    gather(origin, normal, table, dark, lamps, needed, buffers, 0, net, shared, black, two, exact, out)
+    gather(
+        origin, normal, lookup, dark, seen, needed, buffers, 0, points, shared, black, limits, analytic, out
+    )  # fmt: skip
     rays.close()
 
 
+def _one_emitter(kind: str) -> Scene:
+    """Return a scene of one emissive triangle; see `cast_rays`."""
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    face, zero = np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32)
+    up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
+    mesh = Mesh("emitter", corner, up, face, zero, zero, np.zeros(3, np.int32), np.arange(3, dtype=np.int32))
+    material = Material(emission=(1.0, 1.0, 1.0))
+    if kind:
+        mode = "BLEND" if kind == "glass" else "MASK"
+        material = replace(material, base_colour=(0.5, 1.0, 1.0, 0.4), alpha_mode=mode)
+    return Scene("emitter", None, (mesh,), (material,), (Instance(0, "emitter", 0, np.eye(4)),))
+
+
 def finish_pages() -> None:
-    """Finish a page of two charts, one of them with a buried texel."""
+    """Finish a page of two charts, one of them with an invalid texel."""
     from baker.finish.finish import PageLayer, PagePlan, finish_page
     from baker.finish.oidn import LightmapDenoiser
 
@@ -173,7 +232,7 @@ if __name__ == "__main__":
     from baker.trace.numba_start import skip_blas
 
     skip_blas()
-    # Compiling makes millions of small objects and hardly a cycle of them: looking for some takes 5 %.
+    # Compiling allocates millions of small objects and hardly a cycle: collecting would take 5 % of the time.
     gc.disable()
     cast_rays(*sys.argv[1:])
     finish_pages()

@@ -9,6 +9,7 @@ install without a cache folder. Ours are compiled in memory then, anew in every 
 from __future__ import annotations
 
 import contextlib
+import glob
 import importlib.util
 import os
 import time
@@ -58,6 +59,32 @@ def drop_stale(folder: Path, made_of: list[Path]) -> None:
         with contextlib.suppress(OSError):
             if index.stat().st_mtime < newest:
                 index.unlink()
+
+
+def is_stored(kernel: Any) -> bool | None:
+    """Return whether machine code of a kernel is on disk.
+
+    Parameters
+    ----------
+    kernel : numba dispatcher
+        A function that `trace.jit.kernel` made.
+
+    Returns
+    -------
+    bool or None
+        None if this install has no folder in which compiled kernels can be stored.
+
+    Notes
+    -----
+    Numba names the files after the module, the function, its first line and the Python version, and has no
+    public name for them; they are read from the function's own cache, so a renamed kernel has renamed files.
+    An index without machine code is not enough: `drop_stale` removes only indices.
+    """
+    folder = kernel._cache.cache_path
+    if folder is None:
+        return None
+    base = glob.escape(kernel._cache._impl.filename_base)
+    return all(any(Path(folder).glob(base + end)) for end in (".nbi", ".*.nbc"))
 
 
 def allow_no_cache(folder: Path) -> None:
