@@ -1,7 +1,7 @@
-"""Direct light of every texel: lights without area, then emissive triangles.
+"""Direct light of every texel: emissive triangles, then lights without area.
 
-Two estimates come out. The first leaves to the final gather what its rays find at emitters (MIS);
-the second is complete and lights the surfaces that later bounces start from.
+There are two estimates. `weighted` leaves out what the rays of the final gather find at emitters (MIS), which
+adds it. `complete` stands alone: the light that surfaces reflect in later bounces.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.shading import Shading
 from baker.kernels.surface import N_POINTS
 from baker.kernels.triangle_lookup import TriangleLookup
-from baker.radiosity.emitter_choice import Choice, EmitterSampling, LampChooser
+from baker.radiosity.emitter_choice import Choice, EmitterChooser, EmitterSampling
 from baker.radiosity.kernels.area_light import light_samples
 from baker.radiosity.kernels.gather import DIRECT, N_COLUMNS, gather
 from baker.radiosity.kernels.shadow import add_visible
@@ -28,12 +28,12 @@ from baker.radiosity.kernels.side_table import nothing_seen
 from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
-# Texels that are lit together; `gather` uses the same tiles, so that both see the same light chances.
+# Texel entries of a tile. The final gather has the same tiles, so that both choose the same emitters.
 TILE = 512
 # Columns of the light of a tile: RGB of both estimates.
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
-# Hemisphere rays that complete the second estimate close to emitters: where a cluster's radius is more than
-# this share of its distance. Further away shadow rays alone are as good.
+# Hemisphere rays that `complete` has besides shadow rays close to emitters: where radius / distance of a
+# visible cluster is above CLOSE.
 N_HEMISPHERE = 4
 CLOSE = 0.5
 
@@ -48,7 +48,7 @@ class DirectLight:
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
     analytic : (n,) uint8, 1 where `weighted` is complete, too
-    rays : int, shadow rays cast at lamps; of other rays those that may be needed
+    rays : int, shadow rays to emitters that were cast, and all others that may be needed
     """
 
     weighted: NDArray[np.float32]
@@ -132,7 +132,7 @@ class _EmitterLight:
     Attributes
     ----------
     lookup : TriangleLookup
-    chooser : LampChooser
+    chooser : EmitterChooser
     shading : Shading or None, from `emitters.needed_shading`
     sobol_points : (n_light, 2) uint32, hidden_points : (n_hidden, 2) uint32, of shadow rays
     near_points : (N_HEMISPHERE, 2) uint32, of hemisphere rays close to emitters
@@ -140,7 +140,7 @@ class _EmitterLight:
     """
 
     lookup: TriangleLookup
-    chooser: LampChooser
+    chooser: EmitterChooser
     shading: Shading | None
     sobol_points: NDArray[np.uint32]
     hidden_points: NDArray[np.uint32]
@@ -196,13 +196,13 @@ class _EmitterLight:
         n_cast = 0
         # Hemisphere rays that find the same emitters: of the final gather, and of `_gather`.
         hemisphere = np.array([self.n_gather, N_HEMISPHERE * (choice.view > CLOSE)], np.float64)
-        for lamps, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
-            if lamps is None or not lamps.chance.any():
+        for emitters, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
+            if emitters is None or not emitters.chance.any():
                 continue
             light, square = np.zeros_like(out.light), np.zeros(len(out.light), np.float32)
-            analytic = out.analytic if lamps is choice.seen else np.zeros(len(out.light), np.uint8)
+            analytic = out.analytic if emitters is choice.seen else np.zeros(len(out.light), np.uint8)
             n_cast += light_samples(
-                *points, lamps, self.shading, buffers, begin, sobol_points,
+                *points, emitters, self.shading, buffers, begin, sobol_points,
                 shared_bits_mask(len(sobol_points)), hemisphere, analytic, light, square,
             )  # fmt: skip
             out.light[:] += light

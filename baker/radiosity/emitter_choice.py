@@ -1,11 +1,11 @@
-"""Which emitters the texels of a tile sample, and how often.
+"""Chooses which emitters the texels of a tile sample, and with how many samples.
 
-How bright an emitter would be if nothing stood in between (`emitters.cluster_chances`) says nothing of walls:
-one in another room, ten thousand times as bright, would take all samples. So a few shadow rays find the
-clusters that the tile can see. Those alone are sampled as if there were no others; what no ray reached has a
-few samples of its own, and rays of the gather that find it count, so that nothing is lost where it is seen
-through a keyhole. Where a bright emitter is seen from some texels of a tile only, every sixteen neighbours
-choose for themselves.
+`emitters.cluster_chances` estimates the unoccluded irradiance of each cluster of emitters. It ignores
+occlusion: an emitter behind a wall that is ten thousand times as bright would take nearly all samples. So a
+few shadow rays from the tile find the clusters that it can see, and only these share the samples. Clusters
+that no ray reached are sampled apart, with a small number of samples, and gather rays that find them count as
+well (MIS), so that no light is lost where they are visible after all, as through a keyhole. Where a
+bright cluster is visible from part of a tile only, each block of sixteen neighbours chooses for itself.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -35,20 +35,20 @@ from baker.kernels.shading import Shading
 from baker.radiosity.kernels.emitter_probe import probe_clusters
 from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
-# Rays to each cluster from a tile, and what all of them may cost, as a share of a tile's shadow rays.
+# Probe rays to each cluster from a tile, and their total as a share of the tile's shadow rays.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
 _COST = 0.06
-# Up to so many clusters all hidden ones are set apart; of more only the brightest, until the others come to
-# this share of what is seen.
+# With at most _FEW clusters, all hidden ones are sampled apart. With more, the dimmest hidden ones stay with
+# the visible ones, up to this share of the weight of the visible ones.
 _FEW = 32
 _HARMLESS = 0.25
-# A cluster that only some texels see is a reason to choose by blocks of neighbours if it is so many times as
-# bright as another one that is seen. Blocks end where a chart ends or the surface turns so much (cosine).
+# Blocks choose for themselves if a cluster that only part of the tile sees is this many times as bright as
+# another visible one. Blocks end where a chart ends or the cosine of neighbouring normals is below _TURN.
 _OUTSHINES = 4.0
 _TURN = 0.5
-# Emitters that touch and differ by less than this are one lamp: nothing is to be chosen.
+# Touching emitters whose power per area differs by at most this factor are one light: no choice is needed.
 _ALIKE = 4.0
-# Samples of what no ray reached, as a share of the others.
+# Samples of hidden clusters, as a share of those of visible ones.
 _HIDDEN_SHARE = 1.0 / 8.0
 
 
@@ -77,18 +77,18 @@ class EmitterSampling:
         """Return the shading that kernels need; see `emitters.needed_shading`."""
         return needed_shading(self.emitters, self.shading)
 
-    def chooser(self, chart: NDArray[np.int32] | None) -> LampChooser:
-        """Return what chooses emitters for tiles; `chart` (n,) int32 is that of each texel entry."""
-        return LampChooser.build(self.emitters, self.n_light, chart)
+    def chooser(self, chart: NDArray[np.int32] | None) -> EmitterChooser:
+        """Return the chooser of emitters for tiles; `chart` (n,) int32 is that of each texel entry."""
+        return EmitterChooser.build(self.emitters, self.n_light, chart)
 
 
 class Choice(NamedTuple):
-    """What neighbouring texels sample.
+    """Emitters that some neighbouring texels sample.
 
     part : slice of the tile's texels
-    seen : clusters that get the samples; others are missing
-    hidden : clusters that no ray of the tile reached, None if there are none
-    found : all clusters with the density at which both sample them, for rays that find them
+    seen : visible clusters, which share the samples; the others are left out
+    hidden : clusters that no probe ray of the tile reached, None if there are none
+    found : all clusters with the density of both strategies, for gather rays that find them
     view : largest radius / distance of a cluster of `seen`, see `emitters.widest_view`
     """
 
@@ -100,15 +100,19 @@ class Choice(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LampChooser:
-    """Chooses emitters for tiles; the same for all stages that know the same points.
+class EmitterChooser:
+    """Chooses emitters for tiles; stages with the same points get the same choices.
 
     Attributes
     ----------
     emitters : Emitters
-    n_light, n_hidden : int, samples of a texel, and those of what its tile does not see
-    single : bool, whether all emitters are one lamp
-    chart : (n,) int32 or None, of each texel entry
+        All emitters of the scene.
+    n_light, n_hidden : int
+        Samples of a texel, and those of clusters hidden from its tile.
+    single : bool
+        Whether all emitters count as one light.
+    chart : (n,) int32 or None
+        Chart of each texel entry.
     """
 
     emitters: Emitters
@@ -118,10 +122,12 @@ class LampChooser:
     chart: NDArray[np.int32] | None
 
     @classmethod
-    def build(cls, emitters: Emitters, n_light: int, chart: NDArray[np.int32] | None = None) -> LampChooser:
+    def build(
+        cls, emitters: Emitters, n_light: int, chart: NDArray[np.int32] | None = None
+    ) -> EmitterChooser:
         """Return the chooser for `n_light` samples a texel; `chart` (n,) int32 of each texel entry."""
         n_hidden = max(int(n_light * _HIDDEN_SHARE), 1)
-        return cls(emitters, n_light, n_hidden, _one_lamp(emitters), chart)
+        return cls(emitters, n_light, n_hidden, _one_light(emitters), chart)
 
     def choose(
         self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], buffers: PacketBuffers
@@ -130,17 +136,17 @@ class LampChooser:
 
         Parameters
         ----------
-        begin : int, number of the tile's first texel entry
+        begin : int, the tile's first texel entry
         origin, normal : (m, 16, 3) float32, points of the tile's texels, world
         """
         whole = slice(0, len(origin))
-        lamps = tile_emitters(self.emitters, origin)
-        if self.single or np.count_nonzero(lamps.chance) < 2:
-            return [Choice(whole, lamps, None, lamps, widest_view(self.emitters, origin))]
-        bounds, hidden = self._find_hidden(lamps, begin, origin, normal, buffers)
+        all_emitters = tile_emitters(self.emitters, origin)
+        if self.single or np.count_nonzero(all_emitters.chance) < 2:
+            return [Choice(whole, all_emitters, None, all_emitters, widest_view(self.emitters, origin))]
+        bounds, hidden = self._find_hidden(all_emitters, begin, origin, normal, buffers)
         parts = [slice(*span) for span in pairwise(bounds.tolist())]
         if len(parts) == 1:
-            return [self._choice(whole, origin, lamps, hidden[0])]
+            return [self._choice(whole, origin, all_emitters, hidden[0])]
         return [
             self._choice(part, origin[part], tile_emitters(self.emitters, origin[part]), own)
             for part, own in zip(parts, hidden, strict=True)
@@ -148,14 +154,14 @@ class LampChooser:
 
     def _find_hidden(
         self,
-        lamps: TileEmitters,
+        all_emitters: TileEmitters,
         begin: int,
         origin: NDArray[np.float32],
         normal: NDArray[np.float32],
         buffers: PacketBuffers,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return where parts of a tile begin, (P + 1,), and the clusters (P, C) hidden from each."""
-        weight = self._weights(lamps, origin)
+        """Return the bounds of the parts of a tile, (P + 1,), and the clusters (P, C) hidden from each."""
+        weight = self._weights(all_emitters, origin)
         blocks, broken = self._blocks(begin, origin, normal)
         bounds = np.array([0, len(origin)])
         chosen = weight > 0
@@ -176,9 +182,9 @@ class LampChooser:
     def _blocks(
         self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32]
     ) -> tuple[NDArray[np.int64], bool]:
-        """Return where blocks of up to sixteen neighbours of one surface begin, (B + 1,).
+        """Return the bounds (B + 1,) of blocks of up to sixteen neighbours on one surface.
 
-        Also whether the texels belong to several surfaces.
+        Also return whether the texels lie on several surfaces.
         """
         facing = normal[:, 0]
         apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
@@ -197,7 +203,7 @@ class LampChooser:
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the counts of `probe_clusters` (B, C) for some clusters (C,) bool."""
+        """Return `asked` and `seen` of `probe_clusters` (B, C) for the chosen clusters (C,) bool."""
         shape = (len(bounds) - 1, len(chosen))
         share = _COST * self.n_light * len(origin) / (shape[0] * np.count_nonzero(chosen))
         n_rays = int(np.clip(share, _FEWEST_RAYS, _MOST_RAYS if shape[0] == 1 else PACKET_WIDTH))
@@ -206,17 +212,17 @@ class LampChooser:
         probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen)
         return asked, seen
 
-    def _weights(self, lamps: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) roughly how bright clusters are at points (m, w, 3); 0 if they are turned away."""
+    def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return (C,) power / distance^2 of clusters at points (m, w, 3); 0 if they face away."""
         points = origin.reshape(-1, 3)
         low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
         square = ((self.emitters.centre - 0.5 * (low + high)) ** 2).sum(axis=1)
-        reach = self.emitters.radius + 0.5 * np.linalg.norm(high - low)
-        weight: NDArray[np.float64] = self.emitters.power / np.maximum(square, reach**2 + 1e-12)
-        return np.where(lamps.chance > 0, weight, 0.0)
+        touching = self.emitters.radius + 0.5 * np.linalg.norm(high - low)
+        weight: NDArray[np.float64] = self.emitters.power / np.maximum(square, touching**2 + 1e-12)
+        return np.where(all_emitters.chance > 0, weight, 0.0)
 
     def _hidden(self, weight: NDArray[np.float64], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return which clusters (C,) are set apart: none if no cluster is seen."""
+        """Return which clusters (C,) are sampled apart; none if no cluster is visible."""
         hidden: NDArray[np.bool_] = (seen == 0) & (weight > 0)
         if not (seen > 0).any():
             return np.zeros_like(hidden)
@@ -227,25 +233,27 @@ class LampChooser:
         return hidden
 
     def _choice(
-        self, part: slice, origin: NDArray[np.float32], lamps: TileEmitters, hidden: NDArray[np.bool_]
+        self, part: slice, origin: NDArray[np.float32], all_emitters: TileEmitters, hidden: NDArray[np.bool_]
     ) -> Choice:
-        """Return the choice for points (m, w, 3) that do not see the clusters `hidden` (C,)."""
-        hidden = hidden & (lamps.chance > 0)
-        if not hidden.any() or not (lamps.chance[~hidden] > 0).any():
-            return Choice(part, lamps, None, lamps, widest_view(self.emitters, origin))
+        """Return the choice for points (m, w, 3) from which the clusters `hidden` (C,) are not visible."""
+        hidden = hidden & (all_emitters.chance > 0)
+        if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():
+            return Choice(part, all_emitters, None, all_emitters, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # No closed form for these: a ray that gets there after all is never taken for many.
+        # Never evaluate hidden emitters analytically: a few unblocked shadow rays would stand for all others.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
-        chance = np.zeros_like(lamps.chance)
+        chance = np.zeros_like(all_emitters.chance)
         chance[~hidden] = seen.chance / seen.cumulative[-1]
         chance[hidden] = apart.chance / apart.cumulative[-1] * (self.n_hidden / self.n_light)
-        found = lamps._replace(chance=chance, cumulative=np.ones_like(chance), apart=hidden.astype(np.uint8))
+        found = all_emitters._replace(
+            chance=chance, cumulative=np.ones_like(chance), apart=hidden.astype(np.uint8)
+        )
         return Choice(part, seen, apart, found, widest_view(visible, origin))
 
 
 def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
-    """Return the emitters of some clusters (C,) alone."""
+    """Return the emitters of the clusters that `which` (C,) selects."""
     length = np.diff(emitters.first)
     own = np.repeat(which, length)
     row = np.ascontiguousarray(emitters.row[own])
@@ -263,8 +271,8 @@ def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
     )
 
 
-def _one_lamp(emitters: Emitters) -> bool:
-    """Tell whether all clusters hang together and shine alike, so that walls can hardly come in between."""
+def _one_light(emitters: Emitters) -> bool:
+    """Return whether all clusters touch and have similar radiosity, so that walls hardly separate them."""
     n = len(emitters.power)
     if n < 2:
         return True

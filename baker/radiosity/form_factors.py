@@ -1,4 +1,4 @@
-"""The form-factor matrix: cast, merged with its reciprocal, checked.
+"""The form-factor matrix: estimated with rays, merged with its reciprocal, balanced.
 
     F_ij = share of what leaves i that arrives at j    A_i F_ij = A_j F_ji    sum_j F_ij + sky_i + lost_i = 1
 
@@ -31,7 +31,7 @@ from baker.radiosity.trace_job import TraceJob
 
 _TILE = 256
 _BALANCE_STEPS = 30
-# How many rays' worth of its own measurement a row sum may give way to what other patches saw.
+# Rays of a patch by which balancing may change the row sum that they measured.
 _SLACK = 4.0
 
 
@@ -45,11 +45,11 @@ class FormFactorMatrix:
         CSR rows, columns rising.
     sky : (P,) float32
         Share of each patch's rays that leave the scene.
-    tint, sky_tint : (nnz, 3) and (P, 3) float32, or None
-        What coloured surfaces multiply light by between two patches, and between a patch and the sky: means
-        over rays, symmetric as A_i F_ij is. None if nothing colours light.
+    transmittance, sky_transmittance : (nnz, 3) and (P, 3) float32, or None
+        Mean transmittance of surfaces between two patches, and between a patch and the sky, over rays, for
+        R, G and B; symmetric like A_i F_ij. None if no surface colours light.
     lost : (P,) float32
-        Share that ends on black backs of one-sided surfaces or on no texel.
+        Share of rays that end on black backs of one-sided surfaces or on surfaces without texels.
     row_error : float
         Largest |1 - row sum - sky - lost| before the rows were balanced.
     reciprocity_error : float
@@ -65,14 +65,14 @@ class FormFactorMatrix:
     row_error: float
     reciprocity_error: float
     rays: int
-    tint: NDArray[np.float32] | None = None
-    sky_tint: NDArray[np.float32] | None = None
+    transmittance: NDArray[np.float32] | None = None
+    sky_transmittance: NDArray[np.float32] | None = None
 
     @property
     def open(self) -> NDArray[np.float32]:
-        """Return (P, 1 or 3) float32: the share of each patch's light that gets out of the scene."""
+        """Return (P, 1 or 3) float32: the share of each patch's light that leaves the scene."""
         share = self.sky[:, None]
-        return share if self.sky_tint is None else share * self.sky_tint
+        return share if self.sky_transmittance is None else share * self.sky_transmittance
 
     def row_sums(self) -> NDArray[np.float64]:
         """Return sum_j F_ij (P,) float64."""
@@ -116,14 +116,18 @@ def build_form_factors(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_r
     if not job.tracer.coloured or not ordered:
         return _balanced(merged, patches.area, sky, lost, n * n_rays)
     passed, sky_passed = (np.concatenate([row[k] for row in ordered]) for k in (4, 5))
-    # The mean over the rays of both estimates; balancing changes how much light arrives, not its colour.
-    tint = np.ones((len(merged.value), 3), np.float32)
+    # Mean over the rays of both estimates. Balancing changes form factors, not transmittance.
+    transmittance = np.ones((len(merged.value), 3), np.float32)
     for c in range(3):
         part = (passed[:, c] / np.float32(n_rays)).astype(np.float32)
-        tint[:, c] = _merged(first, column, part, patches.area).value / merged.value
-    sky_tint = np.where(tally[:, :1] > 0, sky_passed / np.maximum(tally[:, :1], 1), np.float32(1.0))
+        transmittance[:, c] = _merged(first, column, part, patches.area).value / merged.value
+    sky_transmittance = np.where(tally[:, :1] > 0, sky_passed / np.maximum(tally[:, :1], 1), np.float32(1.0))
     matrix = _balanced(merged, patches.area, sky, lost, n * n_rays)
-    return replace(matrix, tint=np.minimum(tint, 1.0), sky_tint=sky_tint.astype(np.float32))
+    return replace(
+        matrix,
+        transmittance=np.minimum(transmittance, 1.0),
+        sky_transmittance=sky_transmittance.astype(np.float32),
+    )
 
 
 def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int) -> dict[int, Part]:
@@ -144,8 +148,9 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
     -------
     dict of int to tuple
         For the tile that begins at each patch: column, count (k,) int32 of all its rows; length (m,) int32 of
-        each; tally (m, 2) int32 of the rays that left the scene and those that were lost; if anything colours
-        light, also (k, 3) and (m, 3) float32: its colours summed over an entry's rays, and those that left.
+        each row; tally (m, 2) int32, rays that left the scene and rays that were lost. If a surface colours
+        light, also (k, 3) and (m, 3) float32: transmittance summed over the rays of each entry, and over
+        those that left.
     """
     n = patches.n
     sobol_points, shared = sobol_reversed(n_rays, job.seed, 5), shared_bits_mask(n_rays)
@@ -204,11 +209,14 @@ def _starts_of(patches: PatchSet, n_rays: int) -> NDArray[np.int64]:
 def count_targets(
     target: NDArray[np.int32],
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Return which patches (k,) the rays of each row (m, R) hit, rising, how often, and how many (m,)."""
+    """Return the patches (k,) that the rays of each row (m, R) hit, in rising order, with counts (k,).
+
+    Also return the number of patches of each row (m,). Sorts `target` in place.
+    """
     target.sort(axis=1)
     new = np.ones(target.shape, bool)
     new[:, 1:] = target[:, 1:] != target[:, :-1]
-    # Rays that hit no patch stand first in their row.
+    # Rays that hit no patch have negative targets and come first.
     start = np.flatnonzero(new)
     count = np.diff(start, append=target.size)
     column = target.reshape(-1)[start]
@@ -220,7 +228,7 @@ def count_targets(
 def sum_colours(
     target: NDArray[np.int32], colour: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Sum the colours of rays (m, R, 3): for all that `count_targets` finds (k, 3), for the sky (m, 3)."""
+    """Sum transmittances of rays (m, R, 3): for each pair of `count_targets` (k, 3), for the sky (m, 3)."""
     order = np.argsort(target, axis=1, kind="stable")
     target = np.take_along_axis(target, order, axis=1)
     new = np.ones(target.shape, bool)
@@ -271,11 +279,11 @@ def _balanced(
     lost: NDArray[np.float32],
     rays: int,
 ) -> FormFactorMatrix:
-    """Restore the row sums that the rays measured; changes the merged values."""
+    """Balance the merged values, in place, to the row sums that the rays measured."""
     first, column, value, exchanged, unlike = merged
     reciprocity = unlike / max(exchanged, 1e-300)
     goal = 1.0 - sky.astype(np.float64) - lost
-    # The goal's own noise: nothing in a closed room, a few rays where most leave the scene.
+    # Noise of the goal: 0 in a closed room, a few rays where most leave the scene.
     slack = _SLACK * (1.0 - goal) * len(area) / max(rays, 1)
     row_error = sinkhorn_balance(first, column, value, goal, slack, np.ones(len(area)), _BALANCE_STEPS)
     return FormFactorMatrix(first, column, value, sky, lost, float(row_error), reciprocity, rays)

@@ -1,8 +1,8 @@
 """Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
 
-Texels in narrow gaps form patches apart from those outside, and where a gap is narrower than a texel each is
-a patch of its own if there are not too many: light gets no further into such a gap than a few times its
-width, but would cross all of a patch at once.
+Texels in narrow gaps and texels outside share no patch. Where a gap is about a texel wide, each texel is a
+patch if there are not too many: light enters such a gap by a few times its width only, but would cross a
+larger patch at once.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
 far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from baker.core.texels import TexelBuffer
 from baker.radiosity.kernels.regions import join_linked
 
-# The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
+# Largest number of patches outside narrow gaps, and again inside; larger pages get larger blocks.
 MAX_PATCHES = 32768
-# Depth in gaps (`narrow_gaps`) from which blocks are as small as can be.
+# Gap level (`narrow_gaps`) from which blocks are as small as possible.
 NARROW = 2
 
 
@@ -31,11 +31,17 @@ class PatchSet:
 
     Attributes
     ----------
-    patch : (n,) int32, patch of each entry
-    first : (P + 1,) int64, `member` : (n,) int32, entries patch by patch, in rising order
-    cumulative : (n,) float32, running share of the patch's area along `member`
+    patch : (n,) int32
+        Patch of each entry.
+    first : (P + 1,) int64
+        Patch p has the entries `member[first[p] : first[p + 1]]`.
+    member : (n,) int32
+        Entries of all patches, in rising order within a patch.
+    cumulative : (n,) float32
+        Running share of the patch's area along `member`.
     area : (P,) float64, m2
-    block : int, side of a block outside narrow gaps in texels
+    block : int
+        Side of a block outside narrow gaps, texels.
     """
 
     patch: NDArray[np.int32]
@@ -47,7 +53,7 @@ class PatchSet:
 
     @property
     def n(self) -> int:
-        """Count the patches."""
+        """Return the number of patches."""
         return len(self.area)
 
     def mean(self, value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -62,35 +68,43 @@ class PatchSet:
 
 def build_patches(
     texels: TexelBuffer,
-    depth: NDArray[np.uint8] | None = None,
+    level: NDArray[np.uint8] | None = None,
     *,
     max_patches: int = MAX_PATCHES,
     link: NDArray[np.int32] | None = None,
 ) -> PatchSet:
-    """Group texels into blocks: the smallest power of two that keeps to `max_patches`.
+    """Group texels into blocks: the smallest power of two with at most `max_patches` of them.
 
-    Charts smaller than a block still need a patch each, so a page of very many charts may have more.
+    A chart smaller than a block still is a patch, so a page of very many charts may have more.
 
     Parameters
     ----------
     texels : TexelBuffer
-    depth : (n,) uint8, optional
-        0 to 2; entries of different depth share no patch (`narrow_gaps`). Those of depth 2 form smaller
-        blocks that keep to `max_patches` for themselves.
+        The n entries.
+    level : (n,) uint8, optional
+        Gap level 0 to 2 (`narrow_gaps`); entries of different level share no patch. Those of level 2 form
+        smaller blocks, again at most `max_patches`.
+    max_patches : int
+        Largest number of patches outside narrow gaps.
     link : (m, 2) int32, optional
-        Neighbouring entries that see each other (`sides.Sides.link`): in the charts that these lie in,
-        entries of a block that are not linked within it form patches of their own.
+        Neighbouring entries that see each other (`sides.Sides.link`): in the charts of these entries, parts
+        of a block that are not linked within it are separate patches.
+
+    Returns
+    -------
+    PatchSet
+        In Morton order of their first entries.
     """
-    depth = np.zeros(len(texels.pixel), np.uint8) if depth is None else depth
-    block = _smallest_block(texels, depth, np.arange(len(depth)), max_patches)
-    narrow = np.flatnonzero(depth >= NARROW)
-    side = np.full(len(depth), block, np.int64)
-    side[narrow] = min(_smallest_block(texels, depth, narrow, max_patches), block)
-    number, n_patches = _blocks(texels, depth, side, link)
+    level = np.zeros(len(texels.pixel), np.uint8) if level is None else level
+    block = _smallest_block(texels, level, np.arange(len(level)), max_patches)
+    narrow = np.flatnonzero(level >= NARROW)
+    side = np.full(len(level), block, np.int64)
+    side[narrow] = min(_smallest_block(texels, level, narrow, max_patches), block)
+    number, n_patches = _blocks(texels, level, side, link)
     order = np.argsort(number, kind="stable").astype(np.int32)
     first = np.zeros(n_patches + 1, np.int64)
     np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
-    # A texel without area (a sliver) still needs a share, however small, so that its patch has one.
+    # A texel without area (a sliver) gets a small share, so that its patch has an area.
     weight = np.maximum(texels.area, 1e-12).astype(np.float64)
     area = np.bincount(number, weight, n_patches).astype(np.float64)
     running = np.cumsum(weight[order])
@@ -101,7 +115,7 @@ def build_patches(
 
 
 def _smallest_block(
-    texels: TexelBuffer, depth: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
+    texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
     """Return the side of the smallest blocks that cut the chosen entries into at most `max_patches`."""
     # Entries of one side of a page lie in pixels of their own: blocks of one texel are as many as they.
@@ -109,15 +123,15 @@ def _smallest_block(
         return 1
     block = 2
     while block < 256:
-        key = _keys(texels, depth, np.full(len(depth), block, np.int64))
+        key = _keys(texels, level, np.full(len(level), block, np.int64))
         if len(np.unique(key[chosen])) <= max_patches:
             break
         block *= 2
     return block
 
 
-def _keys(texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n,) int64 that are equal for entries of one block; `side` is that of each entry's blocks."""
+def _keys(texels: TexelBuffer, level: NDArray[np.uint8], side: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return (n,) int64, equal for entries of one block; `side` (n,) is the side of blocks at each entry."""
     size = texels.resolution
     page, rest = np.divmod(texels.pixel, size * size)
     row, column = np.divmod(rest, size)
@@ -126,17 +140,17 @@ def _keys(texels: TexelBuffer, depth: NDArray[np.uint8], side: NDArray[np.int64]
     direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
     key = (page * size + row // side) * size + column // side
     key = (key * (int(texels.chart.max(initial=0)) + 1) + texels.chart) * 162
-    return np.asarray(key + (direction * 2 + texels.back) * 3 + depth, np.int64)
+    return np.asarray(key + (direction * 2 + texels.back) * 3 + level, np.int64)
 
 
 def _blocks(
     texels: TexelBuffer,
-    depth: NDArray[np.uint8],
+    level: NDArray[np.uint8],
     side: NDArray[np.int64],
     link: NDArray[np.int32] | None,
 ) -> tuple[NDArray[np.int32], int]:
-    """Number the blocks, or their linked parts, in Morton order of their first texel."""
-    _, first, inverse = np.unique(_keys(texels, depth, side), return_index=True, return_inverse=True)
+    """Return the number (n,) of the block, or linked part of one, of each entry, and their count."""
+    _, first, inverse = np.unique(_keys(texels, level, side), return_index=True, return_inverse=True)
     block = inverse.reshape(-1)
     if link is not None and len(link):
         within = link[block[link[:, 0]] == block[link[:, 1]]]

@@ -6,11 +6,11 @@ With M = s + rho E this is (A / rho - A F) M = A s / rho, symmetric by reciproci
 for rho < 1: conjugate gradients, preconditioned by A / rho, need a few dozen products even where
 simple sweeps need thousands (a closed room of albedo 0.99). N bounces are N products instead.
 
-The norms of conjugate gradients are sums over all patches: a dim room beside a sunlit street is no part of
-them, and the polynomials they choose are those that suit the street. So the residual of every patch and
-colour is held against that patch's own light, and the solve is repeated for the residual of the patches
-that are not done. Rows of the residual have only the light of their own patch in them, so its rounding
-error is relative to that light, too.
+The norms of conjugate gradients are sums over all patches: a dim room beside a sunlit street contributes
+nothing to them, and the iteration converges for the street only. So the residual of every patch and colour is
+compared with the light of that patch, and the solve is repeated for the residual of the patches that have not
+converged. A row of the residual contains the light of its own patch only, so its rounding error is relative
+to that light.
 
 Based on: Goral et al., Modeling the interaction of light between diffuse surfaces, 1984; Neumann,
 New efficient algorithms with positive definite radiosity matrix, 1994; Saad, Iterative methods for
@@ -38,14 +38,14 @@ from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 # Largest error of a patch's light, as a share of that light, at which the solve stops.
 TOLERANCE = 3e-5
 MAX_ITERATIONS = 1000
-# Entries of the matrix that are worth a thread of their own.
+# Entries of the matrix for each thread, at least.
 _PART = 250_000
-# Light below this share of a colour's brightest patch is not resolved any further.
+# Exitance below this share of the brightest patch, by colour, need not converge.
 _DARK = 1e-15
-# One run of conjugate gradients reduces a residual by no more than this: their vectors lose their
-# orthogonality, and the residual that they carry along departs from the true one.
+# Restart conjugate gradients after this reduction of the residual: search directions lose orthogonality, and
+# the updated residual departs from the true one.
 _REDUCTION = 1e-12
-# A closed room of albedo 1 has no solution: light would never end.
+# A closed room of albedo 1 has no solution.
 MAX_ALBEDO = 0.999
 # Black patches get this albedo in the symmetric form, which divides by it.
 MIN_ALBEDO = 1e-4
@@ -57,11 +57,15 @@ class Solution:
 
     Attributes
     ----------
-    irradiance : (P, 3) float64, lx, indirect: at least once reflected
+    irradiance : (P, 3) float64, lx
+        Light that was reflected at least once.
     iterations : int
-    residual : float, |s + rho F M - M| / |s|, the worst of the three colours
-    patch_error : float, the largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour; an estimate of
-        the largest relative error of a patch's light (in a closed room of even light and albedo, its bound)
+        Products with the matrix inside conjugate gradients, or bounces.
+    residual : float
+        |s + rho F M - M| / |s|, the largest of the three colours.
+    patch_error : float
+        The largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour: an estimate of the largest
+        relative error of a patch's light (a bound in a closed room of uniform light and albedo).
     """
 
     irradiance: NDArray[np.float64]
@@ -70,7 +74,7 @@ class Solution:
     patch_error: float
 
     def figures(self) -> dict[str, float]:
-        """Return what the manifest says of the solve."""
+        """Return the figures for the manifest."""
         return {
             "iterations": self.iterations,
             "residual": self.residual,
@@ -92,16 +96,26 @@ def solve_radiosity(
 
     Parameters
     ----------
+    matrix : FormFactorMatrix
+        F of P patches.
     source : (P, 3) float64, lx
-        Light that patches reflect of what reached them directly.
+        Direct light that patches reflect.
     albedo : (P, 3) float64
+        0 to 1; limited to `MIN_ALBEDO` to `MAX_ALBEDO`.
     area : (P,) float64, m2
+        Areas of the patches.
     bounces : int or None
         Number of reflections; None means until converged. The final gather adds one more bounce from
         these values, so N bounces need N - 1 products here.
     progress : Progress
+        Called after each product.
     threads : int
         Work on the products; each row is one thread's, so the result does not depend on their number.
+
+    Returns
+    -------
+    Solution
+        Converged, unless `patch_error` is above `TOLERANCE`.
     """
     report(progress, Stage.SOLVE, 0.0)
     albedo = np.clip(albedo, MIN_ALBEDO, MAX_ALBEDO)
@@ -124,7 +138,7 @@ def _converge(
     area: NDArray[np.float64],
     progress: Progress,
 ) -> Solution:
-    """Solve until every patch has its light; see `solve_radiosity`."""
+    """Repeat conjugate gradients until every patch has converged; see `solve_radiosity`."""
     exitance = source.copy()
     goal = _Goal(TOLERANCE * (1.0 - albedo), _DARK * source.max(axis=0, initial=0.0))
     iterations = 0
@@ -134,7 +148,7 @@ def _converge(
         share = goal.share(rest, exitance)
         if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
             break
-        # What is done counts no more: beside a dim room, even the rounding errors of a bright one are light.
+        # Leave out converged patches: rounding errors of a bright room are large against a dim one.
         rest[share <= goal.MARGIN] = 0.0
         before = iterations
         iterations = _conjugate_gradients(product, exitance, rest, albedo, area, goal, progress, before)
@@ -148,7 +162,7 @@ def _converge(
 
 
 def solve_warnings(solution: Solution) -> list[SceneWarning]:
-    """Return a warning if the solve ended before every patch had its light."""
+    """Return a warning if the solve ended before every patch converged."""
     if solution.patch_error <= TOLERANCE:
         return []
     message = (
@@ -165,7 +179,7 @@ def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np
 
 
 class _Product:
-    """Multiplies by F, rows shared out among threads that live as long as this.
+    """Multiplies by F on a pool of threads.
 
     Parameters
     ----------
@@ -195,10 +209,10 @@ class _Product:
 
         def rows(begin: int, end: int) -> None:
             first, out = matrix.first[begin : end + 1], irradiance[begin:end]
-            if matrix.tint is None:
+            if matrix.transmittance is None:
                 multiply(first, matrix.column, matrix.value, exitance, out)
             else:
-                multiply_coloured(first, matrix.column, matrix.value, matrix.tint, exitance, out)
+                multiply_coloured(first, matrix.column, matrix.value, matrix.transmittance, exitance, out)
 
         if self._pool is None:
             rows(0, len(exitance))
@@ -209,21 +223,21 @@ class _Product:
 
 @dataclass(frozen=True)
 class _Goal:
-    """How large the residual of each patch and colour may be.
+    """Allowed residual of each patch and colour.
 
     Attributes
     ----------
     tolerance : (P, 3) float64, as a share of the patch's exitance
-    dark : (3,) float64, lx, exitance that the residual is held against at least
+    dark : (3,) float64, lx, least exitance that the residual is compared with
     """
 
-    # Share of what is allowed that a run of conjugate gradients aims at.
+    # Conjugate gradients stop at this share of the allowed residual.
     MARGIN: ClassVar[float] = 0.5
     tolerance: NDArray[np.float64]
     dark: NDArray[np.float64]
 
     def share(self, rest: NDArray[np.float64], exitance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the residual (P, 3) in units of what is allowed; 0 where there is no light."""
+        """Return the residual (P, 3) divided by the allowed one; 0 where there is no light."""
         allowed = self.tolerance * np.maximum(exitance, self.dark)
         return np.divide(np.abs(rest), allowed, out=np.zeros_like(rest), where=rest != 0.0)
 
@@ -270,26 +284,36 @@ def energy_audit(
     indirect: NDArray[np.float64],
     albedo: NDArray[np.float64],
 ) -> dict[str, float]:
-    """Return the flux (lm, summed over RGB / 3) that lights bring to surfaces, and where it ends.
+    """Return the luminous flux that lights bring to surfaces, and where it ends.
 
     Parameters
     ----------
-    direct, reflected : (P, 3), lx, direct irradiance of patches and what they reflect of it
-    indirect : (P, 3), lx
+    matrix : FormFactorMatrix
+        F of P patches.
+    area : (P,) float64, m2
+        Areas of the patches.
+    direct : (P, 3) float64, lx
+        Direct irradiance of patches.
+    reflected : (P, 3) float64, lx
+        The part of it that patches reflect.
+    indirect : (P, 3) float64, lx
+        Irradiance by light that was reflected at least once.
+    albedo : (P, 3) float64
+        0 to 1.
 
     Returns
     -------
-    dict
-        emitted: arriving at surfaces straight from lights; absorbed: by surfaces, black backs
-        and panes included; escaped: reflected out of the scene. emitted = absorbed + escaped up to the
-        solver's residual and the balance of the matrix's rows.
+    dict of str to float
+        In lm, mean of R, G and B. emitted: arrives at surfaces straight from lights; absorbed: by surfaces,
+        black backs and BLEND surfaces included; escaped: leaves the scene after a reflection. emitted =
+        absorbed + escaped, up to the residual of the solve and the balance of the matrix rows.
     """
     flux = area[:, None] / 3.0
     leaving = reflected + albedo * indirect
     escaped = float((flux * leaving * matrix.open).sum())
     lost = matrix.lost[:, None] + (matrix.sky[:, None] - matrix.open)
-    if matrix.tint is not None:
-        # Light that a coloured surface took out is in no patch's irradiance.
+    if matrix.transmittance is not None:
+        # Light that coloured surfaces absorb on the way reaches no patch.
         lost = lost + matrix.row_sums()[:, None] - apply(matrix, np.ones_like(leaving))
     backs = float((flux * leaving * lost).sum())
     absorbed = float((flux * (direct + indirect - leaving)).sum()) + backs

@@ -1,7 +1,7 @@
-"""Light that never ends: nearly white surfaces that see nearly nothing but each other.
+"""Warns of light that is hardly absorbed: nearly white surfaces that see little but each other.
 
-What is left of light after n reflections is s_n = (rho F) s_{n-1}, s_0 = 1; in a closed room of albedo rho it
-is rho^n, and all bounces together are 1 / (1 - rho) times the direct light.
+The share of light left after n reflections is s_n = (rho F) s_{n-1}, s_0 = 1. In a closed room of albedo rho
+it is rho^n, and all bounces together are 1 / (1 - rho) times the direct light.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from baker.core.scene import SceneWarning
 from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.solve import MAX_ALBEDO, Solution, apply, solve_warnings
 
-# Albedo from which it is worth looking.
+# Scenes without a patch of at least this albedo are not examined.
 NEARLY_WHITE = 0.98
 REFLECTIONS = 20
-# Light that is multiplied by less than this is ordinary: a closed room of albedo 0.95.
+# No warning below this ratio of all light to direct light, that of a closed room of albedo 0.95.
 MOST_GAIN = 20.0
 
 
@@ -27,7 +27,26 @@ def light_warnings(
     area: NDArray[np.float64],
     bounces: int | None,
 ) -> list[SceneWarning]:
-    """Return what is to be said of bounced light: the solve ended early, or light hardly ends at all."""
+    """Return warnings of bounced light: the solve ended early, or light is hardly absorbed.
+
+    Parameters
+    ----------
+    solution : Solution
+        Result of the solve.
+    matrix : FormFactorMatrix
+        F of P patches.
+    albedo : (P, 3) float64
+        0 to 1.
+    area : (P,) float64, m2
+        Areas of the patches.
+    bounces : int or None
+        Number of reflections of the solve; None means until converged.
+
+    Returns
+    -------
+    list of SceneWarning
+        Empty if there is nothing to warn of.
+    """
     return [*solve_warnings(solution), *trapped_light(matrix, albedo, area, bounces)]
 
 
@@ -37,7 +56,7 @@ def trapped_light(
     area: NDArray[np.float64],
     bounces: int | None,
 ) -> list[SceneWarning]:
-    """Return a warning if light between some patches is multiplied by more than `MOST_GAIN`.
+    """Return a warning if all bounces multiply the light of some patches by more than `MOST_GAIN`.
 
     Parameters
     ----------
@@ -45,7 +64,7 @@ def trapped_light(
     albedo : (P, 3) float64
     area : (P,) float64, m2
     bounces : int or None
-        As the solve has it; few bounces end the light before it can grow.
+        As in the solve; few bounces cannot multiply light by much.
     """
     white = albedo.max(axis=1) > NEARLY_WHITE
     if not white.any() or (bounces is not None and bounces < MOST_GAIN):
@@ -60,7 +79,7 @@ def trapped_light(
         return []
     share = 100.0 * float(area[trapped].sum() / area.sum())
     each = float(np.average(left[trapped], weights=area[trapped])) ** (1.0 / REFLECTIONS)
-    # Rays measure the sums of rows: a closed room's may be a little above 1.
+    # Row sums are measured by rays: those of a closed room may be a little above 1.
     most = 1.0 / (1.0 - min(each, MAX_ALBEDO))
     message = (
         f"surfaces that reflect over {100 * NEARLY_WHITE:g} % see little but each other "

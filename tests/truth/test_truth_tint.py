@@ -158,7 +158,7 @@ def test_exchange_through_a_pane_is_reciprocal_in_each_colour():
     row = np.repeat(np.arange(patches.n), np.diff(matrix.first))
     flux = np.zeros((3, patches.n, patches.n))
     for c in range(3):
-        flux[c, row, matrix.column] = patches.area[row] * matrix.value * matrix.tint[:, c]
+        flux[c, row, matrix.column] = patches.area[row] * matrix.value * matrix.transmittance[:, c]
     np.testing.assert_allclose(flux, flux.transpose(0, 2, 1), rtol=1e-5)
     # Texels of the walls lie above or below the pane; light from one half to the other passed it once.
     high = world.texels.position[:, 1][patches.member[patches.first[:-1]]]
@@ -166,9 +166,9 @@ def test_exchange_through_a_pane_is_reciprocal_in_each_colour():
     across = wall[row] & wall[matrix.column] & (high[row] * high[matrix.column] < 0)
     assert across.sum() > 1000
     np.testing.assert_allclose(
-        matrix.tint[across], np.tile(1 - HALF * (1 - COLOUR), (across.sum(), 1)), rtol=1e-5
+        matrix.transmittance[across], np.tile(1 - HALF * (1 - COLOUR), (across.sum(), 1)), rtol=1e-5
     )
-    assert (matrix.tint[~across] == 1).all()
+    assert (matrix.transmittance[~across] == 1).all()
 
 
 def test_no_light_is_lost_but_in_walls_and_panes():

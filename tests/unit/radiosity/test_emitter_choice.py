@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scenes import SceneBuilder, prepared
 
-from baker.radiosity.emitter_choice import LampChooser, only
+from baker.radiosity.emitter_choice import EmitterChooser, only
 from baker.radiosity.point_cache import points_of
 from baker.trace.packets import new_packet_buffers
 
@@ -29,7 +29,7 @@ def choices(world, chosen, n_light=64):
     """Choose for some texel entries of a world, taken as one tile that begins at the first."""
     begin, end = int(chosen[0]), int(chosen[-1]) + 1
     origin, normal = points_of(world.job.surface, world.job.valid_points, np.arange(begin, end))
-    chooser = LampChooser.build(world.emitters, n_light, world.texels.chart)
+    chooser = EmitterChooser.build(world.emitters, n_light, world.texels.chart)
     return chooser, chooser.choose(begin, origin, normal, new_packet_buffers(world.rays.tracer))
 
 
@@ -45,7 +45,7 @@ def test_hidden_clusters_are_set_apart_and_the_rest_is_as_if_alone(bright):
     chooser, made = choices(world, side(world, True)[:64])
     own = world.emitters.centre[:, 0] < 3
     assert 0 < own.sum() < len(own)
-    alone = LampChooser.build(only(world.emitters, own), 64)
+    alone = EmitterChooser.build(only(world.emitters, own), 64)
     for choice in made:
         assert choice.hidden is not None
         assert choice.seen.chance.sum() == pytest.approx(1.0)
@@ -98,6 +98,6 @@ def test_one_lamp_of_several_triangles_is_no_choice():
     builder.quad((0.5, 1, 0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 1.0), (4, 4))
     world, _ = prepared(builder)
     assert len(world.emitters.power) == 2
-    assert LampChooser.build(world.emitters, 64).single
+    assert EmitterChooser.build(world.emitters, 64).single
     dark = only(world.emitters, np.zeros(2, bool))
-    assert LampChooser.build(dark, 64).single
+    assert EmitterChooser.build(dark, 64).single

@@ -78,7 +78,7 @@ def coloured(matrix, rng):
     tint = np.float32(shared[row, matrix.column])
     dense = np.zeros((3, n, n))
     dense[:, row, matrix.column] = (matrix.value[:, None] * tint).T
-    return replace(matrix, tint=tint, sky_tint=np.float32(rng.random((n, 3)))), dense
+    return replace(matrix, transmittance=tint, sky_transmittance=np.float32(rng.random((n, 3)))), dense
 
 
 @pytest.mark.parametrize("bounces", [None, 3])
@@ -100,7 +100,7 @@ def test_coloured_light_between_patches_is_a_solve_for_each_colour(bounces):
         direct = source / albedo
         energy = energy_audit(matrix, area, direct, source, solution.irradiance, albedo)
         leaving = source + albedo * solution.irradiance
-        share = matrix.sky[:, None] * matrix.sky_tint
+        share = matrix.sky[:, None] * matrix.sky_transmittance
         assert energy["escaped"] == pytest.approx((area[:, None] * leaving * share).sum() / 3, rel=1e-5)
         assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-4)
 
