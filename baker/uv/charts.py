@@ -1,4 +1,4 @@
-"""Cuts meshes into charts that are true to size in metres, checked, every triangle included."""
+"""Cuts meshes into charts without overlap, of every triangle, at the scale of the mesh."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class MeshCharts:
     ----------
     vertex : (V',) int32
         Mesh vertex of each lightmap vertex.
-    uv : (V', 2) float64, unit of the positions that were cut
-        Each chart has its lower corner at 0.
+    uv : (V', 2) float64, unit of the positions
+        The lower corner of each chart is at 0.
     triangle : (T, 3) int32, into the lightmap vertices
     chart : (T,) int32, from 0
     vertex_chart : (V',) int32
     n_repaired : int
-        Triangles that the unwrapper left out or laid over each other.
+        Triangles that xatlas left out or overlapped, in charts of their own.
     """
 
     vertex: NDArray[np.int32]
@@ -49,7 +49,7 @@ class MeshCharts:
 
 @dataclass(frozen=True)
 class _Welded:
-    """A mesh with one vertex a place, and where its loose parts are."""
+    """A mesh with one vertex per position: positions (P, 3), triangles (T, 3) and the part of each (T,)."""
 
     position: NDArray[np.float64]
     triangle: NDArray[np.int32]
@@ -68,9 +68,15 @@ def chart_meshes(
     ----------
     meshes : sequence of (position (V, 3) float64, triangle (T, 3) int32)
     threads : int
-        Most worker processes at a time; the result does not depend on it.
+        Largest number of worker processes; the result does not depend on it.
     progress : Progress
-        Told up to the fraction `until` of the stage.
+        Called with fractions of the stage from 0 to `until`.
+    until : float
+
+    Returns
+    -------
+    list of MeshCharts
+        One for each mesh.
     """
     welded = [_weld_mesh(position, triangle) for position, triangle in meshes]
     jobs, origin = _make_jobs(welded)
@@ -79,7 +85,7 @@ def chart_meshes(
     chart = [np.full(len(w.triangle), -1, np.int64) for w in welded]
     base = 0
     for answer, pieces in zip(answers, origin, strict=True):
-        # A job's charts are numbered over all its pieces; a base keeps jobs apart.
+        # Offset the chart numbers, which start at 0 in each job.
         number = np.where(answer.chart >= 0, answer.chart.astype(np.int64) + base, -1)
         base = int(number.max(initial=base - 1)) + 1
         row = 0
@@ -95,16 +101,19 @@ def chart_meshes(
 
 
 def _weld_mesh(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> _Welded:
-    """Weld vertices at one place, so that only sharp creases and not split normals cut charts."""
+    """Weld vertices at equal positions, so that split normals do not separate charts."""
     label = weld(position)
-    place = np.zeros((int(label.max(initial=-1)) + 1, 3))
-    place[label] = position
+    welded = np.zeros((int(label.max(initial=-1)) + 1, 3))
+    welded[label] = position
     joined = label[triangle]
-    return _Welded(place, joined, cut_parts(place, joined))
+    return _Welded(welded, joined, cut_parts(welded, joined))
 
 
 def _make_jobs(welded: Sequence[_Welded]) -> tuple[list[ChartJob], list[list[tuple[int, NDArray[np.int64]]]]]:
-    """Gather loose parts into jobs; the cut depends on the meshes alone."""
+    """Bundle parts into jobs of about `JOB_TRIANGLES`, and return the jobs and the (mesh, faces) of each.
+
+    The jobs depend on the meshes alone, not on the number of threads.
+    """
     jobs: list[ChartJob] = []
     origin: list[list[tuple[int, NDArray[np.int64]]]] = []
     bundle: list[tuple[int, NDArray[np.int64]]] = []
@@ -143,7 +152,7 @@ def _bundle_job(welded: Sequence[_Welded], bundle: Sequence[tuple[int, NDArray[n
 
 
 def _finish(triangle: NDArray[np.int32], welded: _Welded, flat: FlatCharts) -> MeshCharts:
-    """Repair what is missing or overlaps, and give each (vertex, place in the plane) one lightmap vertex."""
+    """Replace missing and overlapping charts by planar ones, and merge equal corners to lightmap vertices."""
     uv, chart = flat.uv.copy(), flat.chart.astype(np.int64)
     good = np.flatnonzero(chart >= 0)
     if len(good):
@@ -160,7 +169,7 @@ def _finish(triangle: NDArray[np.int32], welded: _Welded, flat: FlatCharts) -> M
     low = np.full((n_charts, 2), np.inf)
     np.minimum.at(low, corner_chart, flat_uv)
     flat_uv = flat_uv - low[corner_chart]
-    # Corners become one lightmap vertex where mesh vertex, chart and uv agree.
+    # Merge corners of equal mesh vertex, chart and uv to one lightmap vertex.
     key = np.stack([triangle.reshape(-1).astype(np.float64), corner_chart.astype(np.float64)], axis=1)
     label = weld(key, flat_uv)
     _, first = np.unique(label, return_index=True)

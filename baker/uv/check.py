@@ -1,4 +1,4 @@
-"""Checks any uv layout: overlap, range, and area."""
+"""Overlap and area of uv layouts, and the tolerances by which they are valid."""
 
 from __future__ import annotations
 
@@ -7,18 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# A kept uv may lie this far outside 0..1: exporters round.
+# Largest distance by which a valid lightmap uv may leave 0..1: exporters round.
 RANGE_SLACK = 1e-4
-# Shares of doubly covered samples that count as no overlap: rounded borders that cross by a hair.
+# Largest share of the surface without uv area of a valid lightmap uv.
+MOST_LOST = 0.01
+# Largest share of samples covered twice in a valid page and in a valid chart: rounded borders may cross.
 PAGE_TOLERANCE = 1e-3
 CHART_TOLERANCE = 0.01
-# Samples closer to an edge than this share of their spacing count for neither side.
+# Samples closer to an edge than this share of their spacing lie inside neither of its triangles.
 EDGE_SLACK = 0.05
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """How much of a layout is covered more than once.
+    """Multiple coverage of a layout, by groups of triangles.
 
     Attributes
     ----------
@@ -30,19 +32,24 @@ class Overlap:
     doubled: NDArray[np.int64]
 
     def overlaps(self, tolerance: float) -> NDArray[np.bool_]:
-        """Tell which groups overlap something by more than `tolerance` of their samples."""
+        """Return which groups share more than `tolerance` of their samples with earlier triangles, (G,)."""
         return (self.doubled > tolerance * self.covered) & (self.doubled > 2)
 
 
 def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolution: int) -> Overlap:
-    """Count doubly covered samples of one page, 2 x 2 a texel.
+    """Count the samples of one page that are covered twice; 2 x 2 samples per texel up to 4096 texels.
 
     Parameters
     ----------
     uv : (T, 3, 2) float, page uv
     group : (T,) int
-        Whose triangle it is; groups in order, a later one is blamed for covering an earlier one.
+        Group of each triangle, in ascending order; overlap counts for the later group.
     resolution : int
+        Page width in texels.
+
+    Returns
+    -------
+    Overlap
     """
     from baker.uv.kernels.uv_overlap import count_overlap
 
@@ -57,12 +64,17 @@ def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolutio
 
 
 def chart_overlap(uv: NDArray[np.float64], chart: NDArray[np.int32]) -> Overlap:
-    """Count doubly covered samples inside each chart, on a grid of its own of some 16 samples a triangle.
+    """Count the samples of each chart that are covered twice, on a grid of about 16 samples per triangle.
 
     Parameters
     ----------
     uv : (T, 3, 2) float64, any unit
     chart : (T,) int32, all at least 0
+
+    Returns
+    -------
+    Overlap
+        A group for each chart.
     """
     from baker.uv.kernels.uv_overlap import count_overlap
 

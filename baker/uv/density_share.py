@@ -1,7 +1,8 @@
-"""Which objects show none of the light that falls on them, and so need hardly a texel.
+"""Lower density for objects that show none of the light that falls on them.
 
-A sky dome or a lamp with a black base colour shows its emission alone, and a hull of alpha 0 nothing at all.
-A dome around a level has thousands of times its area: with equal density it takes the whole page.
+A sky dome or an emitter with a black base colour shows its emission alone, and a hull of alpha 0 is
+invisible. The dome around a level may have thousands of times its area, and would take the whole page at
+equal density.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Material, Scene
 
-# Share of the surface that such objects count for together, at most.
+# Largest share of the page area that such objects get together.
 _MOST = 0.05
 
 
 def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float64]:
-    """Return (N,) by what the density of each instance is multiplied where one page is filled: mostly 1."""
+    """Return the factor on the density of each instance where one page is filled, (N,) float64: mostly 1."""
     share = np.ones(len(instances))
     blank = np.array([_shows_nothing(m) for m in scene.materials], bool)
     hidden = np.array([bool(blank[scene.meshes[i.mesh].material].all()) for i in instances], bool)
@@ -29,7 +30,7 @@ def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float6
 
 
 def _shows_nothing(material: Material) -> bool:
-    """Tell whether a lightmap cannot be seen on a material: a black lamp, or nothing that is there."""
+    """Return whether a lightmap is invisible on a material: a black emitter, or alpha 0."""
     black = max(material.base_colour[:3]) <= 0.0 and max(material.emission) > 0.0
     return black or (material.alpha_mode != "OPAQUE" and material.base_colour[3] <= 0.0)
 

@@ -1,4 +1,4 @@
-"""Judges and uses a lightmap uv that the scene brings along: TEXCOORD_1."""
+"""Tests the lightmap uv of a scene, TEXCOORD_1, and finds its charts."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.scene import Mesh, Scene, SceneWarning
 from baker.topology.weld import connected_vertices, weld
-from baker.uv.check import PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
+from baker.uv.check import MOST_LOST, PAGE_TOLERANCE, RANGE_SLACK, page_overlap, uv_area
 
 
 @dataclass(frozen=True)
 class KeptUv:
-    """Which instances use TEXCOORD_1, and how.
+    """The instances that keep their TEXCOORD_1.
 
     Attributes
     ----------
     usable : (I,) bool
         The instance's own TEXCOORD_1 is valid taken alone.
     together : bool
-        All instances' uv lie in one page without overlap: they stay exactly as they are.
+        The uv of all instances share one page without overlap: they stay exactly as they are.
     warnings : tuple of SceneWarning
     """
 
@@ -33,12 +33,25 @@ class KeptUv:
 
 
 def lightmap_uv(mesh: Mesh) -> NDArray[np.float32] | None:
-    """Return the mesh's TEXCOORD_1, (V, 2) float32, or None."""
+    """Return a mesh's TEXCOORD_1, (V, 2) float32, or None."""
     return mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
 
 
 def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
-    """Return (warning code, what is wrong) of a mesh's TEXCOORD_1, or None if it can carry a lightmap."""
+    """Return the fault of a mesh's TEXCOORD_1 that keeps it from holding a lightmap.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With or without the set.
+    resolution : int
+        Page width in texels, at which overlap and area are measured.
+
+    Returns
+    -------
+    (str, str) or None
+        Warning code and a clause that starts with "its" or "it"; None if the uv is valid.
+    """
     uv = lightmap_uv(mesh)
     if uv is None:
         return "uv.missing", "it has no TEXCOORD_1"
@@ -54,7 +67,7 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
     corner = mesh.position[mesh.triangle].astype(np.float64)
     real = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     lost = float(real[area == 0].sum()) / max(float(real.sum()), 1e-300)
-    if lost > 0.01:
+    if lost > MOST_LOST:
         return "uv.degenerate", f"{100 * lost:.3g}% of its surface has no area in TEXCOORD_1"
     overlap = page_overlap(used, np.zeros(len(used), np.int64), resolution)
     if overlap.overlaps(PAGE_TOLERANCE)[0]:
@@ -68,8 +81,15 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
 
     Parameters
     ----------
+    scene : Scene
+    resolution : int
+        Page width in texels.
     mode : str
         "auto", "keep" or "unwrap".
+
+    Returns
+    -------
+    KeptUv
 
     Raises
     ------
@@ -82,7 +102,7 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
     if mode == "unwrap":
         return KeptUv(usable, False, ())
     fault = {m: find_fault(scene.meshes[m], resolution) for m in sorted({i.mesh for i in scene.instances})}
-    told: set[int] = set()
+    warned: set[int] = set()
     for k, instance in enumerate(scene.instances):
         found = fault[instance.mesh]
         usable[k] = found is None
@@ -97,15 +117,15 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
                 file=str(scene.path) if scene.path else None,
                 object=name,
             )
-        if code != "uv.missing" and instance.mesh not in told:
-            told.add(instance.mesh)
-            warnings.append(SceneWarning(code, f"'{name}' is unwrapped anew, because {why}", name))
+        if code != "uv.missing" and instance.mesh not in warned:
+            warned.add(instance.mesh)
+            warnings.append(SceneWarning(code, f"'{name}' is unwrapped, because {why}", name))
     together = bool(n) and bool(usable.all()) and _disjoint(scene, resolution)
     return KeptUv(usable, together, tuple(warnings))
 
 
 def _disjoint(scene: Scene, resolution: int) -> bool:
-    """Tell whether all instances' uv share one page without overlap."""
+    """Return whether the uv of all instances share one page without overlap."""
     if len({i.mesh for i in scene.instances}) < len(scene.instances):
         return False
     uv, group = [], []
@@ -119,7 +139,7 @@ def _disjoint(scene: Scene, resolution: int) -> bool:
 
 
 def kept_charts(mesh: Mesh) -> NDArray[np.int32]:
-    """Return the (T,) int32 chart of each triangle of a kept uv: pieces connected in space and in uv."""
+    """Return the chart of each triangle of a kept uv, (T,) int32: pieces connected in space and in uv."""
     uv = lightmap_uv(mesh)
     assert uv is not None
     label = weld(mesh.position, uv)
@@ -129,12 +149,22 @@ def kept_charts(mesh: Mesh) -> NDArray[np.int32]:
 def close_charts(
     uv: Sequence[NDArray[np.floating]], chart: Sequence[NDArray[np.int32]], resolution: int, gap: int
 ) -> int:
-    """Count the texels that have another chart's texel within `gap` texels; charts in one page.
+    """Count the texels of one page that have another chart's texel within `gap` texels.
 
     Parameters
     ----------
     uv : sequence of (T, 3, 2) float
-    chart : sequence of (T,) int32, numbered over all
+        Page uv of each instance's triangles.
+    chart : sequence of (T,) int32
+        Their charts, numbered over all instances.
+    resolution : int
+        Page width in texels.
+    gap : int
+        Texels.
+
+    Returns
+    -------
+    int
     """
     from baker.uv.kernels.uv_overlap import count_close, mark_charts
 

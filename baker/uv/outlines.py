@@ -1,4 +1,4 @@
-"""Turns instances into outlines to pack, and packed outlines back into instances' uv."""
+"""Makes the outlines of instances that are packed, and the uv of instances from packed outlines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.uv.pack import Packing, Shapes
 
 @dataclass(frozen=True)
 class CutInstance:
-    """An instance whose mesh was cut into charts, which lie anywhere.
+    """An instance whose mesh was cut into charts, which are packed one by one.
 
     Attributes
     ----------
@@ -56,11 +56,12 @@ class Outlines:
     ----------
     shapes : Shapes
     turned : (S,) bool
-        u and v are exchanged in the shape, so that it lies on its long side.
+        u and v are exchanged in the shape, so that it is at least as wide as high.
     item_shape : (I,) int64
-        One item per instance and chart (or one for a rigid instance), instance by instance.
+        Shape of each item. There is one item per instance and chart, or one for a rigid instance, sorted by
+        instance.
     first_item : (N + 1,) int64
-        Items of each instance.
+        Items `first_item[i]` to `first_item[i + 1]` belong to instance i.
     """
 
     shapes: Shapes
@@ -72,7 +73,18 @@ class Outlines:
 def make_outlines(
     placements: Sequence[CutInstance | RigidInstance], meshes: Sequence[MeshCharts]
 ) -> Outlines:
-    """Make one shape per distinct chart and size, and one item per chart of each instance."""
+    """Make one shape per distinct chart and size, and one item per chart of each instance.
+
+    Parameters
+    ----------
+    placements : sequence of CutInstance or RigidInstance
+    meshes : sequence of MeshCharts
+        Indexed by `CutInstance.charts`.
+
+    Returns
+    -------
+    Outlines
+    """
     corner: list[NDArray[np.float64]] = []
     count: list[NDArray[np.int64]] = []
     extent: list[NDArray[np.float64]] = []
@@ -133,8 +145,22 @@ def place_uv(
 
     Parameters
     ----------
+    outlines : Outlines
+    instance : int
+    placement : CutInstance or RigidInstance
+        Of the instance.
+    meshes : sequence of MeshCharts
+        Indexed by `CutInstance.charts`.
+    packing : Packing
+        Of its page.
     position : (n, 2) int32
-        Lower corners of the instance's items.
+        Lower corners of the instance's items, texels.
+    resolution : int
+        Page width in texels.
+
+    Returns
+    -------
+    (V', 2) float32
     """
     first = int(outlines.first_item[instance])
     if isinstance(placement, RigidInstance):

@@ -1,7 +1,7 @@
 """Packs outlines into one square page, and finds the largest density that fits.
 
-Texel centres lie at whole numbers here; an outline's lower corner sits on one, so that straight
-borders are looked up exactly there.
+In this file texel centres have integer coordinates. The lower corner of an outline is a texel centre, so that
+lookups at straight borders read texels without interpolation.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 
-# Items times texels of the page to place between two looks at the cancel flag: well under a second.
+# Items times texels of the page to place between two calls of `progress`: well under a second.
 _CHUNK_WORK = 1 << 29
 
 
@@ -30,7 +30,7 @@ class Shapes:
     extent : (S, 2) float64, metres
     area : (S,) float64, square metres
     rigid : (S,) bool
-        True: scaled evenly. False: stretched so that both extents are whole texels.
+        True: scaled uniformly. False: stretched so that both extents are whole numbers of texels.
     """
 
     corner: NDArray[np.float64]
@@ -40,7 +40,7 @@ class Shapes:
     rigid: NDArray[np.bool_]
 
     def scale(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (S, 2) texels per metre along u and v for (S,) wanted densities."""
+        """Return texels per metre along u and v, (S, 2) float64, for (S,) target densities."""
         wanted = self.extent * density[:, None]
         whole = np.maximum(np.round(wanted), 1.0)
         snapped = np.divide(whole, self.extent, out=np.ones_like(whole), where=self.extent > 1e-12)
@@ -49,7 +49,7 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Packing:
-    """Where items lie in a page.
+    """Positions of items in a page.
 
     Attributes
     ----------
@@ -57,11 +57,11 @@ class Packing:
         Column and row of each item's lower corner.
     scale : (S, 2) float64, texels per metre
     height : int
-        Rows in use, with the border.
+        Rows in use, with the page border.
     placed : int
-        Items that found a place; the packing is good if it is all of them.
+        Number of items that were placed; the packing is complete if it is all of them.
     placed_area : float
-        Their share of the area of all, 0 to 1.
+        Their share of the area of all items, gaps included, 0 to 1.
     """
 
     position: NDArray[np.int32]
@@ -72,12 +72,12 @@ class Packing:
 
 
 def border(gap: int) -> int:
-    """Return the empty texels along the page border: wrapped around, they make one gap."""
+    """Return the width of the empty page border in texels: half a gap, for pages that repeat."""
     return max(1, (gap + 1) // 2)
 
 
 def texel_gap(padding: int) -> int:
-    """Return the empty texels between outlines: a bilinear lookup reads one texel beyond each."""
+    """Return the number of empty texels between outlines: at least 2, one texel of lookup beyond each."""
     return max(2, padding)
 
 
@@ -98,8 +98,15 @@ def pack(
     density : (S,) float64, texels per metre
     page : (resolution, gap)
         Width and height in texels; empty texels between items.
+    progress : Progress
+    fraction : float
+        Fraction of the stage to report.
+
+    Returns
+    -------
+    Packing
     """
-    from baker.uv.kernels.uv_pack import outline_spans, place
+    from baker.uv.kernels.uv_pack import outline_spans, place_items
 
     resolution, gap = page
     margin = border(gap)
@@ -128,7 +135,7 @@ def pack(
     for start in range(0, len(order), step):
         report(progress, Stage.UNWRAP, fraction)
         chunk = order[start : start + step]
-        count = place(
+        count = place_items(
             next_used, next_free, chunk, item_shape, first_row, low, high, gap, margin, lowest, position
         )
         placed += count
@@ -153,11 +160,15 @@ def fit_page(
 
     Parameters
     ----------
+    shapes : Shapes
+    item_shape : (I,) int64
     page : (resolution, gap)
+        Width and height in texels; empty texels between items.
+    progress : Progress
     span : (float, float)
-        Fractions of the stage to report between.
+        First and last fraction of the stage to report.
     most : float
-        Density not to go beyond, texels per metre.
+        Largest density, texels per metre.
 
     Returns
     -------
@@ -178,7 +189,7 @@ def fit_page(
         result = pack(shapes, item_shape, np.full(n, guess), page, progress, fraction)
         if result.placed == len(item_shape):
             low, best = guess, result
-            # What is left of the page in height says how much there is to gain.
+            # Extrapolate from the unused height: the area grows with the square of the density.
             step = guess * float(np.sqrt(resolution / max(1, result.height))) * 1.003
         else:
             high = guess
@@ -186,7 +197,7 @@ def fit_page(
         if best is not None and (low >= ceiling or high <= low * (1 + tolerance)):
             break
         if best is None and k >= n_tries - 3:
-            # Outlines have a least size: go down in large steps.
+            # Outlines have a minimum size of one texel, so their area shrinks slowly: go down in large steps.
             step = guess / 30.0
         margin = 0.25 * (high - low)
         guess = min(max(step, low + margin), high - margin) if best is not None and high < ceiling else step
@@ -195,7 +206,11 @@ def fit_page(
 
 
 def _estimate(shapes: Shapes, item_shape: NDArray[np.int64], inner: int, gap: int) -> float:
-    """Guess the density at which outlines and gaps fill 85 % of the page: a quadratic equation."""
+    """Return the density d at which outlines and gaps fill 85 % of the page.
+
+    Solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2 for items of w x h metres and a gap of g texels,
+    with their area in place of w h.
+    """
     area = float(shapes.area[item_shape].sum())
     half = float(shapes.extent[item_shape].sum()) * (1 + gap)
     rest = len(item_shape) * (1 + gap) ** 2 - 0.85 * inner * inner

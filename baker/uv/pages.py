@@ -1,4 +1,4 @@
-"""Distributes instances over pages: one page filled to the brim, or as many as a density needs."""
+"""Distributes instances over pages: one page as dense as fits, or the pages that a density needs."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from baker.core.settings import BakeSettings
 from baker.uv.outlines import Outlines
 from baker.uv.pack import Packing, border, fit_page, pack, texel_gap
 
-# Pages are tried with less and less on them until it fits, starting from this share of their area.
+# Share of a page's area that the first attempt fills, and the largest number of attempts.
 _FIRST_FILL = 0.92
 _PAGE_TRIES = 8
 
 
 @dataclass(frozen=True)
 class Page:
-    """One page: its instances, and where their items lie.
+    """One page: its instances, and the positions of their items.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Page:
 
 
 class _Packer:
-    """Holds what every attempt at a page needs."""
+    """Packs subsets of instances into pages of one size and gap."""
 
     def __init__(self, outlines: Outlines, resolution: int, gap: int, progress: Progress) -> None:
         self.outlines = outlines
@@ -70,7 +70,7 @@ class _Packer:
         return packing if packing.placed == len(items) else None
 
     def need(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Estimate the share of a page's area that each instance needs."""
+        """Return an estimate of the share of a page's area that each instance needs, (I,) float64."""
         gap = self.page[1]
         shapes, item = self.outlines.shapes, self.outlines.item_shape
         per_item = np.repeat(density, np.diff(self.outlines.first_item))
@@ -85,8 +85,21 @@ def fill_pages(
 ) -> tuple[list[Page], list[SceneWarning]]:
     """Pack all instances into pages of exactly `settings.resolution`.
 
-    Without a density: one page, as dense as fits. With one: instances at that density on up to
-    `max_pages` pages, at less where that is not enough.
+    Without `settings.density`: one page, as dense as fits. With it: instances at that density on up to
+    `max_pages` pages, at a lower one where these are not enough.
+
+    Parameters
+    ----------
+    outlines : Outlines
+    names : list of str
+        Of the instances, for messages.
+    settings : BakeSettings
+    progress : Progress
+
+    Returns
+    -------
+    pages : list of Page
+    warnings : list of SceneWarning
 
     Raises
     ------
@@ -119,7 +132,7 @@ def fill_pages(
                 )
                 warnings.append(SceneWarning("uv.padding_reduced", message))
             return pages, warnings
-    # More charts than one page has room for: any density will do that spreads them.
+    # More charts than fit one page: distribute them at the density that fills a quarter of all pages.
     packer = _Packer(outlines, settings.resolution, gaps[-1], progress)
     area = float(outlines.shapes.area[outlines.item_shape].sum())
     start = settings.resolution * float(np.sqrt(0.25 * settings.max_pages / max(area, 1e-12)))
@@ -132,7 +145,7 @@ def fill_pages(
 def _fill_at(
     packer: _Packer, wanted: float, names: list[str], max_pages: int, warnings: list[SceneWarning]
 ) -> list[Page]:
-    """Pack at a density, lowering it for objects that fill a page alone, or for all if pages run out."""
+    """Pack at a density, or a lower one: for objects that exceed a page, and for all if pages run out."""
     n = len(packer.outlines.first_item) - 1
     everything = np.arange(n)
     if max_pages == 1:
@@ -160,7 +173,7 @@ def _fill_at(
 
 
 def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return each instance's density so that it fits a page alone, and those that had to be lowered."""
+    """Return the density (I,) at which each instance fits a page alone, and the instances below `target`."""
     outlines = packer.outlines
     n = len(outlines.first_item) - 1
     density = np.full(n, target)
@@ -185,7 +198,7 @@ def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np
 
 
 def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -> list[Page] | None:
-    """Fill page after page, largest instances first; None if `max_pages` are not enough."""
+    """Fill page after page, largest instances first; return None if `max_pages` are not enough."""
     need = packer.need(density)
     if need.sum() > 1.3 * max_pages:
         return None
@@ -224,7 +237,7 @@ def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -
 
 
 def _take(need: NDArray[np.float64], fill: float) -> NDArray[np.bool_]:
-    """Choose instances, in order, while they fit the share `fill` of a page; at least the first."""
+    """Return the (N,) mask of the first instance and, in order, those that fit the share `fill` of a page."""
     taken = np.zeros(len(need), bool)
     total = 0.0
     for k, value in enumerate(need):

@@ -1,4 +1,4 @@
-"""Cuts a mesh into parts that xatlas does well with: connected, not too large, not curled up."""
+"""Cuts a mesh into parts that xatlas handles well: connected, not too large, of similar normals."""
 
 from __future__ import annotations
 
@@ -7,28 +7,34 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_faces, connected_vertices
 
-# A part has at most about this many triangles if it had to be cut, and small parts are gathered into
-# worker's jobs of this many.
+# Largest number of triangles of a part that had to be cut; smaller parts are bundled to jobs of about this
+# size.
 JOB_TRIANGLES = 20_000
-# Connected parts above this are cut into blocks of space first: xatlas's time grows faster than
-# linearly with the part, and it crashed on one of 328 k triangles.
+# Connected parts with more triangles are cut into blocks in space: xatlas's time grows faster than linearly
+# with the part, and it crashed on one of 328 k triangles.
 SPLIT_TRIANGLES = 40_000
-# xatlas takes neighbours whose normals differ by less than some 2.5 degrees for one plane, from
-# neighbour to neighbour, so that a finely tessellated ball becomes one "planar" chart (stretch 0.37).
+# xatlas joins neighbours whose normals differ by less than about 2.5 degrees to one plane, transitively, so
+# that a finely tessellated sphere becomes one "planar" chart (stretch 0.37). These are the cosine of such an
+# angle, and the smallest region of such neighbours that is cut.
 SMOOTH_DOT = 0.9985
 SMOOTH_TRIANGLES = 500
-# Such a region is cut until its normals lie in a cone of about 40 degrees around their mean.
+# Such a region is cut until the cosine between its normals and their mean is at min_facing this: about 40
+# degrees.
 MIN_FACING = 0.77
 
 
 def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the (T,) int32 part of each triangle; a part is connected.
+    """Return the part of each triangle; parts are connected.
 
     Parameters
     ----------
     position : (V, 3) float64
     triangle : (T, 3) int32
-        Vertices at one place should be one vertex.
+        Over vertices welded by position.
+
+    Returns
+    -------
+    (T,) int32
     """
     part = connected_vertices(triangle, len(position))
     if len(triangle) <= SMOOTH_TRIANGLES:
@@ -43,9 +49,9 @@ def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDA
     sums = [np.bincount(region, weights=cross[:, k], minlength=n_regions) for k in range(3)]
     mean = np.stack(sums, axis=1).astype(np.float64)
     facing = np.einsum("tx,tx->t", cross, _unit(mean)[region])
-    least = np.ones(n_regions)
-    np.minimum.at(least, region, np.where(length > 0, facing / np.where(length > 0, length, 1.0), 1.0))
-    curled = (least < MIN_FACING) & (size > SMOOTH_TRIANGLES)
+    min_facing = np.ones(n_regions)
+    np.minimum.at(min_facing, region, np.where(length > 0, facing / np.where(length > 0, length, 1.0), 1.0))
+    curled = (min_facing < MIN_FACING) & (size > SMOOTH_TRIANGLES)
     large = np.bincount(part) > SPLIT_TRIANGLES
 
     block = np.zeros(len(triangle), np.int64)
@@ -57,7 +63,7 @@ def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDA
         n = _cut_blocks(block, n, np.flatnonzero((part == k) & ~curled[region]), centre, None, None)
     if n == 1:
         return part
-    # Blocks hang together by edges: a fan around one vertex makes no good chart.
+    # Split blocks into parts connected by edges: parts that touch in a vertex make no good chart.
     return connected_faces(triangle, part.astype(np.int64) * n + block)
 
 
@@ -75,7 +81,11 @@ def _cut_blocks(
     normal: NDArray[np.float64] | None,
     cross: NDArray[np.float64] | None,
 ) -> int:
-    """Halve `face` until each block is small and, with normals given, uncurled; return the next number."""
+    """Halve the (N,) faces until each block is small and, with normals given, of similar normals.
+
+    Writes numbers from `n` on to the faces' rows of `block` (T,), and returns the next number. `centre`,
+    `normal` and `cross` are the (T, 3) centroids, unit normals and area vectors.
+    """
     todo = [face]
     while todo:
         rows = todo.pop()

@@ -1,6 +1,7 @@
-"""Charts without any library: faces that look one way, projected; else one chart a triangle.
+"""Planar charts for triangles that xatlas left out or overlapped.
 
-The way out for triangles that the unwrapper left out or laid over each other.
+Connected faces whose normals have the same largest component are projected to a plane. Triangles that this
+distorts or overlaps become charts of their own.
 """
 
 from __future__ import annotations
@@ -15,17 +16,23 @@ from baker.uv.check import CHART_TOLERANCE, chart_overlap
 def planar_charts(
     position: NDArray[np.float64], triangle: NDArray[np.int32]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return (T, 3, 2) float64 uv in the unit of `position` and the (T,) int32 chart of each triangle.
+    """Return planar charts of triangles.
 
     Parameters
     ----------
     position : (V, 3) float64
     triangle : (T, 3) int32
-        Vertices at one place should be one vertex.
+        Over vertices welded by position.
+
+    Returns
+    -------
+    uv : (T, 3, 2) float64
+        In the unit of `position`.
+    chart : (T,) int32
     """
     corner = position[triangle]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    # Faces join where they share an edge and look along the same of six axes.
+    # Join faces that share an edge and whose normal is closest to the same of six axes.
     axis = np.abs(cross).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(cross, axis[:, None], axis=1)[:, 0] < 0)
     chart = connected_faces(triangle, side)
@@ -40,7 +47,8 @@ def planar_charts(
         [np.einsum("tkx,tx->tk", corner, tangent[chart]), np.einsum("tkx,tx->tk", corner, bitangent[chart])],
         axis=2,
     )
-    # A face that leans more than 75 degrees from its chart, or a chart over itself, goes alone.
+    # Separate faces more than 75 degrees off their chart's normal, and those of charts that overlap
+    # themselves.
     area = np.linalg.norm(cross, axis=1)
     facing = np.einsum("tx,tx->t", cross, normal[chart])
     alone = (
@@ -53,7 +61,7 @@ def planar_charts(
 
 
 def lay_flat(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lay each (T, 3, 3) triangle into the plane, its longest edge along u; (T, 3, 2) float64."""
+    """Return (T, 3, 3) triangles as congruent ones in the plane, longest edge along u, (T, 3, 2) float64."""
     edge = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(edge, axis=2)
     first = length.argmax(axis=1)

@@ -1,4 +1,4 @@
-"""Runs chart jobs here or in worker processes that are killed when the caller stops."""
+"""Runs chart jobs in this process, or in worker processes that end with the call."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
-# Fewer triangles than this take less time here than a process takes to start (0.2 s).
+# Fewer triangles than this are cut in less time than a process takes to start (0.2 s).
 IN_PROCESS_TRIANGLES = 3000
 
 
@@ -26,9 +26,10 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     ----------
     jobs : sequence of ChartJob
     threads : int
-        Most worker processes at a time.
+        Largest number of worker processes.
     progress : Progress
-        Told up to the fraction `until` of the stage.
+        Called with fractions of the stage from 0 to `until`.
+    until : float
 
     Returns
     -------
@@ -38,7 +39,7 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     Raises
     ------
     Cancelled
-        If `progress` says so; the workers are killed then, as for any exception.
+        If `progress` returns a truthy answer. The workers are killed, as for any exception.
     """
     total = sum(len(job.triangle) for job in jobs)
     if total < IN_PROCESS_TRIANGLES:
@@ -113,7 +114,7 @@ class _Pool:
                     break
                 charts = self._ask(process, self.jobs[k])
                 if charts is None:
-                    # The library crashed on this job: its triangles go the slow, safe way.
+                    # xatlas crashed on this job: leave its triangles to `planar_charts`.
                     self._end(process)
                     process = None
                     n = len(self.jobs[k].triangle)
@@ -147,5 +148,5 @@ class _Pool:
         try:
             process.stdin.close()
         except OSError:
-            # What was still buffered for the dead process is of no use.
+            # Closing flushes the buffer to a dead process.
             return

@@ -1,9 +1,9 @@
-"""Gives every instance its own texels: keeps, cuts and packs lightmap uv, and checks the result."""
+"""Lays out all instances in lightmap pages: keeps, cuts and packs lightmap uv, and checks the result."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,16 @@ from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.uv.pages import fill_pages
 
-# Relative difference of the axes' scales up to which an instance counts as evenly scaled.
+# Largest relative difference of the scales along axes of an instance that counts as evenly scaled.
 _EVEN_SCALE = 1e-4
+# Fraction of the stage at which cutting ends and packing starts.
 _CUT_UNTIL = 0.7
+_NONE = np.zeros(0, np.int32)
 
 
 @dataclass(frozen=True)
 class _Cut:
-    """A mesh in the size it has in the world, to be cut once for all instances alike."""
+    """A mesh and the symmetric (3, 3) stretch with which it is cut, for all instances that share both."""
 
     mesh: int
     stretch: NDArray[np.float64]
@@ -40,10 +42,11 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     Parameters
     ----------
     scene : Scene
+        Its own TEXCOORD_1 are used as `settings.uv` says.
     settings : BakeSettings
         `resolution`, `density`, `max_pages`, `padding`, `uv` and `threads` are read.
     progress : Progress
-        Told the stage "unwrap"; a truthy answer stops the work, and kills what runs in processes.
+        Called with the stage "unwrap"; a truthy answer stops the work and the worker processes.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
         try:
             atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
         except InputError as error:
-            # What packs charts does not know where they come from.
+            # Add the file, which the packer does not have.
             raise InputError(
                 error.message,
                 file=error.file or (str(scene.path) if scene.path else None),
@@ -114,12 +117,48 @@ def _lay_out(
     usable: NDArray[np.bool_],
     warnings: tuple[SceneWarning, ...],
 ) -> Atlas:
-    """Cut what has no usable uv, and pack everything."""
+    """Cut the instances whose uv is not `usable` (I,), and pack all of them."""
     # An instance without triangles has nothing to pack.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
-    # A density that was asked for is kept.
+    # A density that was asked for applies to all instances.
     equal = settings.density is not None
     shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
+    placements, cuts = _placements(scene, filled, shares, usable)
+    found = list(warnings)
+    charts = _cut(scene, cuts, settings, progress, found)
+    outlines = make_outlines(placements, charts)
+    names = [scene.instances[k].name or scene.meshes[scene.instances[k].mesh].name for k in filled]
+    pages, packing_warnings = fill_pages(outlines, names, settings, progress)
+    found += packing_warnings
+    layouts: list[InstanceLayout] = [
+        InstanceLayout(
+            k, 0, _NONE, np.zeros((0, 2), np.float32), scene.meshes[i.mesh].triangle, _NONE, False, 1.0
+        )
+        for k, i in enumerate(scene.instances)
+    ]
+    for number, page in enumerate(pages):
+        for slot, position, density in zip(page.instance, page.position, page.density, strict=True):
+            uv = place_uv(
+                outlines, int(slot), placements[slot], charts, page.packing, position, settings.resolution
+            )
+            k = filled[slot]
+            mesh = scene.meshes[scene.instances[k].mesh]
+            vertex, triangle, chart = _structure(mesh, placements[slot], charts)
+            scaled = float(density * shares[slot])
+            layouts[k] = InstanceLayout(k, number, vertex, uv, triangle, chart, False, scaled)
+    # Number the charts over all instances, in their order.
+    n_charts = 0
+    for k in filled:
+        layouts[k] = replace(layouts[k], chart=layouts[k].chart + n_charts)
+        n_charts = int(layouts[k].chart.max()) + 1
+    found += _verify(layouts, len(pages), settings.resolution, scene, progress)
+    return Atlas(settings.resolution, len(pages), tuple(layouts), n_charts, settings.padding, tuple(found))
+
+
+def _placements(
+    scene: Scene, filled: list[int], shares: NDArray[np.float64], usable: NDArray[np.bool_]
+) -> tuple[list[CutInstance | RigidInstance], list[_Cut]]:
+    """Return how each `filled` instance is placed, and the meshes to cut, each once for all alike."""
     placements: list[CutInstance | RigidInstance] = []
     cuts: list[_Cut] = []
     index: dict[tuple[int, bytes], int] = {}
@@ -134,54 +173,32 @@ def _lay_out(
             index[key] = len(cuts)
             cuts.append(_Cut(instance.mesh, stretch))
         placements.append(CutInstance(index[key], factor * share))
+    return placements, cuts
+
+
+def _cut(
+    scene: Scene, cuts: list[_Cut], settings: BakeSettings, progress: Progress, found: list[SceneWarning]
+) -> list[MeshCharts]:
+    """Cut meshes into charts; append warnings to `found`."""
+    if not cuts:
+        return []
     inputs = [
         (scene.meshes[c.mesh].position.astype(np.float64) @ c.stretch, scene.meshes[c.mesh].triangle)
         for c in cuts
     ]
-    charts = (
-        chart_meshes(inputs, settings.threads or os.cpu_count() or 1, progress, _CUT_UNTIL) if cuts else []
-    )
-    found = list(warnings)
+    charts = chart_meshes(inputs, settings.threads or os.cpu_count() or 1, progress, _CUT_UNTIL)
     for cut, one in zip(cuts, charts, strict=True):
         if one.n_repaired:
             name = scene.meshes[cut.mesh].name
             message = f"{one.n_repaired} triangles of '{name}' were cut into flat charts of their own"
             found.append(SceneWarning("uv.repaired", message, name))
-
-    outlines = make_outlines(placements, charts)
-    names = [scene.instances[k].name or scene.meshes[scene.instances[k].mesh].name for k in filled]
-    pages, told = fill_pages(outlines, names, settings, progress)
-    found += told
-    layout: dict[int, tuple[int, NDArray[np.float32], float]] = {}
-    for number, page in enumerate(pages):
-        for slot, position, density in zip(page.instance, page.position, page.density, strict=True):
-            uv = place_uv(
-                outlines, int(slot), placements[slot], charts, page.packing, position, settings.resolution
-            )
-            layout[filled[slot]] = (number, uv, float(density * shares[slot]))
-    slots = {k: slot for slot, k in enumerate(filled)}
-    layouts: list[InstanceLayout] = []
-    n_charts = 0
-    for k, instance in enumerate(scene.instances):
-        mesh = scene.meshes[instance.mesh]
-        if k not in slots:
-            none = np.zeros(0, np.int32)
-            layouts.append(
-                InstanceLayout(k, 0, none, np.zeros((0, 2), np.float32), mesh.triangle, none, False, 1.0)
-            )
-            continue
-        number, uv, density = layout[k]
-        vertex, triangle, chart = _structure(mesh, placements[slots[k]], charts)
-        layouts.append(InstanceLayout(k, number, vertex, uv, triangle, chart + n_charts, False, density))
-        n_charts = int(layouts[-1].chart.max()) + 1
-    found += _verify(layouts, len(pages), settings.resolution, scene, progress)
-    return Atlas(settings.resolution, len(pages), tuple(layouts), n_charts, settings.padding, tuple(found))
+    return charts
 
 
 def _structure(
     mesh: Mesh, placement: CutInstance | RigidInstance, charts: list[MeshCharts]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Return mesh vertex, triangles and chart of an instance's lightmap vertices."""
+    """Return mesh vertex (V',), triangles (T, 3) and chart (T,) of an instance's lightmap vertices, int32."""
     if isinstance(placement, RigidInstance):
         return np.arange(len(mesh.position), dtype=np.int32), mesh.triangle, kept_charts(mesh)
     own = charts[placement.charts]
@@ -191,7 +208,7 @@ def _structure(
 def _verify(
     layouts: list[InstanceLayout], n_pages: int, resolution: int, scene: Scene, progress: Progress
 ) -> list[SceneWarning]:
-    """Check the finished pages for overlap and range, whatever made them."""
+    """Return warnings about overlap and range of the finished pages, kept and cut uv alike."""
     found: list[SceneWarning] = []
     for page in range(n_pages):
         report(progress, Stage.UNWRAP, 0.95 + 0.05 * page / n_pages)
@@ -217,8 +234,8 @@ def _verify(
 def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Split a transform's effect on lengths into a factor and a symmetric (3, 3) stretch.
 
-    The stretch is the identity for even scales, so that all such instances share their charts; else
-    it is the root of M^T M: rotations and mirrors do not matter.
+    The stretch is the identity for even scales, so that all such instances share their charts; otherwise it
+    is the root of M^T M, which does not depend on rotations and mirrors.
     """
     linear = world_from_object[:3, :3].astype(np.float64)
     gram = linear.T @ linear
@@ -227,18 +244,18 @@ def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArr
         return float(f"{even:.6g}"), np.eye(3)
     value, vector = np.linalg.eigh(gram)
     root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
-    # Rounded, so that instances that differ by rounding alone share their charts.
+    # Round, so that instances that differ by rounding errors share their charts.
     digits = 5 - int(np.floor(np.log10(np.abs(root).max())))
     return 1.0, np.round(0.5 * (root + root.T), digits) + 0.0
 
 
 def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
-    """Return an instance that keeps the shape of its TEXCOORD_1, at a share of the density."""
+    """Return an instance that keeps the shape of its TEXCOORD_1, at `share` of the density of others."""
     uv = lightmap_uv(mesh)
     assert uv is not None
     wide = uv.astype(np.float64)
     used = wide[mesh.triangle].reshape(-1, 2)
-    # Vertices no triangle uses may hold anything: they go to the corner.
+    # Move unused vertices, which may have any value, into the bounds.
     wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
     factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
     return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)

@@ -1,4 +1,4 @@
-"""Runs chart jobs in a process of its own, so that a C++ library can be stopped at any moment.
+"""Runs chart jobs in a separate process, which can be killed while xatlas is busy.
 
 Protocol, both ways on stdin and stdout: 8 bytes of length, little-endian, then that many bytes of npz.
 """
@@ -58,7 +58,7 @@ def receive_charts(stream: IO[bytes]) -> FlatCharts | None:
 
 def main() -> None:
     """Answer jobs until stdin ends."""
-    # Ctrl-C reaches the whole process group; the parent decides what happens to this process.
+    # Ctrl-C signals the whole process group; the parent ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     source, sink = sys.stdin.buffer, sys.stdout.buffer
     while (message := read_message(source)) is not None:

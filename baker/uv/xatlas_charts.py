@@ -1,8 +1,8 @@
-"""Cuts a mesh into flat charts with xatlas; the only file that knows xatlas.
+"""Cuts a mesh into flat charts with xatlas; the only file that imports xatlas.
 
-xatlas can only compute charts and pack them in one go, and packing stretches each chart to whole
-texels along u and v. The pack made here is a throw-away; the stretch is taken out again by a
-least-squares fit of the two axis scales to the 3-D edge lengths.
+xatlas computes and packs charts in one call, and packing stretches each chart to whole texels along u and v.
+That packing is discarded; a least-squares fit of the two axis scales to the 3-D edge lengths removes the
+stretch.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_vertices, number_by_first
 
-# Faces a chart should have at most, on average: the cost of growing a chart rises faster than
-# linearly (82 k triangles: 14 charts 54 s, 46 charts 3.6 s, 123 charts 1.2 s).
+# Largest mean number of faces per chart: the time to grow a chart rises faster than linearly (82 k triangles:
+# 14 charts 54 s, 46 charts 3.6 s, 123 charts 1.2 s).
 CHART_FACES = 700
 
 
@@ -27,9 +27,9 @@ class ChartJob:
     ----------
     position : (V, 3) float64, any unit
     triangle : (T, 3) int32
-        Indices into the part's own vertices; vertices at one place should be one vertex.
+        Indices into the vertices of the part, which are welded by position.
     first_vertex, first_triangle : (P + 1,) int64
-        Where each part's rows start.
+        First row of each part; the last entry is V or T.
     """
 
     position: NDArray[np.float64]
@@ -45,12 +45,12 @@ class ChartJob:
 
 @dataclass(frozen=True)
 class FlatCharts:
-    """Charts in a plane, each somewhere.
+    """Charts in a plane, not packed: they may overlap each other.
 
     Attributes
     ----------
     uv : (T, 3, 2) float64
-        Corners of each triangle in the unit of the positions, true to size on average per chart.
+        Corners of each triangle, in the unit of the positions. The area of each chart equals that in space.
     chart : (T,) int32
         Chart of each triangle, from 0; -1 where no usable chart was found.
     """
@@ -66,20 +66,36 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
     ----------
     job : ChartJob
     chart_faces : int
-        Charts are capped at the area that this many triangles of their part have on average.
+        The area of charts is limited to that of this number of mean triangles of their part.
 
     Returns
     -------
     FlatCharts
-        Charts are numbered over the whole job. Some triangles may have chart -1: xatlas leaves out
-        what it takes for degenerate.
+        Charts are numbered over the whole job. Some triangles may have chart -1: xatlas leaves out those that
+        it considers degenerate.
+    """
+    part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
+    corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]
+    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    texel, chart = _run_xatlas(job, area, chart_faces)
+    found = np.flatnonzero(chart >= 0)
+    if len(found):
+        sized = _true_to_size(texel[found], corner[found], area[found], chart[found])
+        texel[found] = sized
+        chart[found] = _drop_flat(sized, area[found], chart[found])
+    return FlatCharts(texel, chart)
+
+
+def _run_xatlas(
+    job: ChartJob, area: NDArray[np.float64], chart_faces: int
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Return corners in texels of xatlas's page, (T, 3, 2), and the chart of each triangle, (T,), or -1.
+
+    `area` is that of the (T,) triangles, in the unit of the positions.
     """
     import xatlas
 
     n = len(job.triangle)
-    part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
-    corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]
-    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     chart_options = xatlas.ChartOptions()
     chart_options.max_chart_area = float(chart_faces)
     pack_options = xatlas.PackOptions()
@@ -94,7 +110,7 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
         total = float(area[faces].sum())
         if not total > 0:
             continue
-        # xatlas has absolute epsilons for lengths and areas: make the mean triangle one unit large.
+        # Scale the mean triangle to an area of 1: xatlas has absolute epsilons for lengths and areas.
         scale = float(np.sqrt((faces.stop - faces.start) / total))
         centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
         atlas.add_mesh(
@@ -103,10 +119,10 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
         added.append(k)
     uv, chart = np.zeros((n, 3, 2)), np.full(n, -1, np.int32)
     if not added:
-        return FlatCharts(uv, chart)
+        return uv, chart
     atlas.generate(chart_options, pack_options)
     if atlas.width == 0 or atlas.height == 0:
-        return FlatCharts(uv, chart)
+        return uv, chart
     n_charts = 0
     for m, k in enumerate(added):
         faces = slice(job.first_triangle[k], job.first_triangle[k + 1])
@@ -116,12 +132,7 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
         uv[faces] = (packed.astype(np.float64) * (atlas.width, atlas.height))[index.astype(np.int64)]
         chart[faces] = n_charts + connected_vertices(index, len(packed))
         n_charts = int(chart[faces].max()) + 1
-    placed = np.flatnonzero(chart >= 0)
-    if len(placed):
-        sized = _true_to_size(uv[placed], corner[placed], area[placed], chart[placed])
-        uv[placed] = sized
-        chart[placed] = _drop_flat(sized, area[placed], chart[placed])
-    return FlatCharts(uv, chart)
+    return uv, chart
 
 
 def _true_to_size(
@@ -154,7 +165,6 @@ def _true_to_size(
     even = np.where(np.isfinite(even), even, 0.0)
     axis = np.sqrt(np.stack([np.where(good, a, even), np.where(good, b, even)], axis=1))
     uv = texel * axis[chart][:, None, :]
-    # Signed areas: a chart with folds must not be blown up by them.
     e1, e2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     flat = np.bincount(
         chart, weights=0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]), minlength=n_charts
@@ -167,16 +177,19 @@ def _true_to_size(
 def _drop_flat(
     uv: NDArray[np.float64], area: NDArray[np.float64], chart: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Give charts that have no area, or that fold, in the plane the number -1."""
+    """Return renumbered charts, (T,) int32, with -1 for those that fold or lose area in the plane.
+
+    uv : (T, 3, 2), area : (T,) area in space, chart : (T,).
+    """
     n_charts = int(chart.max()) + 1
     e1, e2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     signed = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     total = np.bincount(chart, weights=signed, minlength=n_charts)
     real = np.bincount(chart, weights=area, minlength=n_charts)
-    # A face that turns its back to its chart overlaps a neighbour.
+    # Area of faces with a sign against that of their chart: they overlap a neighbour.
     back = np.where(signed * np.sign(total)[chart] < 0, np.abs(signed), 0.0)
     fold = np.bincount(chart, weights=back, minlength=n_charts)
-    # Faces with area in space but none in the plane would share one sample.
+    # Area of faces that have almost none in the plane: all their points would share one sample.
     lost = np.bincount(chart, weights=np.where(np.abs(signed) < 1e-4 * area, area, 0.0), minlength=n_charts)
     bad = (np.abs(total) < 0.5 * real) | (fold > 1e-3 * real) | (lost > 1e-3 * real) | ~np.isfinite(total)
     return number_by_first(np.where(bad[chart], -1, chart))

@@ -10,18 +10,18 @@ from baker.trace.jit import kernel, larger, smaller
 
 @kernel
 def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):
-    """Mark the samples each triangle covers and count those that were covered before.
+    """Mark the samples that each triangle covers, and count those that were covered before.
 
-    Sample (r, c) lies at (c + 0.5, r + 0.5). A sample closer than `slack` to an edge does not count,
-    so that triangles sharing an edge, even one that was rounded, do not overlap.
+    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers it if it lies inside by more than `slack`, so
+    that triangles that share an edge do not overlap, even if the edge is rounded.
 
     Parameters
     ----------
     corner : (T, 3, 2) float64, in samples
     group : (T,) int64
-        Grid and counter of each triangle.
+        Grid and counters of each triangle.
     base, stride, rows : (G,) int64
-        Where each group's grid starts in `mark`, its columns and its rows. Groups may share a grid.
+        First entry of each group's grid in `mark`, its columns and its rows. Groups may share a grid.
     slack : float, in samples
     mark : (M,) uint8
         In and out: 0 free, 1 covered once, 2 more than once.
@@ -38,12 +38,13 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
             continue
         if turn < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
-        # Signed distance to an edge: n . (p - a), n pointing inwards.
+        # Signed distance to an edge is n . (p - a), n pointing inwards: cross product over the edge length.
         l0 = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         l1 = math.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
         l2 = math.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
         if l0 == 0.0 or l1 == 0.0 or l2 == 0.0:
             continue
+        # Visit the samples in the bounding box.
         r_low = larger(0, math.floor(smaller(smaller(ay, by), cy) - 0.5))
         r_high = smaller(rows[g] - 1, math.ceil(larger(larger(ay, by), cy) - 0.5))
         c_low = larger(0, math.floor(smaller(smaller(ax, bx), cx) - 0.5))
@@ -75,10 +76,10 @@ def mark_charts(corner, chart, owner):
     corner : (T, 3, 2) float64, in texels; texel (r, c) spans c to c + 1 and r to r + 1
     chart : (T,) int32
     owner : (H, W) int32
-        In and out: 0 where free.
+        In and out: chart + 1, 0 where free.
     """
     height, width = owner.shape
-    # What only touches a texel's border does not enter it.
+    # A triangle that only touches the border of a texel does not enter it.
     slack = 1e-4
     for t in range(len(corner)):
         y_low = smaller(smaller(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1])
@@ -86,6 +87,7 @@ def mark_charts(corner, chart, owner):
         for r in range(
             larger(0, math.floor(y_low + slack)), smaller(height - 1, math.ceil(y_high - slack) - 1) + 1
         ):
+            # Range of x in which the triangle crosses row r.
             x_low, x_high = 1e30, -1e30
             for k in range(3):
                 ax, ay = corner[t, k, 0], corner[t, k, 1]
@@ -108,7 +110,10 @@ def mark_charts(corner, chart, owner):
 
 @kernel
 def count_close(owner, gap):
-    """Count owned texels that have another owner's texel within `gap` rows and columns."""
+    """Return the number of texels with another owner's texel within `gap` rows and columns.
+
+    owner : (H, W) int32, 0 where free.
+    """
     height, width = owner.shape
     count = 0
     for r in range(height):

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Places chart outlines in a page: conservative outlines, then first fit from the bottom up.
+"""Places chart outlines in a page: conservative outlines, then first fit from the lowest row up.
 
-An outline is one texel span per row, so a free place is found by jumping from occupied run to
-occupied run, and the cost hardly depends on the size of the page.
+An outline is one span of texels per row. The search for free space jumps from occupied run to occupied run,
+so its cost hardly depends on the size of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
-Generation*, 2002 (packing along outlines); here on runs of rows, so that holes fill too.
+Generation*, 2002 (packing along outlines); here with runs per row, so that holes are filled, too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
     first_triangle : (S + 1,) int64
         Triangles `first_triangle[s]` to `first_triangle[s + 1]` belong to shape s.
     shape : (S,) int64
-        Shapes to do.
+        Shapes to write.
     scale : (S, 2) float64, texels per metre along u and v
     first_row : (S + 1,) int64
         Rows of shape s in `low` and `high`.
@@ -64,16 +64,21 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
 
 @inner
 def _fill(next_used, next_free, y, start, end):
-    """Mark texels `start` to `end` of row `y` as used."""
+    """Mark texels `start` to `end` of row `y` as used.
+
+    next_used, next_free : (H, W + 1) int16, see `place_items`; in and out.
+    """
     width = next_used.shape[1] - 1
     after = next_free[y, end + 1] if end + 1 < width else width
     for x in range(start, end + 1):
         next_used[y, x] = x
         next_free[y, x] = after
+    # Extend the used run to the left.
     x = start - 1
     while x >= 0 and next_used[y, x] == x:
         next_free[y, x] = after
         x -= 1
+    # Point the free run to the left at the new texels.
     x = start - 1
     while x >= 0 and next_used[y, x] > start:
         next_used[y, x] = start
@@ -82,7 +87,11 @@ def _fill(next_used, next_free, y, start, end):
 
 @inner
 def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
-    """Return (x, y) of the lowest, then leftmost free place, or (-1, -1)."""
+    """Return the lowest, then leftmost position (x, y) at which an outline fits, or (-1, -1).
+
+    next_used, next_free : (H, W + 1) int16, see `place_items`.
+    low, high : (R,) int32, see `outline_spans`; the outline has `n_rows` rows from `row0` on.
+    """
     height = next_used.shape[0]
     width = next_used.shape[1] - 1
     most = 0
@@ -92,7 +101,7 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
         x = margin
         r, checked = 0, 0
         while x + most < width - margin:
-            # A row that blocks moves x past the used run; then all rows must agree again.
+            # If row r is blocked, move x past the used run and test all rows again.
             a, b = low[row0 + r], high[row0 + r]
             if b >= a:
                 used = next_used[y + r, x + a]
@@ -108,8 +117,8 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
 
 
 @kernel
-def place(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):
-    """Place items one after the other; stop at the first that has no place.
+def place_items(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):
+    """Place items one after the other; stop at the first that does not fit.
 
     Parameters
     ----------
@@ -125,14 +134,14 @@ def place(next_used, next_free, order, item_shape, first_row, low, high, gap, ma
     margin : int
         Empty texels along the page border.
     lowest : (S,) int64
-        Per shape: no place starts below this row (kept between calls).
+        Lowest row at which each shape may fit; in and out, kept between calls.
     position : (I, 2) int32
         Out: column and row of the outline's lower corner, in texels.
 
     Returns
     -------
     int
-        How many were placed.
+        Number of items placed.
     """
     height = next_used.shape[0]
     width = next_used.shape[1] - 1
@@ -145,6 +154,7 @@ def place(next_used, next_free, order, item_shape, first_row, low, high, gap, ma
             return n
         lowest[s] = y
         position[item, 0], position[item, 1] = x, y
+        # Mark the outline, dilated by `gap`, as used.
         for r in range(-gap, n_rows + gap):
             if not 0 <= y + r < height:
                 continue
