@@ -1,7 +1,8 @@
-"""The register of checks: one function a code, with severity, advice and the text of its docs.
+"""The registry of checks: one function per code, with its severity, advice and documentation.
 
-A check function takes a `CheckContext` and yields `RawFinding`. Its docstring is its page of the docs: the
-first line says what it finds, the rest why that matters and what it looks at.
+A rule is a function that takes a `CheckContext` and yields `RawFinding`, decorated with `check` in a file of
+`baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line states what it finds,
+the rest why that matters and how it is found.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Finding, RawFinding
+from baker.checks.finding import SEVERITIES, Finding, RawFinding
 from baker.core.registry import Registry
 
 CheckFunction = Callable[[CheckContext], Iterable[RawFinding]]
@@ -20,16 +21,23 @@ GROUPS = ("geometry", "uv", "light", "file", "cost")
 
 @dataclass(frozen=True)
 class Check:
-    """A check with everything that is told about it.
+    """A registered rule.
 
     Attributes
     ----------
+    code : str
+        Stable name of its findings.
     group : str
-        One of `GROUPS`.
+        One of `GROUPS`, its chapter of the docs.
+    severity : str
+        One of `baker.checks.finding.SEVERITIES`; a finding may override it.
     fix : str
-        One line: what to do.
+        One line of advice.
+    docs : str
+        The docstring of the rule.
+    function : callable
     in_bake : bool
-        A bake runs it, too.
+        `bake_warnings` runs it in every bake, too.
     """
 
     code: str
@@ -52,10 +60,40 @@ CHECKS: Registry[Check] = Registry("baker.checks.rules")
 def check(
     code: str, *, group: str, severity: str, fix: str, in_bake: bool = False
 ) -> Callable[[CheckFunction], CheckFunction]:
-    """Return a decorator that files a function as the check of `code`."""
+    """Return a decorator that registers a function as the rule of a code.
+
+    Parameters
+    ----------
+    code : str
+        Lower-case words joined by dashes; lightmap uv have the prefix `uv.`.
+    group : str
+        One of `GROUPS`.
+    severity : str
+        "info", "warning" or "error".
+    fix : str
+        One line of advice, without a full stop.
+    in_bake : bool
+        Marks the rules that `baker.checks.in_bake` calls.
+
+    Returns
+    -------
+    callable
+        The decorator; it returns the function unchanged.
+
+    Raises
+    ------
+    ValueError
+        For an unknown group or severity, a rule without docstring, or a code that is registered already.
+    """
 
     def add(function: CheckFunction) -> CheckFunction:
         docs = inspect.cleandoc(function.__doc__ or "")
+        if group not in GROUPS:
+            raise ValueError(f"check '{code}': group '{group}' is none of {', '.join(GROUPS)}")
+        if severity not in SEVERITIES:
+            raise ValueError(f"check '{code}': severity '{severity}' is none of {', '.join(SEVERITIES)}")
+        if not docs:
+            raise ValueError(f"check '{code}' has no docstring, which is its documentation")
         CHECKS.register(code)(Check(code, group, severity, fix, docs, function, in_bake))
         return function
 
@@ -63,13 +101,13 @@ def check(
 
 
 def all_checks() -> list[Check]:
-    """Return every check, by group, then by code."""
+    """Return every rule, sorted by group and code."""
     found = [CHECKS.require(name, "check") for name in CHECKS.names()]
     return sorted(found, key=lambda entry: (GROUPS.index(entry.group), entry.code))
 
 
 def run_check(entry: Check, context: CheckContext) -> list[Finding]:
-    """Run one check."""
+    """Run one rule and return its findings with severity and advice."""
     return [
         Finding(entry.code, found.severity or entry.severity, found.message, entry.fix, found)
         for found in entry.function(context)
