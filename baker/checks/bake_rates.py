@@ -1,4 +1,4 @@
-"""Finds out how fast bakes are here: by the bake that was named, or one that lies beside the scene."""
+"""Speed of bakes on this machine, from the manifest of a named bake or of one beside the scene."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from baker.core.errors import SettingsError
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
 
-# Folders beside a scene that are looked into, and bytes of a manifest that are read.
+# Largest number of folders beside a scene that are searched, and largest manifest that is read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages that grow with texels, and with triangles; the rest grow with rays.
+# Stages whose time is proportional to texels, and to triangles; that of the rest is proportional to rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (
@@ -29,16 +29,16 @@ RAY_STAGES = (
 
 @dataclass(frozen=True)
 class Rates:
-    """How fast bakes are on this machine.
+    """Speed of bakes on this machine.
 
     Attributes
     ----------
     ray : dict of Stage to float
-        Seconds a ray of each stage.
+        Seconds per ray of each stage.
     texel, triangle : float
-        Seconds each of the stages that cast no rays.
+        Seconds per texel and per triangle of the stages that cast no rays.
     basis : str
-        Where this is known from, in words.
+        Source of the numbers, in words.
     """
 
     ray: Mapping[Stage, float]
@@ -55,17 +55,26 @@ def rates_of_bake(manifest: Mapping[str, Any]) -> Rates:
         stage: timings[stage] / rays[stage] for stage in RAY_STAGES if timings.get(stage) and rays.get(stage)
     }
     per_texel = sum(timings.get(stage, 0.0) for stage in BY_TEXEL) / max(texels, 1)
-    # The manifest does not count triangles; cutting and loading are told as they were.
+    # The manifest does not count triangles.
     return Rates(ray, per_texel, 0.0, "an earlier bake")
 
 
 def rates_of(folder: Path) -> Rates:
     """Return the speed of the bake in a folder.
 
+    Parameters
+    ----------
+    folder : Path
+        Output folder of a bake.
+
+    Returns
+    -------
+    Rates
+
     Raises
     ------
     SettingsError
-        If there is none, or it does not tell its rays and timings.
+        If there is none, or its manifest lacks rays and timings.
     """
     try:
         return rates_of_bake(json.loads((folder / MANIFEST_NAME).read_text("utf-8")))
@@ -85,7 +94,7 @@ def rates_beside(scene: Path) -> Rates | None:
     with contextlib.suppress(OSError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
             path = folder / MANIFEST_NAME
-            # Whatever lies there was not asked for: what cannot be read is none of ours.
+            # Skip what cannot be read: the user did not name these folders.
             with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
                 if path.stat().st_size > _MOST_BYTES:
                     continue

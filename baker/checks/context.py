@@ -1,4 +1,4 @@
-"""What is checked: a scene as its file has it, with what checks share about it."""
+"""The context of a check: a scene as its file has it, with values that several rules use."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from baker.checks.bake_rates import Rates
 from baker.checks.direct_light import Levels, estimate_levels
 from baker.checks.emission import Emission, find_emission
-from baker.checks.finding import Place
+from baker.checks.finding import Location
 from baker.checks.mesh_facts import MeshFacts
-from baker.checks.scene_rays import World
 from baker.checks.settings import DEFAULT_MIP
 from baker.checks.uv_facts import UvFacts
+from baker.checks.world_triangles import WorldTriangles
 from baker.core.light_kind import check_light_kinds
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
@@ -24,13 +24,14 @@ from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, 
 
 
 class CheckContext:
-    """A scene with the settings that it is to be baked with.
+    """A scene, the settings of its bake, and values derived from both, each computed once on first use.
 
     Attributes
     ----------
     scene : Scene
-        Loaded leniently, or as a bake has it.
+        Read leniently, or for a bake.
     source : SourceScene
+        The meshes of the file, defective triangles included; of a scene read for a bake, its good triangles.
     settings : BakeSettings
     mip : int
         Mip level of the lightmap down to which charts must not bleed into each other.
@@ -38,7 +39,7 @@ class CheckContext:
     rates : Rates or None
         Speed of an earlier bake.
     probe : bool
-        Measure the speed if it is not known.
+        Measure the speed of rays if there are no rates.
 
     Raises
     ------
@@ -82,7 +83,7 @@ class CheckContext:
             facts = self.meshes[instance.mesh]
             if not len(facts.good):
                 continue
-            # The corners of the mesh's own box reach at least as far as the mesh itself.
+            # Transform the corners of the mesh's own box, which bounds the transformed mesh.
             own = facts.bounds
             box = np.array(list(product(*own.T)))
             world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
@@ -96,22 +97,22 @@ class CheckContext:
         return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
 
     @cached_property
-    def world(self) -> World:
-        """Return all good triangles in the world."""
+    def world(self) -> WorldTriangles:
+        """Return the good triangles of all instances."""
         threads = thread_count(self.settings.threads)
-        return World(
+        return WorldTriangles(
             self.source.instances, self.meshes, self.scene.materials, self.scene.origin, threads=threads
         )
 
     @cached_property
     def used_materials(self) -> list[int]:
-        """Return the materials that good triangles have."""
+        """Return the indices of materials that good triangles have, sorted."""
         used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
         return [int(k) for k in np.unique(np.concatenate(used))] if used else []
 
     @property
-    def wants_light(self) -> bool:
-        """Tell whether anything else than AO is to be baked."""
+    def bakes_light(self) -> bool:
+        """Return whether a channel other than AO is baked."""
         return any(name != "ao" for name in self.settings.channels)
 
     @cached_property
@@ -120,35 +121,35 @@ class CheckContext:
         return find_emission(self.world)
 
     @property
-    def glows(self) -> bool:
-        """Tell whether any triangle emits; one whose part of the emissive texture is black does not."""
+    def emits(self) -> bool:
+        """Return whether any triangle emits. One whose part of the emissive texture is black does not."""
         some = any(max(self.scene.materials[k].emission) > 0 for k in self.used_materials)
         return some and len(self.emission.triangle) > 0
 
     @cached_property
     def levels(self) -> Levels | None:
-        """Return direct light at sample points; None without light, surface, or wish for either."""
+        """Return direct light at sample points; None without light or surface, or for a bake of AO alone."""
         bright = [max(light.intensity) for light in self.scene.lights]
         lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
-        if not self.wants_light or not (lit or self.glows) or not self.world.area.sum() > 0:
+        if not self.bakes_light or not (lit or self.emits) or not self.world.area.sum() > 0:
             return None
         return estimate_levels(self.scene, self.world, self.emission, self.settings)
 
     def uv(self, mesh: int) -> UvFacts:
-        """Return the lightmap uv of a mesh, worked out once."""
+        """Return the lightmap uv of a mesh."""
         if mesh not in self._uv:
             self._uv[mesh] = UvFacts(self.meshes[mesh])
         return self._uv[mesh]
 
-    def place(self, mesh: int) -> Place:
-        """Return where a mesh stands first."""
+    def location(self, mesh: int) -> Location:
+        """Return the first instance of a mesh as the location of a finding."""
         instance = self.first_instance.get(mesh)
         if instance is None:
-            return Place(self.source.meshes[mesh].name)
-        return Place(instance.name or self.source.meshes[mesh].name, instance.node)
+            return Location(self.source.meshes[mesh].name)
+        return Location(instance.name or self.source.meshes[mesh].name, instance.node)
 
     def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
-        """Return a (3,) point of a mesh in the world, where the mesh stands first."""
+        """Return the world position, metres, of a (3,) object-space point in the first instance of a mesh."""
         instance = self.first_instance.get(mesh)
         matrix = np.eye(4) if instance is None else instance.world_from_object
         x, y, z = (float(v) for v in matrix[:3, :3] @ np.asarray(point, np.float64) + matrix[:3, 3])
@@ -163,7 +164,7 @@ def source_scene_of(scene: Scene) -> SourceScene:
 
 
 def _primitives(mesh: Mesh) -> tuple[SourcePrimitive, ...]:
-    # Vertices and triangles of a primitive stand together, in the order of primitives.
+    # Vertices and triangles are sorted by primitive.
     out = []
     for number in np.unique(mesh.primitive):
         rows = slice(*np.searchsorted(mesh.vertex_primitive, [number, number + 1]))

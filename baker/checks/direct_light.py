@@ -1,6 +1,6 @@
 """Direct irradiance at a few hundred points of a scene, before any bake.
 
-E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each where nothing is in the way
+E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each times visibility
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.emission import Emission
-from baker.checks.scene_rays import World
+from baker.checks.world_triangles import WorldTriangles
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.light_kind import kind_of
 from baker.core.scene import PunctualLight, Scene
 from baker.core.settings import BakeSettings
 
-# Receivers, a multiple of 16; rays from each to emissive surfaces, and into the sky.
+# Number of points, a multiple of 16; rays from each to emissive surfaces, and into the sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
@@ -30,7 +30,7 @@ class Levels:
     ----------
     position : (n, 3) float64, metres, relative to `Scene.origin`
     irradiance : (n,) float64, lx, brightest of RGB
-    triangle : (n,) int64, the triangle of `World` each point lies on
+    triangle : (n,) int64, triangle of `WorldTriangles` that each point lies on
     """
 
     position: NDArray[np.float64]
@@ -38,17 +38,24 @@ class Levels:
     triangle: NDArray[np.int64]
 
 
-def estimate_levels(scene: Scene, world: World, emission: Emission, settings: BakeSettings) -> Levels:
-    """Estimate direct light at points spread over all front sides by area.
+def estimate_levels(
+    scene: Scene, world: WorldTriangles, emission: Emission, settings: BakeSettings
+) -> Levels:
+    """Estimate direct light at points on all front sides, stratified by area.
 
     Parameters
     ----------
     scene : Scene
-    world : World
+    world : WorldTriangles
         Its triangles.
     emission : Emission
         Those of them that emit.
     settings : BakeSettings
+        `seed` and the sky are used.
+
+    Returns
+    -------
+    Levels
     """
     random = np.random.default_rng(settings.seed)
     position, normal, triangle = spread_points(world, POINTS, random)
@@ -60,17 +67,19 @@ def estimate_levels(scene: Scene, world: World, emission: Emission, settings: Ba
     total += _emissive(world, emission, origin, normal, random)
     sky = np.array(settings.sky_radiance)
     if sky.any():
-        way = cosine_ways(normal, SKY_RAYS, random)
-        far = np.full(len(way), 1e30)
-        hit, _ = world.first_hits(np.repeat(origin, SKY_RAYS, axis=0), way, np.zeros(len(way)), far)
+        direction = cosine_directions(normal, SKY_RAYS, random)
+        far = np.full(len(direction), 1e30)
+        hit, _ = world.first_hits(
+            np.repeat(origin, SKY_RAYS, axis=0), direction, np.zeros(len(direction)), far
+        )
         total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
     return Levels(position, total.max(axis=1), triangle)
 
 
 def spread_points(
-    world: World, n: int, random: np.random.Generator
+    world: WorldTriangles, n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return n points, stratified by area, with the normal of their face and its number."""
+    """Return n points, stratified by area: positions (n, 3), face normals (n, 3) and triangles (n,)."""
     share = np.cumsum(world.area)
     pick = (np.arange(n) + random.random(n)) / n * share[-1]
     triangle = np.minimum(np.searchsorted(share, pick), len(share) - 1)
@@ -78,12 +87,12 @@ def spread_points(
 
 
 def points_inside(
-    world: World,
+    world: WorldTriangles,
     triangle: NDArray[np.int64],
     random: np.random.Generator,
     part: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return a random point of each triangle, or of a part of it (n, 3), see `Emission.inside`."""
+    """Return a random point of each triangle, (n, 3), or of the part of it that `Emission.inside` gives."""
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
@@ -97,9 +106,10 @@ def points_inside(
 
 
 def _punctual(
-    world: World, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
+    world: WorldTriangles, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    # A kind of light fills rows of 16 points.
+    """Return the irradiance of a light without area at (n, 3) points, (n, 3) float64."""
+    # `LightKind.fill` takes rows of 16 points.
     shape = (len(origin) // 16, 16)
     ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
     at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
@@ -111,13 +121,13 @@ def _punctual(
 
 
 def _emissive(
-    world: World,
+    world: WorldTriangles,
     found: Emission,
     origin: NDArray[np.float64],
     normal: NDArray[np.float64],
     random: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Light from emissive triangles, by points chosen by power, (n, 3) float64."""
+    """Return the irradiance of emissive triangles, (n, 3) float64, by points on them chosen by power."""
     power = found.area * (found.radiance @ _LUMINANCE)
     total = np.zeros((len(origin), 3))
     if not power.sum() > 0:
@@ -126,21 +136,25 @@ def _emissive(
     for _ in range(EMITTER_RAYS):
         part = np.minimum(np.searchsorted(share, random.random(len(origin))), len(share) - 1)
         chosen = found.triangle[part]
-        way = points_inside(world, chosen, random, found.inside[part]) - origin
-        square = np.maximum(np.einsum("nx,nx->n", way, way), 1e-20)
-        here = np.einsum("nx,nx->n", way, normal)
-        there = -np.einsum("nx,nx->n", way, world.normal[chosen])
+        direction = points_inside(world, chosen, random, found.inside[part]) - origin
+        square = np.maximum(np.einsum("nx,nx->n", direction, direction), 1e-20)
+        here = np.einsum("nx,nx->n", direction, normal)
+        there = -np.einsum("nx,nx->n", direction, world.normal[chosen])
         there = np.where(world.double_sided[chosen], np.abs(there), there)
-        hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 0.9999))
+        hit, _ = world.first_hits(
+            origin, direction, np.zeros(len(direction)), np.full(len(direction), 0.9999)
+        )
         geometry = np.maximum(here, 0) * np.maximum(there, 0) / square**2 * (hit < 0)
         density = power[part] / power.sum() / np.maximum(found.area[part], 1e-300)
         total += found.radiance[part] * (geometry / density)[:, None] / EMITTER_RAYS
     return total
 
 
-def cosine_ways(normal: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
+def cosine_directions(
+    normal: NDArray[np.float64], n: int, random: np.random.Generator
+) -> NDArray[np.float64]:
     """Return n cosine-weighted directions around each normal, (N n, 3) float64."""
-    way = random.normal(size=(len(normal) * n, 3))
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    out: NDArray[np.float64] = way * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)
+    direction = random.normal(size=(len(normal) * n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    out: NDArray[np.float64] = direction * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)
     return out

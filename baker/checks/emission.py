@@ -1,4 +1,4 @@
-"""What each triangle of the file emits: exact means of emissive textures, and where on it the light is."""
+"""Emission of each triangle of the file: exact means of emissive textures over triangles or parts of them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.checks.scene_rays import World
+from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Parts that textured triangles are cut into, beside what they were.
+# Largest number of parts that cutting adds to the textured triangles.
 _MOST_PARTS = 2048
 
 
@@ -21,9 +21,9 @@ class Emission:
     Attributes
     ----------
     triangle : (E,) int64
-        Triangle of `World`.
+        Triangle of `WorldTriangles`.
     inside : (E, 3) float64
-        Which part of it, see `baker.lights.emissive_texture.Parts`.
+        The part of it, see `baker.lights.emissive_texture.Parts`.
     radiance : (E, 3) float64
         Mean, cd/m2.
     area : (E,) float64, m2
@@ -35,17 +35,17 @@ class Emission:
     area: NDArray[np.float64]
 
 
-def find_emission(world: World) -> Emission:
-    """Find what emits; triangles whose part of the texture is black do not."""
+def find_emission(world: WorldTriangles) -> Emission:
+    """Find the triangles that emit. Those whose part of the texture is black do not."""
     materials = world.materials
     factor = np.array([m.emission for m in materials], np.float64).reshape(-1, 3)
     emits = np.flatnonzero((factor.max(axis=1, initial=0.0) > 0)[world.material] & (world.area > 0))
     textured = np.array([m.emission_texture is not None for m in materials], bool)[world.material[emits]]
-    plain, image = emits[~textured], emits[textured]
-    triangle, inside = plain, np.tile([0.0, 0.0, 1.0], (len(plain), 1))
-    radiance = factor[world.material[plain]]
+    untextured, image = emits[~textured], emits[textured]
+    triangle, inside = untextured, np.tile([0.0, 0.0, 1.0], (len(untextured), 1))
+    radiance = factor[world.material[untextured]]
     if len(image):
-        # Kernels are compiled for files that have such textures only.
+        # Import, and compile, these kernels only for files with emissive textures.
         from baker.kernels.textures import pack_textures
         from baker.lights.emissive_texture import EmissiveTextures, cut
 
@@ -63,20 +63,20 @@ def find_emission(world: World) -> Emission:
     return Emission(triangle, inside, radiance, world.area[triangle] * inside[:, 2] ** 2)
 
 
-def _image_uv(world: World, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
-    """Return where the corners of triangles lie in a texture, (n, 3, 2); (0, 0) without such a set."""
+def _image_uv(world: WorldTriangles, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
+    """Return the uv of triangles' corners in a texture, (n, 3, 2) float64; 0 without the uv set."""
     out = np.zeros((len(triangle), 3, 2))
     for k in np.unique(world.instance[triangle]):
         own = np.flatnonzero(world.instance[triangle] == k)
-        place = world.instances[k]
-        facts = world.meshes[place.mesh]
+        instance = world.instances[k]
+        facts = world.meshes[instance.mesh]
         sets = [p.texcoord.get(texture.texcoord) for p in facts.source.primitives]
         known = [
             np.zeros((len(p.position), 2)) if uv is None or len(uv) != len(p.position) else uv
             for p, uv in zip(facts.source.primitives, sets, strict=True)
         ]
         corner = facts.triangle[world.face[triangle[own]]]
-        if np.linalg.det(place.world_from_object[:3, :3]) < 0:
+        if np.linalg.det(instance.world_from_object[:3, :3]) < 0:
             corner = corner[:, ::-1]
         given = np.array([uv is not None for uv in sets])[facts.primitive[world.face[triangle[own]]]]
         uv = np.concatenate(known)[corner].astype(np.float64)

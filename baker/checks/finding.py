@@ -1,24 +1,24 @@
-"""What a check found: where, how often, how bad, and what to do."""
+"""Findings of checks: location, count, severity and advice."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
 
-# From harmless to harmful; the position is the rank.
+# In ascending order; the index is the rank.
 SEVERITIES = ("info", "warning", "error")
-# Most face numbers or face pairs that one finding names.
+# Largest number of faces or face pairs that one finding lists.
 MOST_FACES = 10
 
 
 @dataclass(frozen=True)
-class Place:
-    """The thing that a finding is about.
+class Location:
+    """The object that a finding is about.
 
     Attributes
     ----------
     object : str
-        Name of the node (of a mesh that stands in several places: the first), light or material.
+        Name of the node (the first one that shows the mesh), light or material; empty for the whole scene.
     node : int or None
         glTF node index.
     """
@@ -29,33 +29,33 @@ class Place:
 
 @dataclass(frozen=True)
 class RawFinding:
-    """What a check function yields; the check's own severity and advice are added by `run_check`.
+    """A finding as a rule yields it; `run_check` adds the severity and advice of the rule.
 
     Attributes
     ----------
     message : str
         One sentence with the numbers.
-    place : Place
+    location : Location
     count : int
-        How many faces, vertices, edges ... are concerned.
+        Number of faces, vertices, edges ... concerned.
     percent : float or None
         Share of the object concerned.
     primitive : int or None
         Primitive of the first face concerned.
     faces : tuple of int
-        Up to ten face numbers, counted within their primitive.
+        Up to `MOST_FACES` face numbers within their primitive.
     pairs : tuple of (int, int)
-        Up to ten pairs of faces.
+        Up to `MOST_FACES` pairs of faces.
     position : (3,) tuple or None
-        A place in the world, metres, where to look.
+        World position of the defect, metres.
     severity : str or None
-        Where it differs from the check's.
+        Overrides the severity of the rule.
     more : dict
-        Further numbers for machines.
+        Further keys of the finding in `--json`.
     """
 
     message: str
-    place: Place = field(default_factory=Place)
+    location: Location = field(default_factory=Location)
     count: int = 1
     percent: float | None = None
     primitive: int | None = None
@@ -68,7 +68,7 @@ class RawFinding:
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding as it is reported."""
+    """A finding with the severity and advice of its rule."""
 
     code: str
     severity: str
@@ -79,12 +79,12 @@ class Finding:
     @property
     def object(self) -> str:
         """Return the name of the object concerned, empty for the whole scene."""
-        return self.found.place.object
+        return self.found.location.object
 
     @property
     def node(self) -> int | None:
         """Return the node index of the object concerned."""
-        return self.found.place.node
+        return self.found.location.node
 
     @property
     def rank(self) -> int:
@@ -93,7 +93,7 @@ class Finding:
 
 
 def finding_json(finding: Finding) -> dict[str, Any]:
-    """Return a finding as plain JSON values; what does not apply is left out, the contract's keys stay."""
+    """Return a finding as JSON values. Keys after `fix` are left out where they do not apply."""
     found = finding.found
     value: dict[str, Any] = {
         "code": finding.code,

@@ -1,4 +1,4 @@
-"""Findings that somebody has looked at and accepted: `CODE`, or `CODE@OBJECT`, both with `*`."""
+"""Accepted findings, which do not fail a check: `CODE` or `CODE@OBJECT`, both may contain `*`."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from baker.core.names import unknown_name
 
 @dataclass(frozen=True)
 class Ignore:
-    """One rule."""
+    """A pattern of accepted findings."""
 
     code: str
     object: str = "*"
 
     def matches(self, code: str, name: str) -> bool:
-        """Tell whether the rule covers a finding."""
+        """Return whether the pattern matches a finding's code and object."""
         return fnmatchcase(code, self.code) and fnmatchcase(name, self.object)
 
 
 def parse_ignore(rules: Iterable[str]) -> list[Ignore]:
-    """Return the rules of `CODE[@OBJECT]` texts.
+    """Return the patterns of `CODE[@OBJECT]` texts.
 
     Raises
     ------

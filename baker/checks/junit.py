@@ -1,4 +1,4 @@
-"""A check's result as JUnit cases: one for each scene and code."""
+"""The result of a check as JUnit test cases, one for each scene and code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,18 @@ from baker.io.junit import Case, junit_text
 
 
 def check_junit(reports: Sequence[CheckReport]) -> str:
-    """Return the JUnit document; findings below the limit do not fail a case."""
+    """Return the JUnit document. Findings below `fail_on` do not fail a case.
+
+    Parameters
+    ----------
+    reports : sequence of CheckReport
+        One for each scene.
+
+    Returns
+    -------
+    str
+        XML text.
+    """
     cases = []
     for report in reports:
         limit = SEVERITIES.index(report.fail_on)

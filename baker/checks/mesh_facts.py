@@ -1,4 +1,4 @@
-"""What several checks need to know of one mesh, each worked out once: faces, edges, pieces."""
+"""Properties of a mesh that several rules use, each computed once on first use: faces, edges, pieces."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from baker.topology.weld import number_by_first, number_rows
 
 
 class MeshFacts:
-    """A mesh of the file with its triangles sorted into good and bad.
+    """A mesh of the file, and which of its triangles a bake can use.
 
-    Faces are numbered over all primitives; `primitive` and `local` say where the file has them.
+    Faces are numbered over all primitives, without those that only stitch a triangle strip.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class MeshFacts:
         Primitive of each face and its number in it.
     material : (T,) int32
     trusted : bool
-        The importer has left bad faces out already: nothing is looked for twice.
+        The importer has removed bad faces already; all faces count as good.
     """
 
     def __init__(self, source: SourceMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
@@ -42,7 +42,7 @@ class MeshFacts:
         for k, p in enumerate(source.primitives):
             number = np.arange(len(p.triangle))
             if p.stitched:
-                # Triangles with a repeated index only join the pieces of a strip.
+                # Drop triangles with a repeated index, which only join the pieces of a strip.
                 t = p.triangle
                 number = number[(t[:, 0] != t[:, 1]) & (t[:, 1] != t[:, 2]) & (t[:, 2] != t[:, 0])]
             parts.append(p.triangle[number] + start[k])
@@ -57,7 +57,7 @@ class MeshFacts:
 
     @cached_property
     def within(self) -> NDArray[np.bool_]:
-        """Tell which faces name only vertices of their own primitive, (T,) bool."""
+        """Return which faces have indices of vertices of their own primitive only, (T,) bool."""
         if self.trusted:
             return np.ones(len(self.triangle), bool)
         low, high = self.vertex_start[self.primitive], self.vertex_start[self.primitive + 1]
@@ -65,7 +65,7 @@ class MeshFacts:
 
     @cached_property
     def usable(self) -> NDArray[np.bool_]:
-        """Tell which faces have finite corners within range, (T,) bool; false where an index is wrong."""
+        """Return which faces have valid indices and usable coordinates (`usable_vertices`), (T,) bool."""
         if self.trusted:
             return self.within
         good = usable_vertices(self.position)
@@ -77,7 +77,7 @@ class MeshFacts:
 
     @cached_property
     def flat(self) -> NDArray[np.bool_]:
-        """Tell which usable faces have no area, (T,) bool."""
+        """Return which usable faces have no area, (T,) bool."""
         found = np.zeros(len(self.triangle), bool)
         if self.trusted:
             return found
@@ -87,7 +87,7 @@ class MeshFacts:
 
     @cached_property
     def repeated(self) -> NDArray[np.bool_]:
-        """Tell which usable faces with area repeat an earlier one, (T,) bool."""
+        """Return which usable faces with area repeat an earlier one, (T,) bool."""
         found = np.zeros(len(self.triangle), bool)
         if self.trusted:
             return found
@@ -114,7 +114,7 @@ class MeshFacts:
 
     @cached_property
     def area_vector(self) -> NDArray[np.float64]:
-        """Return the good faces' normals as long as their area, (G, 3) float64, object space."""
+        """Return normals of the good faces whose length is the area, (G, 3) float64, object space."""
         return 0.5 * face_normal(self.position, self.triangle[self.good])
 
     @cached_property
@@ -125,21 +125,21 @@ class MeshFacts:
 
     @cached_property
     def double_sided(self) -> NDArray[np.bool_]:
-        """Tell which good faces have a double-sided material, (G,) bool."""
+        """Return which good faces have a double-sided material, (G,) bool."""
         return np.array([m.double_sided for m in self.materials], bool)[self.material[self.good]]
 
     @cached_property
     def welded(self) -> NDArray[np.int64]:
-        """Return for each corner of the good faces the number of its position, (G, 3) int64."""
+        """Return the good faces' corners as numbers of positions, (G, 3) int64: equal positions share one."""
         corner = self.triangle[self.good]
         return number_rows(self.position)[corner]
 
     @cached_property
     def single(self) -> NDArray[np.bool_]:
-        """Tell which good faces have no twin of the opposite winding, (G,) bool."""
+        """Return which good faces share their three positions with no other good face, (G,) bool."""
         ordered = np.sort(self.welded, axis=1)
         n = int(ordered.max(initial=0)) + 1
-        # One number for three would overflow: the hash of the last two is enough to find candidates.
+        # Hash the three numbers to one key: their product may exceed 64 bits.
         key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
         key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
         order = np.argsort(key)
@@ -151,17 +151,17 @@ class MeshFacts:
 
     @cached_property
     def edges(self) -> Edges:
-        """Return the edges of the good faces without twins (row numbers refer to `sheet`)."""
+        """Return the edges of the faces of `sheet`, whose rows `Edges.face` counts."""
         return find_edges(self.welded[self.sheet])
 
     @cached_property
     def sheet(self) -> NDArray[np.int64]:
-        """Return the rows of `good` that `edges` is made of: no face with a twin of the other winding."""
+        """Return the rows of `good` without a twin (see `single`), (S,) int64."""
         return np.flatnonzero(self.single)
 
     @cached_property
     def piece(self) -> NDArray[np.int32]:
-        """Return the piece of each face of `sheet`: faces that hang together by edges."""
+        """Return the piece of each face of `sheet`, (S,) int32: faces connected by edges."""
         return number_by_first(self.edges.connected_faces(len(self.sheet)))
 
     @cached_property
@@ -171,7 +171,7 @@ class MeshFacts:
 
     @cached_property
     def closed(self) -> NDArray[np.bool_]:
-        """Tell which pieces have two faces at every edge, wound alike, (P,) bool."""
+        """Return which pieces have two consistently wound faces at every edge, (P,) bool."""
         edges = self.edges
         fine = (edges.count == 2) & (edges.balance == 0)
         closed = np.ones(self.n_pieces, bool)
@@ -180,16 +180,16 @@ class MeshFacts:
 
     @cached_property
     def volume(self) -> NDArray[np.float64]:
-        """Return the signed volume of each piece, (P,) float64; meaningful where `closed`."""
+        """Return the signed volume of each piece, (P,) float64, object space; meaningful where `closed`."""
         corner = self.corner[self.sheet]
         corner = corner - corner.mean(axis=(0, 1))
         six = np.einsum("gx,gx->g", corner[:, 0], 2.0 * self.area_vector[self.sheet])
         return np.bincount(self.piece, six / 6.0, minlength=self.n_pieces).astype(np.float64)
 
     def named(self, faces: NDArray[np.integer], most: int = 10) -> tuple[int, ...]:
-        """Return the first few faces' numbers within their primitives."""
+        """Return the numbers within their primitives of the first `most` faces."""
         return tuple(int(k) for k in self.local[faces[:most]])
 
     def primitive_of(self, faces: NDArray[np.integer]) -> int | None:
-        """Return the source number of the primitive that the first face belongs to."""
+        """Return the number in the file of the first face's primitive, or None without faces."""
         return int(self.source.primitives[self.primitive[faces[0]]].index) if len(faces) else None

@@ -1,4 +1,4 @@
-"""A check's result as JSON and as text."""
+"""The result of a check as JSON and as text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,20 @@ from baker.checks.scenes import Unreadable
 
 
 def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable] = ()) -> dict[str, Any]:
-    """Return the object of `--json`, for one scene or several."""
+    """Return the object of `--json`, for one scene or several.
+
+    Parameters
+    ----------
+    reports : sequence of CheckReport
+        One for each scene that could be read.
+    unreadable : sequence of Unreadable
+        The other scenes; they fail the check.
+
+    Returns
+    -------
+    dict
+        Keys `passed`, `fail_on`, `findings` and `scenes`.
+    """
     scenes: list[dict[str, Any]] = [
         {
             "scene": str(report.path),
@@ -40,7 +53,19 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
 
 
 def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: bool = False) -> None:
-    """Write findings one a line, with what to do below each; infos only with -v, the cost if asked for."""
+    """Write one line for each finding with its advice below, and a summary.
+
+    Parameters
+    ----------
+    report : CheckReport
+        The result for one scene.
+    stream : TextIO
+        Where to write.
+    verbose : int
+        Above 0: also findings of severity info, and face numbers.
+    cost : bool
+        Also the finding `cost`, with the share of each object.
+    """
     shown = [
         finding
         for finding in report.findings

@@ -1,4 +1,4 @@
-"""Runs every check on a scene and says whether it passed."""
+"""Runs all rules on a scene."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 
 from baker.checks.bake_rates import rates_beside, rates_of
 from baker.checks.context import CheckContext
-from baker.checks.finding import SEVERITIES, Finding, Place, RawFinding
+from baker.checks.finding import SEVERITIES, Finding, Location, RawFinding
 from baker.checks.ignore import Ignore, parse_ignore
 from baker.checks.rule import CHECKS, all_checks, run_check
 from baker.checks.settings import CheckSettings, with_extras
 from baker.core.errors import IndexRangeError
 from baker.core.progress import Progress, silent
-from baker.core.progress import report as tell_progress
+from baker.core.progress import report as report_progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
@@ -23,16 +23,21 @@ from baker.io.load import load_for_bake
 
 @dataclass(frozen=True)
 class CheckReport:
-    """All that was found about one scene.
+    """The findings about one scene.
 
     Attributes
     ----------
     path : Path
     findings : tuple of Finding
-        Worst first.
+        By severity, worst first, then by code and object.
     ignored : tuple of Finding
+        Findings that `ignore` accepts.
     fail_on : str
+        Least severity that fails the check.
     seconds : float
+        Duration of reading and checking.
+    timings : dict of str to float
+        Seconds of each rule by its code, and of reading the scene by "load".
     """
 
     path: Path
@@ -44,7 +49,7 @@ class CheckReport:
 
     @property
     def passed(self) -> bool:
-        """Tell whether nothing reaches the limit."""
+        """Return whether no finding has the severity `fail_on` or a higher one."""
         limit = SEVERITIES.index(self.fail_on)
         return all(finding.rank < limit for finding in self.findings)
 
@@ -55,15 +60,23 @@ def check_scene(
     bake_settings: BakeSettings,
     progress: Progress = silent,
 ) -> CheckReport:
-    """Read a scene leniently and run every check on it.
+    """Read a scene leniently and run every rule on it.
 
     Parameters
     ----------
     path : Path or str
+        The scene file.
     settings : CheckSettings
+        The scene's own extras are added to them.
     bake_settings : BakeSettings
-        What the scene is to be baked with: resolution, padding, uv, sky ...
+        Settings of the bake that is checked for: resolution, padding, uv, sky ...
     progress : Progress
+        Called with the stage "checks".
+
+    Returns
+    -------
+    CheckReport
+        All findings, those about the file included.
 
     Raises
     ------
@@ -105,7 +118,7 @@ def _run(
     found: list[Finding] = []
     entries = all_checks()
     for k, entry in enumerate(entries):
-        tell_progress(progress, Stage.CHECKS, k / len(entries))
+        report_progress(progress, Stage.CHECKS, k / len(entries))
         begin = time.perf_counter()
         found += run_check(entry, context)
         timings[entry.code] = time.perf_counter() - begin
@@ -113,9 +126,9 @@ def _run(
 
 
 def _index_range(error: IndexRangeError) -> Finding:
-    # Some formats cannot be taken apart any further once an index is wrong.
+    # An importer that stops at a wrong index returns no scene that other rules could read.
     entry = CHECKS.require("index-range", "check")
-    found = RawFinding(error.message, Place(error.object or ""))
+    found = RawFinding(error.message, Location(error.object or ""))
     return Finding(entry.code, entry.severity, error.message, entry.fix, found)
 
 

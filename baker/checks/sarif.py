@@ -1,4 +1,4 @@
-"""A check's result as SARIF, which code hosts show beside the files concerned.
+"""The result of a check as SARIF, which code hosts show beside the files concerned.
 
 Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0, 2020.
 """
@@ -24,8 +24,14 @@ def sarif_log(reports: Sequence[CheckReport], folder: Path) -> dict[str, Any]:
     Parameters
     ----------
     reports : sequence of CheckReport
+        One for each scene.
     folder : Path
-        Scenes below it are named relative to it, as code hosts want.
+        Scenes below it have URIs relative to it, which code hosts resolve against the repository.
+
+    Returns
+    -------
+    dict
+        The SARIF log as JSON values.
     """
     checks = all_checks()
     index = {entry.code: k for k, entry in enumerate(checks)}
@@ -73,7 +79,7 @@ def _result(finding: Finding, index: dict[str, int], uri: str, *, suppressed: bo
         "level": _LEVEL[finding.severity],
         "message": {"text": f"{where}{finding.message}. To do: {finding.fix}."},
         "locations": [location],
-        # Stays the same while other findings come and go.
+        # Independent of other findings and of counts.
         "partialFingerprints": {"object/v1": f"{finding.code}@{finding.object}"},
         "properties": finding_json(finding),
     }

@@ -1,4 +1,4 @@
-"""Which scene files are meant, and their checks one after the other."""
+"""Scene files of paths, folders and patterns, checked one after the other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,17 @@ class Unreadable:
 
 
 def find_scenes(paths: Sequence[Path]) -> list[Path]:
-    """Return the scene files that paths, folders (all scenes below) and patterns (`*`) stand for, each once.
+    """Return the scene files of paths, folders and patterns, each once.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files; folders, of which all scenes below are taken; patterns with `*`, `?` or `[`.
+
+    Returns
+    -------
+    list of Path
+        In the order of `paths`, those of a folder or pattern sorted.
 
     Raises
     ------
@@ -41,7 +51,7 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
                 raise InputError(f"there is no scene file ({', '.join(sorted(known))}) below", file=str(path))
             found.update(dict.fromkeys(inside))
         elif not path.exists() and glob.has_magic(str(path)):
-            # Shells that do not expand patterns leave it to us.
+            # Expand patterns for shells that do not.
             root = Path(path.anchor)
             matches = sorted(root.glob(str(path.relative_to(root))))
             if not matches:
@@ -55,7 +65,25 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
 def check_scenes(
     paths: Sequence[Path], settings: CheckSettings, bake_settings: BakeSettings, progress: Progress = silent
 ) -> tuple[list[CheckReport], list[Unreadable]]:
-    """Check scenes; of several, one that cannot be read does not stop the others.
+    """Check scenes. Of several, one that cannot be read does not stop the others.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Scene files.
+    settings : CheckSettings
+        What fails a check, and what is ignored.
+    bake_settings : BakeSettings
+        Settings of the bake that is checked for.
+    progress : Progress
+        Called with the stage "checks", once through for each scene.
+
+    Returns
+    -------
+    reports : list of CheckReport
+        Of the scenes that could be read.
+    unreadable : list of Unreadable
+        The others.
 
     Raises
     ------

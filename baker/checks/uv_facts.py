@@ -1,4 +1,4 @@
-"""What checks need to know of a mesh's lightmap uv: its triangles, areas, charts."""
+"""Properties of a mesh's lightmap uv that several rules use: triangles, areas, charts."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from baker.checks.mesh_facts import MeshFacts
 from baker.topology.weld import connected_vertices, number_rows
+from baker.uv.check import RANGE_SLACK
 
 LIGHTMAP_SET = 1
-# A lightmap uv may lie this far outside 0..1: exporters round.
-RANGE_SLACK = 1e-4
 
 
 class UvFacts:
@@ -42,17 +41,17 @@ class UvFacts:
 
     @cached_property
     def finite(self) -> NDArray[np.bool_]:
-        """Tell which rows have finite uv."""
+        """Return which rows have finite uv, (F,) bool."""
         return np.asarray(np.isfinite(self.uv).all(axis=(1, 2)))
 
     @cached_property
     def valid(self) -> bool:
-        """Tell whether all uv are finite and lie in 0..1, or nearly, so that the rest can be looked at."""
+        """Return whether there are rows, and all are finite and inside the page: what other rules require."""
         return bool(len(self.rows)) and bool(self.finite.all()) and not self.outside.any()
 
     @cached_property
     def outside(self) -> NDArray[np.bool_]:
-        """Tell which rows reach out of 0..1 by more than exporters round."""
+        """Return which rows leave 0..1 by more than `RANGE_SLACK`, (F,) bool."""
         with np.errstate(invalid="ignore"):
             return np.asarray(((self.uv < -RANGE_SLACK) | (self.uv > 1.0 + RANGE_SLACK)).any(axis=(1, 2)))
 
@@ -70,7 +69,7 @@ class UvFacts:
 
     @cached_property
     def chart(self) -> NDArray[np.int32]:
-        """Return the chart of each row: pieces connected in space and in uv."""
+        """Return the chart of each row, (F,) int32: pieces connected both in space and in uv."""
         label = number_rows(np.concatenate([self.facts.position, self._vertex], axis=1))
         return connected_vertices(label[self.triangle], int(label.max(initial=-1)) + 1)
 
@@ -80,5 +79,5 @@ class UvFacts:
         return int(self.chart.max(initial=-1)) + 1
 
     def per_chart(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the sums of a value over the charts."""
+        """Return the sum of (F,) values over each chart, (C,) float64."""
         return np.bincount(self.chart, value, self.n_charts).astype(np.float64)

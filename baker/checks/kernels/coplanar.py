@@ -16,16 +16,17 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
     Parameters
     ----------
     corner : (T, 3, 2) float64
-        In the coordinates of the plane; triangles of one plane stand together, sorted by `low` along x.
+        In the coordinates of their plane, grouped by plane and sorted by `low` along x.
     low, high : (T, 2) float64
-        Bounds of each triangle.
+        Bounding box of each triangle.
     first : (P + 1,) int64
-        Where each plane's triangles start.
+        First triangle of each plane; the last entry is T.
     owner : (T,) int64
+        Object of each triangle.
     slack : float
-        Triangles that overlap by no more than this along some axis only touch.
+        Triangles whose overlap along some axis is at most this do not count. Unit of `corner`.
     partner : (T,) int64
-        In and out: -1 where none is known.
+        In and out: a triangle of another owner, -1 where none was found yet.
     """
     for p in range(len(first) - 1):
         for i in range(first[p], first[p + 1]):
@@ -43,7 +44,7 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
 
 @njit(cache=True, nogil=True)
 def _apart(a, b, slack):
-    """Tell whether a side of `a` has all of `b` on its far side, but for `slack`."""
+    """Return whether a side of `a` (3, 2) separates all of `b` (3, 2) from it, up to `slack`."""
     turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
     sign = 1.0 if turn > 0.0 else -1.0
     for k in range(3):

@@ -6,12 +6,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+# Entries of `counts`: samples covered, samples covered again, triangles that cover samples of an earlier one,
+# pairs listed.
+COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
+
 
 @njit(cache=True, nogil=True)
 def cover_pairs(corner, slack, owner, pairs, counts):
-    """Mark the samples that each triangle covers; note who had them before.
+    """Mark the samples that each triangle covers, and list pairs of triangles that share samples.
 
-    Sample (r, c) lies at (c + 0.5, r + 0.5) and counts for a triangle if it is further than `slack` inside.
+    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers it if it lies inside by more than `slack`.
 
     Parameters
     ----------
@@ -22,7 +26,7 @@ def cover_pairs(corner, slack, owner, pairs, counts):
     pairs : (K, 2) int64
         Out: the first K pairs of triangles that share samples, each counted once for each later triangle.
     counts : (4,) int64
-        Out: samples covered, samples covered again, triangles that cover another one's samples, pairs noted.
+        In and out: see `COVERED` to `LISTED`.
     """
     height, width = owner.shape
     for t in range(len(corner)):
@@ -31,19 +35,21 @@ def cover_pairs(corner, slack, owner, pairs, counts):
         cx, cy = corner[t, 2, 0], corner[t, 2, 1]
         if (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
-        # Unit normals inwards; a side of no length gives nan, and nan covers nothing.
+        # Divide by the sides' lengths below; skip triangles with a side of no length.
         l0 = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         l1 = np.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
         l2 = np.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
         if l0 == 0.0 or l1 == 0.0 or l2 == 0.0:
             continue
         last = 0
+        # Visit the samples in the bounding box.
         for r in range(max(0, int(min(ay, by, cy) - 0.5)), min(height - 1, int(max(ay, by, cy) + 0.5)) + 1):
             y = r + 0.5
             for c in range(
                 max(0, int(min(ax, bx, cx) - 0.5)), min(width - 1, int(max(ax, bx, cx) + 0.5)) + 1
             ):
                 x = c + 0.5
+                # Distance to the nearest side, positive inside.
                 nearest = min(
                     ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / l0,
                     ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / l1,
@@ -53,13 +59,13 @@ def cover_pairs(corner, slack, owner, pairs, counts):
                     continue
                 before = owner[r, c]
                 if before == 0:
-                    counts[0] += 1
+                    counts[COVERED] += 1
                 else:
-                    counts[1] += 1
+                    counts[COVERED_AGAIN] += 1
                     if last == 0:
-                        counts[2] += 1
-                    if before != last and counts[3] < len(pairs):
-                        pairs[counts[3], 0], pairs[counts[3], 1] = before - 1, t
-                        counts[3] += 1
+                        counts[OVERLAPPING] += 1
+                    if before != last and counts[LISTED] < len(pairs):
+                        pairs[counts[LISTED], 0], pairs[counts[LISTED], 1] = before - 1, t
+                        counts[LISTED] += 1
                     last = before
                 owner[r, c] = t + 1

@@ -1,4 +1,4 @@
-"""Checks of single faces and vertices: what the file says that no bake can use."""
+"""Rules about single faces and vertices that a bake cannot use, or hardly."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.topology.slivers import find_slivers
@@ -22,10 +22,19 @@ def faces_found(
 
     Parameters
     ----------
+    context : CheckContext
+    mesh : int
+        Index into `context.meshes`.
+    faces : (n,) int
+        The first one gives primitive and position.
     what : str
         The message, with `{n}` for the count and `{some}` for "1 face" or "n faces".
     whole : int or None
-        What the percentage is of; all faces by default.
+        Count that is 100 %; all faces of the mesh by default.
+
+    Returns
+    -------
+    RawFinding
     """
     facts = context.meshes[mesh]
     n = len(faces)
@@ -39,7 +48,7 @@ def faces_found(
         position = context.to_world(mesh, corner[finite][0]) if finite.any() else None
     return RawFinding(
         what.format(n=n, some="1 face" if n == 1 else f"{n} faces"),
-        context.place(mesh),
+        context.location(mesh),
         n,
         percent=100.0 * n / max(len(facts.triangle) if whole is None else whole, 1),
         primitive=facts.primitive_of(faces),
@@ -59,7 +68,7 @@ def _each(context: CheckContext) -> Iterator[tuple[int, MeshFacts]]:
     fix="export the mesh again: its index buffer belongs to other vertices",
 )
 def index_range(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces that name a vertex which does not exist.
+    """Faces with the index of a vertex that does not exist.
 
     The index buffer and the vertices do not belong together. A bake refuses such a file.
     """
@@ -95,9 +104,9 @@ def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
 def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area: a line or a point.
 
-    Nothing can be seen of them and a bake leaves them out, but a collapsed face often stands where a real
-    one was meant to be. The limit is a height of 1e-7 of the longest side, below which the plane of the
-    face is only rounding.
+    They are not visible and a bake leaves them out, but a collapsed face may leave a hole where a real one
+    was intended. The limit is a height of 1e-7 of the longest side, below which the plane of the face
+    consists of rounding errors.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.flat)
@@ -115,7 +124,7 @@ def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces less than a fiftieth as high as long.
 
     A sliver has hardly a texel of its own: at a length of 50 texels it is less than one texel high. The
-    thinner it is, the more its normal consists of rounding. By the same limit, `--repair` remeshes meshes of
+    thinner it is, the more its normal consists of rounding. By the same limit, `repair` remeshes meshes of
     500 faces or more of which a tenth are slivers.
     """
     for m, facts in _each(context):
@@ -135,9 +144,9 @@ def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
 def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that repeat another one of the same mesh, corner by corner.
 
-    Two surfaces in the same place shadow each other at random. A bake keeps the first of each; engines
-    keep both. A face with the opposite winding is the other's back and no double, unless their material is
-    double-sided anyway.
+    Two surfaces at the same position shadow each other at random. A bake keeps the first of each; engines
+    keep both. A face with the opposite winding is the back of the other and no duplicate, unless their
+    material is double-sided.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.repeated)
@@ -152,7 +161,7 @@ def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="delete the object, or export its faces as triangles",
 )
 def no_triangles(context: CheckContext) -> Iterator[RawFinding]:
-    """Meshes of which nothing can be baked.
+    """Meshes without any usable triangle.
 
     An error if the whole scene holds no usable triangle: a bake then refuses it.
     """
@@ -161,5 +170,4 @@ def no_triangles(context: CheckContext) -> Iterator[RawFinding]:
         return
     for m, facts in _each(context):
         if not len(facts.good):
-            place: Place = context.place(m)
-            yield RawFinding("the mesh has no usable triangle", place, len(facts.triangle))
+            yield RawFinding("the mesh has no usable triangle", context.location(m), len(facts.triangle))

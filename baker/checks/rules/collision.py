@@ -1,4 +1,4 @@
-"""Meshes that an engine takes for collision only, by the names that engines and their exporters know."""
+"""Meshes that engines use for collision only, by the naming conventions of engines and exporters."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
 # Unreal: UCX_, UBX_, USP_, UCP_, MCDCX_; Godot: -colonly, -convcolonly, -navmesh, -occonly; plain words.
@@ -27,16 +27,16 @@ _NAME = re.compile(
 def collision_hull(context: CheckContext) -> Iterator[RawFinding]:
     """An object with the name of a collision hull.
 
-    Engines never show such meshes, but in a bake they block light like all others, and what they enclose is
-    black. Known are Unreal's UCX_, UBX_, USP_, UCP_ and MCDCX_, Godot's -colonly, -convcolonly, -navmesh and
-    -occonly, and names that end in collision, collider or hitbox.
+    Engines do not show such meshes, but in a bake they block light like all others, and surfaces that they
+    enclose are black. Recognized are Unreal's UCX_, UBX_, USP_, UCP_ and MCDCX_, Godot's -colonly,
+    -convcolonly, -navmesh and -occonly, and names that end in collision, collider or hitbox.
     """
     for instance in context.source.instances:
         name = next(
             (n for n in (instance.name, context.source.meshes[instance.mesh].name) if _NAME.search(n)), None
         )
         if name is not None and len(context.meshes[instance.mesh].good):
-            place = Place(instance.name, instance.node)
+            location = Location(instance.name, instance.node)
             yield RawFinding(
-                f"'{name}' is named like a collision hull, but blocks light as any object", place
+                f"'{name}' is named like a collision hull, but blocks light as any object", location
             )

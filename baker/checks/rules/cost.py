@@ -1,4 +1,4 @@
-"""What a bake of the scene will cost: texels, pages, rays, memory, time, and whose they are."""
+"""Estimate of the cost of a bake: texels, pages, rays, memory, time, and the share of each object."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _PATCHES, _LEAST_PATCH_RAYS, _MOST_PATCH_RAYS = 32768, 128, 512
 # Measured on cornell.glb, hall.glb and interior.glb.
 _OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
 PROBE_SECONDS = 1.0
-# Objects whose share is told.
+# Number of objects whose share is listed.
 MOST_SHARES = 20
 
 
 @dataclass(frozen=True)
 class Cost:
-    """An estimate; the rays are an upper bound, for rows that end early."""
+    """An estimate. The number of rays is an upper bound, since rows of texels may end early."""
 
     texels: int
     pages: int
@@ -43,7 +43,16 @@ class Cost:
 
 
 def estimate_cost(context: CheckContext) -> Cost:
-    """Estimate what a bake with the subject's settings takes."""
+    """Estimate the cost of a bake with the settings of a context.
+
+    Parameters
+    ----------
+    context : CheckContext
+
+    Returns
+    -------
+    Cost
+    """
     settings, world = context.settings, context.world
     area = np.bincount(world.instance, world.area, len(context.source.instances))
     page = settings.resolution**2
@@ -79,21 +88,21 @@ def _rays(context: CheckContext, texels: int) -> dict[Stage, int]:
     light = settings.light_samples or hemisphere
     occlusion = settings.ao_samples or hemisphere
     rays = {Stage.INSIDE_GEOMETRY: _BURIED * texels}
-    if context.wants_light:
-        lamps = sum(max(x.intensity) > 0 for x in context.scene.lights)
-        glows = context.glows
-        rays[Stage.DIRECT_LIGHT] = texels * (_POINTS * lamps + (light + _NEAR) * glows)
+    if context.bakes_light:
+        n_lights = sum(max(x.intensity) > 0 for x in context.scene.lights)
+        emits = context.emits
+        rays[Stage.DIRECT_LIGHT] = texels * (_POINTS * n_lights + (light + _NEAR) * emits)
         if settings.bounces != 0:
             each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)
             rays[Stage.FORM_FACTORS] = min(texels, _PATCHES) * each
         rays[Stage.FINAL_GATHER] = texels * hemisphere
-    if "ao" in settings.channels and not (context.wants_light and occlusion == hemisphere):
+    if "ao" in settings.channels and not (context.bakes_light and occlusion == hemisphere):
         rays[Stage.AMBIENT_OCCLUSION] = texels * occlusion
     return rays
 
 
 def probe(context: CheckContext) -> Rates:
-    """Cast rays between surfaces of the scene for up to a second and return how fast that goes."""
+    """Return rates measured with cosine-weighted rays from surfaces of the scene, cast for about a second."""
     world = context.world
     random = np.random.default_rng(context.settings.seed)
     share = np.cumsum(world.area)
@@ -101,23 +110,23 @@ def probe(context: CheckContext) -> Rates:
     chosen = np.minimum(np.searchsorted(share, pick), len(share) - 1)
     middle = world.position[world.triangle[chosen]].mean(axis=1).astype(np.float64)
     origin = world.lifted(middle, chosen, world.normal[chosen])
-    way = random.normal(size=origin.shape)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    way += world.normal[chosen]
-    near, far = np.zeros(len(way)), np.full(len(way), 1e30)
-    # Once unmeasured: the kernel is loaded and the tree built.
-    world.first_hits(origin, way, near, far)
+    direction = random.normal(size=origin.shape)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction += world.normal[chosen]
+    near, far = np.zeros(len(direction)), np.full(len(direction), 1e30)
+    # Load the kernel and build the tree before measuring.
+    world.first_hits(origin, direction, near, far)
     start, cast = time.perf_counter(), 0
     while time.perf_counter() - start < PROBE_SECONDS:
-        world.first_hits(origin, way, near, far)
-        cast += len(way)
+        world.first_hits(origin, direction, near, far)
+        cast += len(direction)
     each = (time.perf_counter() - start) / cast / _OF_PROBE
     texel = _PER_TEXEL_SECONDS / world.threads
     return Rates(dict.fromkeys(RAY_STAGES, each), texel, 0.0, "a probe of one second")
 
 
 def seconds_of(cost: Cost, rates: Rates) -> float:
-    """Return how long a bake takes; a stage that was never timed counts as the slowest known."""
+    """Return the seconds of a bake. A stage without a rate gets the slowest known one."""
     slowest = max(rates.ray.values(), default=0.0)
     rays = sum(n * rates.ray.get(stage, slowest) for stage, n in cost.rays.items())
     return rays + cost.texels * rates.texel + cost.triangles * rates.triangle
@@ -127,11 +136,11 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
     "cost", group="cost", severity="info", fix="lower `resolution`, `density` or `quality` if it is too much"
 )
 def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
-    """What a bake with these settings will take: texels, pages, rays, memory, and time if it is known.
+    """The cost of a bake with these settings: texels, pages, rays, memory, and time if known.
 
     Time comes from an earlier bake: the one that `rates` names, else the latest of this scene in a
     folder beside it; or, with `cost` and no bake, from rays cast for one second. Else it is left out. It
-    does not hold the unwrap, whose time hangs on the shapes. `objects` lists the 20 largest with their
+    does not include unwrapping, whose time depends on the shapes. `objects` lists the 20 largest with their
     share of surface, which is their share of texels and nearly of the time.
     """
     if not context.world.area.sum() > 0:

@@ -1,4 +1,4 @@
-"""Faces that lie inside of a solid, where nobody sees them."""
+"""Faces inside solids, which are never visible."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
-from baker.checks.scene_rays import World
+from baker.checks.world_triangles import WorldTriangles
 from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
 
-# A face is looked at in its middle and beside its corners, which are drawn in by this share.
+# A face is tested at its centroid and near its corners, which are moved this share of the way to the
+# centroid.
 _DRAWN_IN = 0.02
-# Rays from the inside of a solid that prove a point to be there.
+# Number of rays that must hit the inside of a solid for a point to count as inside.
 _PROOF = 2
-# Directions that are added to the normal: no rounding of a modeller's numbers.
-_WAYS = np.array(
+# Unit directions that are added to the normal; arbitrary, so that rays avoid edges of modelled geometry.
+_DIRECTIONS = np.array(
     [
         [0.53, 0.41, 0.743],
         [-0.61, 0.37, -0.7],
@@ -37,14 +38,14 @@ _WAYS = np.array(
     fix="delete the hidden faces to save their texels; a bake fills them from their neighbours",
 )
 def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces that lie as a whole inside of a closed solid.
+    """Faces that lie completely inside a closed solid.
 
-    The foot of a crate that is sunk into a floor, the end of a wall inside another wall, faces between two
-    boxes that touch. Nobody sees them and no light gets there. A bake marks their texels invalid and fills
-    them from visible neighbours of the same chart. Whether materials are double-sided does not matter; rooms
-    (with a lamp, a camera or most of the scene inside) are no solids. Faces that a solid surrounds only in
-    part are not counted. Double-sided faces that bound a solid and look into it are counted: turn them over,
-    or their map holds the dark inside.
+    Examples: the base of a crate that is sunk into a floor, the end of a wall inside another wall, faces
+    between two boxes that touch. They are never visible and receive no light. A bake marks their texels
+    invalid and fills them from visible neighbours of the same chart. Double-sided materials make no
+    difference; rooms (with a light, a camera or most of the scene inside) are no solids. Faces that a solid
+    encloses only in part are not counted. Double-sided faces that bound a solid and look into it are counted:
+    flip them, since their lightmap shows the dark inside.
     """
     world = context.world
     if not len(world.triangle):
@@ -54,7 +55,7 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
         return
     inverted = (solids.inside == BEFORE) & world.double_sided
     holder = _holders(world, solids)
-    # One-sided faces that look into their own solid are told as `inside-out` or `flipped-neighbours`.
+    # `inside-out` and `flipped-neighbours` report one-sided faces that look into their own solid.
     holder[solids.inside == BEFORE] = -1
     for number in np.unique(world.instance[(holder >= 0) | inverted]):
         own = world.instance == number
@@ -76,10 +77,10 @@ def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFind
     faces = world.face[rows]
     area = float(world.area[rows].sum())
     whole = float(world.area[world.instance == world.instance[rows[0]]].sum())
-    x, y, z = world.place_of(rows[0])
+    x, y, z = world.middle_of(rows[0])
     return RawFinding(
         text.format(some="1 face lies" if len(rows) == 1 else f"{len(rows)} faces lie"),
-        Place(instance.name or context.source.meshes[instance.mesh].name, instance.node),
+        Location(instance.name or context.source.meshes[instance.mesh].name, instance.node),
         len(rows),
         percent=100.0 * area / max(whole, 1e-300),
         primitive=facts.primitive_of(faces),
@@ -89,7 +90,7 @@ def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFind
     )
 
 
-def _solids(context: CheckContext, world: World) -> Solids:
+def _solids(context: CheckContext, world: WorldTriangles) -> Solids:
     materials = context.scene.materials
     surfaces = Surfaces(
         position=world.position,
@@ -102,8 +103,8 @@ def _solids(context: CheckContext, world: World) -> Solids:
     return find_solids(surfaces, lights_and_cameras(context.scene))
 
 
-def _holders(world: World, solids: Solids) -> NDArray[np.int64]:
-    """Return (T,) int64: an object with a solid that each face lies in, or -1."""
+def _holders(world: WorldTriangles, solids: Solids) -> NDArray[np.int64]:
+    """Return an object with a solid that encloses each face, (T,) int64, -1 where there is none."""
     corner = world.position[world.triangle].astype(np.float64)
     middle = corner.mean(axis=1)
     rows = np.flatnonzero(world.area > 0)
@@ -118,13 +119,13 @@ def _holders(world: World, solids: Solids) -> NDArray[np.int64]:
 
 
 def _held(
-    world: World, solids: Solids, origin: NDArray[np.float64], normal: NDArray[np.float64]
+    world: WorldTriangles, solids: Solids, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Return (n,) int64: an object with a solid that each point lies in, or -1."""
+    """Return an object with a solid that encloses each point (n, 3), (n,) int64, or -1."""
     count, holder = np.zeros(len(origin), np.int64), np.full(len(origin), -1, np.int64)
     near, far = np.zeros(len(origin), np.float32), np.full(len(origin), np.inf, np.float32)
-    for way in _WAYS:
-        aim = normal + way
+    for direction in _DIRECTIONS:
+        aim = normal + direction
         hit, _ = world.first_hits(origin, aim, near, far)
         met = hit >= 0
         front = np.einsum("nx,nx->n", world.normal[hit], aim) < 0

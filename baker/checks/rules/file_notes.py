@@ -1,14 +1,14 @@
-"""What the importer noticed while it read the file and no other check tells."""
+"""Warnings of the importer that no other check reports."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
-# Importer's code: severity, what to do. Codes of the same name as a check are left to that check.
+# Code of the importer: severity, advice. Codes that are those of a check are reported by that check.
 NOTES = {
     "broken-attribute": ("warning", "export the attribute again if the level needs it"),
     "broken-camera": ("info", "export the camera again if the level needs it"),
@@ -33,9 +33,9 @@ NOTES = {
 
 @check("file-note", group="file", severity="info", fix="see the message")
 def file_note(context: CheckContext) -> Iterator[RawFinding]:
-    """Parts of the file that a bake passes by or reads in its own way.
+    """Parts of the file that a bake ignores or interprets.
 
-    The importer's own code is in `note`: unknown extensions, skins (posed by their joints), morph targets
+    The importer's code is in `note`: unknown extensions, skins (posed by their joints), morph targets
     (the base shape is baked), primitives of points and lines, several scenes in one file, missing texture
     coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
     needed: normal maps, unused files, tangents, cameras.
@@ -46,5 +46,5 @@ def file_note(context: CheckContext) -> Iterator[RawFinding]:
             node = next((i.node for i in context.source.instances if i.name == warning.object), None)
             text = f"{warning.message}; {advice}"
             yield RawFinding(
-                text, Place(warning.object, node), severity=severity, more={"note": warning.code}
+                text, Location(warning.object, node), severity=severity, more={"note": warning.code}
             )

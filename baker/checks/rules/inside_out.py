@@ -1,4 +1,4 @@
-"""Closed meshes whose fronts point inwards although nothing is in there to see them."""
+"""Closed parts of meshes whose fronts point inwards although they contain nothing."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.core.light_kind import light_positions
 from baker.topology.winding_number import first_inside
 
-# Length of the summed area vectors over the area, above which a mesh cannot be closed all over.
+# Length of the sum of area vectors over the area, above which a mesh cannot be closed.
 _ROUNDING = 1e-4
-# Share of a mesh's surface below which parts that are inside out are a blemish.
+# Share of a mesh's surface below which parts that are inside out are a warning only.
 MOST_WRONG = 0.05
-# Points of another object that are looked at before it counts as outside.
+# Number of points of another object that are tested.
 _WITNESSES = 8
 
 
@@ -34,9 +34,9 @@ _WITNESSES = 8
 def inside_out(context: CheckContext) -> Iterator[RawFinding]:
     """A closed part whose faces all look inwards, with nothing in it.
 
-    Seen from outside it is black and swallows all light. A room is the same thing on purpose: a part with a
-    light, a camera or other geometry in it, one that glows itself, the hollow of a shell, and double-sided
-    surfaces are left alone. Less than 5 % of an object's surface is a warning only.
+    From outside it is black and absorbs all light. Rooms look inwards on purpose, so parts with a light, a
+    camera or other geometry inside are not reported, nor are parts that emit, the inner surfaces of shells,
+    and double-sided surfaces. Less than 5 % of an object's surface is a warning only.
     """
     for m, facts in enumerate(context.meshes):
         wrong = inside_out_parts(context, m)
@@ -44,24 +44,37 @@ def inside_out(context: CheckContext) -> Iterator[RawFinding]:
             rows = np.concatenate(wrong)
             share = float(facts.area[rows].sum() / facts.area.sum())
             parts = "a closed part" if len(wrong) == 1 else f"{len(wrong)} closed parts"
-            looks = "looks" if len(wrong) == 1 else "look"
-            text = f"{parts} of {{some}} {looks} inwards, and nothing is inside"
+            verb = "looks" if len(wrong) == 1 else "look"
+            text = f"{parts} of {{some}} {verb} inwards, and nothing is inside"
             found = faces_found(context, m, facts.good[rows], text)
             severity = "warning" if share < MOST_WRONG else None
             yield replace(found, percent=100.0 * share, severity=severity)
 
 
 def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]]:
-    """Return the parts of a mesh that are inside out, each as rows of the mesh's `good` faces."""
+    """Return the parts of a mesh that are inside out.
+
+    Parameters
+    ----------
+    context : CheckContext
+        The scene.
+    mesh : int
+        Index into `context.meshes`.
+
+    Returns
+    -------
+    list of (n,) int64
+        Rows of `MeshFacts.good`, an array for each part.
+    """
     facts = context.meshes[mesh]
     if not len(facts.good) or not _may_be(facts):
         return []
     wrong = []
     suspect = np.flatnonzero(facts.closed & (facts.volume < 0))
-    glowing = np.array([max(material.emission) > 0 for material in facts.materials], bool)
+    emits = np.array([max(material.emission) > 0 for material in facts.materials], bool)
     for piece in suspect:
         rows = facts.sheet[facts.piece == piece]
-        if facts.double_sided[rows].all() or glowing[facts.material[facts.good[rows]]].any():
+        if facts.double_sided[rows].all() or emits[facts.material[facts.good[rows]]].any():
             continue
         if not _inhabited(context, mesh, rows, int(piece)):
             wrong.append(rows)
@@ -69,24 +82,24 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
 
 
 def _may_be(facts: MeshFacts) -> bool:
-    """Tell, without looking at edges, whether a closed part may be inside out."""
+    """Return False if no closed part can be inside out, by tests that need no edges."""
     if facts.double_sided.all():
         return False
     if len(facts.good) < 4:
         return False
     total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
-    # All parts closed and the sum of their volumes positive: a part inside out would still hide in it, so
-    # only a mesh without any face towards its own middle is let go.
+    # A positive volume of the whole mesh does not rule out a part with a negative one. Rule out meshes whose
+    # area vectors add up to zero and of which no face looks to the centroid.
     outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 
 
 def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
-    """Tell whether anything is inside a closed part, or the part is the hollow of another one."""
+    """Return whether a closed part contains anything, or is the inner surface of another part."""
     facts = context.meshes[mesh]
     corner = facts.corner[rows]
     others = [np.zeros((0, 3))]
-    # Other parts of the same mesh.
+    # Test the other parts of the same mesh.
     for other in range(facts.n_pieces):
         if other != piece:
             own = facts.sheet[facts.piece == other]
@@ -97,6 +110,7 @@ def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece:
                     return True
     if first_inside(corner, np.concatenate(others)) is not None:
         return True
+    # Test lights, cameras and other objects, in the space of each instance.
     for instance in context.source.instances:
         if instance.mesh == mesh:
             inverse = np.linalg.pinv(instance.world_from_object)
@@ -108,7 +122,7 @@ def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece:
 
 
 def _things(context: CheckContext, node: int) -> NDArray[np.float64]:
-    """Return points of lights, cameras and all objects but that of `node`, (n, 3) float64, world."""
+    """Return points of lights, cameras and all objects except that of `node`, (n, 3) float64, world."""
     scene = context.scene
     points = list(light_positions(scene))
     points += [np.array(camera.position) for camera in scene.cameras]

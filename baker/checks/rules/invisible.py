@@ -1,6 +1,6 @@
-"""Objects of which nothing is there: alpha 0 everywhere, or below the cutoff everywhere.
+"""Objects that are invisible: alpha 0 everywhere, or below the cutoff everywhere.
 
-alpha = factor x texture x vertex alpha; MASK shows what reaches the cutoff, BLEND what is above 0.
+alpha = factor x texture x vertex alpha; visible is alpha >= cutoff in mode MASK, alpha > 0 in mode BLEND.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.core.scene import Material, Texture
 
-# Alpha of BLEND below which nothing is seen: half a level of an image of eight bits.
-LEAST_SEEN = 0.5 / 255.0
-# Barycentrics of the points of a triangle at which textures are looked up first.
-_LOOKS = np.array(
+# Least visible alpha of mode BLEND: half a level of an 8-bit image.
+LEAST_ALPHA = 0.5 / 255.0
+# Barycentric coordinates of the points of a triangle at which textures are sampled first.
+_SAMPLES = np.array(
     [[1 / 3, 1 / 3, 1 / 3], [2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]]
 )
 
@@ -35,10 +35,10 @@ _LOOKS = np.array(
 def invisible(context: CheckContext) -> Iterator[RawFinding]:
     """An object that its materials make invisible as a whole.
 
-    Alpha is 0 everywhere (BLEND) or below the cutoff everywhere (MASK): factor, texture and vertex colours
-    are looked at. Such an object neither blocks nor reflects nor emits light. Exporters that take `Tr` of
-    MTL files for opacity write such materials, and so does an alpha channel that was never painted. An
-    object of which a part can be seen is left alone.
+    Alpha (factor, texture and vertex colours) is 0 everywhere (BLEND) or below the cutoff everywhere (MASK).
+    Such an object neither blocks nor reflects nor emits light. Causes are exporters that interpret `Tr` of
+    MTL files as opacity, and alpha channels that were never painted. An object with a visible part is not
+    reported.
     """
     fades = np.array([material.alpha_mode != "OPAQUE" for material in context.scene.materials], bool)
     if not fades.any():
@@ -50,9 +50,11 @@ def invisible(context: CheckContext) -> Iterator[RawFinding]:
         used = [int(k) for k in np.unique(material)]
         if any(_seen(facts, k, context.scene.materials[k]) for k in used):
             continue
-        places = sum(instance.mesh == m for instance in context.source.instances)
-        if places:
-            yield RawFinding(_sentence([context.scene.materials[k] for k in used]), context.place(m), places)
+        n_shown = sum(instance.mesh == m for instance in context.source.instances)
+        if n_shown:
+            yield RawFinding(
+                _sentence([context.scene.materials[k] for k in used]), context.location(m), n_shown
+            )
 
 
 def _sentence(materials: list[Material]) -> str:
@@ -67,12 +69,12 @@ def _sentence(materials: list[Material]) -> str:
 
 
 def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
-    """Tell whether anything of a material's faces on a mesh is there."""
-    least = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_SEEN
+    """Return whether any face of material `number` on a mesh is visible."""
+    least_alpha = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_ALPHA
     face = facts.good[facts.material[facts.good] == number]
     alpha = material.base_colour[3] * _vertex_alpha(facts)[facts.triangle[face]]
-    # As kernels compare: in float32, with the last digit to spare.
-    enough = np.float32(least) * np.float32(1.0 - 1e-6)
+    # Compare in float32 like the kernels, with a margin for the last digit.
+    enough = np.float32(least_alpha) * np.float32(1.0 - 1e-6)
     strong = alpha.max(axis=1) >= enough
     if not strong.any():
         return False
@@ -84,17 +86,17 @@ def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
         return False
     face, alpha = face[strong], alpha[strong]
     uv = _image_uv(facts, texture)[facts.triangle[face]]
-    looks = np.einsum("kc,tcx->tkx", _LOOKS, uv)
-    there = alpha @ _LOOKS.T
+    sample = np.einsum("kc,tcx->tkx", _SAMPLES, uv)
+    vertex_alpha = alpha @ _SAMPLES.T
     size = np.array(image.shape[::-1])
-    column, row = (np.floor(looks % 1.0 * size).astype(np.int64).clip(0, size - 1)[..., i] for i in (0, 1))
-    if texture.wrap == ("repeat", "repeat") and (image[row, column] * there >= enough).any():
+    column, row = (np.floor(sample % 1.0 * size).astype(np.int64).clip(0, size - 1)[..., i] for i in (0, 1))
+    if texture.wrap == ("repeat", "repeat") and (image[row, column] * vertex_alpha >= enough).any():
         return True
     return _any_within(image * float(alpha.max()) >= enough, uv, texture.wrap)
 
 
 def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
-    """Return (V,) float32: the vertex colours' alpha, 1 without colours."""
+    """Return the alpha of the vertex colours, (V,) float32, 1 without colours."""
     parts = [
         np.ones(len(p.position), np.float32)
         if p.colour is None
@@ -105,7 +107,7 @@ def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
 
 
 def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
-    """Return (V, 2) float64: where each vertex looks the texture up; 0 where it has no such set."""
+    """Return the uv of each vertex in the texture, (V, 2) float64; 0 where it has no such set."""
     parts = [
         np.nan_to_num(
             p.texcoord.get(texture.texcoord, np.zeros((len(p.position), 2))), nan=0.0, posinf=0.0, neginf=0.0
@@ -116,7 +118,7 @@ def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
 
 
 def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[str, str]) -> bool:
-    """Tell whether any texel of a mask lies in the box of any triangle's uv, a texel for lookup around it.
+    """Return whether any triangle's uv bounding box, one texel wider for the lookup, has a texel of a mask.
 
     Parameters
     ----------
@@ -124,6 +126,7 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
     uv : (T, 3, 2) float64
     wrap : (str, str)
     """
+    # Summed-area table: the count in a box is the sum over its four corners.
     total = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int64)
     total[1:, 1:] = mask.cumsum(axis=0).cumsum(axis=1)
     (left, right), (top, bottom) = (
@@ -134,9 +137,9 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
 
 
 def _range(value: NDArray[np.float64], size: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first and the last texel (exclusive) that triangles look up along one axis.
+    """Return the first and the last texel (exclusive) that triangles sample along one axis, (T,) int64 each.
 
-    A triangle that goes over the image's border counts as one that sees all of it.
+    A triangle across a repeat of the image gets the whole range.
     """
     low, high = value.min(axis=1), value.max(axis=1)
     if wrap == "clamp":

@@ -1,6 +1,6 @@
-"""What direct light does at a few hundred points: all black, or too bright for half floats.
+"""Rules about direct light at a few hundred points: all black, or too bright for half floats.
 
-E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each where nothing is in the way
+E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each times visibility
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from baker.checks.context import CheckContext
-from baker.checks.direct_light import cosine_ways, points_inside
-from baker.checks.finding import Place, RawFinding
+from baker.checks.direct_light import cosine_directions, points_inside
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
 
-# Rays from emissive surfaces that look for anything to light.
+# Rays from each emissive object to find whether it lights anything.
 FACING_RAYS = 64
 
 
@@ -26,7 +26,7 @@ FACING_RAYS = 64
     fix="look where the lights are and what is between them and the surfaces",
 )
 def all_black(context: CheckContext) -> Iterator[RawFinding]:
-    """A scene with light of which nothing arrives at any of 512 points on its surfaces."""
+    """A scene whose light reaches none of 512 points on its surfaces."""
     levels = context.levels
     if levels is not None and not levels.irradiance.any():
         yield RawFinding(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
@@ -56,7 +56,7 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
         most = levels.irradiance[worst]
         text = f"about {share:.3g}% of the surface gets more than {highest:.5g} lx, up to {most:.3g}"
         at = context.source.instances[context.world.instance[levels.triangle[worst]]]
-        yield RawFinding(text, Place(at.name, at.node), len(over), percent=share, position=(x, y, z))
+        yield RawFinding(text, Location(at.name, at.node), len(over), percent=share, position=(x, y, z))
 
 
 @check(
@@ -66,7 +66,7 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     fix="nothing to do: this is what direct light will look like",
 )
 def light_levels(context: CheckContext) -> Iterator[RawFinding]:
-    """Brightest and darkest direct irradiance at 512 points on the surfaces, before any bounce."""
+    """Brightest and darkest direct irradiance at 512 points on the surfaces, without reflected light."""
     levels = context.levels
     if levels is not None and levels.irradiance.any():
         low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
@@ -85,16 +85,16 @@ def light_levels(context: CheckContext) -> Iterator[RawFinding]:
 def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
     """An emissive object that faces away from everything.
 
-    Of 64 rays that leave its front none meets anything: it lights nothing. One-sided surfaces emit on
-    their front only.
+    None of 64 rays from its front hits anything, so it lights nothing. One-sided surfaces emit on their front
+    only.
     """
-    if not context.glows or len(context.source.instances) < 2:
+    if not context.emits or len(context.source.instances) < 2:
         return
     world = context.world
     random = np.random.default_rng(context.settings.seed)
-    glows = np.unique(context.emission.triangle)
-    for k in np.unique(world.instance[glows]):
-        own = glows[world.instance[glows] == k]
+    emitters = np.unique(context.emission.triangle)
+    for k in np.unique(world.instance[emitters]):
+        own = emitters[world.instance[emitters] == k]
         share = np.cumsum(world.area[own])
         pick = (np.arange(FACING_RAYS) + 0.5) / FACING_RAYS * share[-1]
         chosen = own[np.minimum(np.searchsorted(share, pick), len(own) - 1)]
@@ -103,13 +103,15 @@ def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
         for side in sides:
             normal = side * world.normal[chosen]
             origin = world.lifted(points_inside(world, chosen, random), chosen, normal)
-            way = cosine_ways(normal, 1, random)
-            hit, _ = world.first_hits(origin, way, np.zeros(len(way)), np.full(len(way), 1e30))
+            direction = cosine_directions(normal, 1, random)
+            hit, _ = world.first_hits(
+                origin, direction, np.zeros(len(direction)), np.full(len(direction), 1e30)
+            )
             met = met or bool((hit >= 0).any())
         if not met:
             instance = context.source.instances[k]
-            x, y, z = world.place_of(own[0])
-            place = Place(instance.name, instance.node)
+            x, y, z = world.middle_of(own[0])
+            location = Location(instance.name, instance.node)
             yield RawFinding(
-                "its emitting faces face away from everything", place, len(own), position=(x, y, z)
+                "its emitting faces face away from everything", location, len(own), position=(x, y, z)
             )

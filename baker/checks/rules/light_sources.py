@@ -1,4 +1,4 @@
-"""Checks of what emits and what reflects: lights, emissive surfaces, albedo."""
+"""Rules about lights, emissive surfaces and albedo."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.core.colour import linear_from_srgb
 from baker.core.light_kind import kind_of, light_positions
 from baker.topology.winding_number import first_inside
 
-# Albedo above which light hardly ever dies away.
+# Albedo above which reflections decay very slowly.
 MOST_REFLECTED = 0.95
-# Albedo from which closed rooms are worth a look.
+# Albedo above which paths are traced to find trapped light.
 NEARLY_WHITE = 0.98
-# cd/m2; more is likelier a wrong unit than such a surface. Lights without area: `LightKind.plausible_max`.
+# cd/m2; more is probably a wrong unit. For lights without area see `LightKind.plausible_max`.
 ABSURD_EMISSION = 1e8
-# Upward share of a normal that makes a face a floor.
+# Least y component of the normal of a floor.
 FLOOR = 0.5
 
 
@@ -34,8 +34,8 @@ FLOOR = 0.5
 def no_light(context: CheckContext) -> Iterator[RawFinding]:
     """A scene without any light, emissive surface or sky: its irradiance is black."""
     lit = any(max(light.intensity) > 0 for light in context.scene.lights)
-    dark = not lit and not any(context.settings.sky_radiance) and context.wants_light
-    if dark and not context.glows:
+    dark = not lit and not any(context.settings.sky_radiance) and context.bakes_light
+    if dark and not context.emits:
         yield RawFinding("nothing emits light: the irradiance will be black")
 
 
@@ -48,12 +48,12 @@ def no_light(context: CheckContext) -> Iterator[RawFinding]:
 def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     """Spot and directional lights whose node leaves them no direction.
 
-    A scale of zero along the axis that the light shines along, of the node or of a parent, maps the direction
-    to nothing, or to rounding errors. Point lights need no direction and are kept.
+    A scale of zero along the axis of the light, of the node or of a parent, maps the direction to zero or to
+    rounding errors. Point lights need no direction and are kept.
     """
     for warning in context.scene.warnings:
         if warning.code == "flat-light":
-            yield RawFinding(warning.message, Place(warning.object))
+            yield RawFinding(warning.message, Location(warning.object))
 
 
 @check(
@@ -65,8 +65,8 @@ def flat_light(context: CheckContext) -> Iterator[RawFinding]:
 def light_range(context: CheckContext) -> Iterator[RawFinding]:
     """Point and spot lights whose `range` ends inside the scene.
 
-    Light fades out as KHR_lights_punctual says, to nothing at the range. Engines fade lights out in other
-    ways, and some ignore the range.
+    Light fades to zero at the range, as KHR_lights_punctual defines it. Engines use other falloffs, and some
+    ignore the range.
     """
     lights = [
         light for light in context.scene.lights if math.isfinite(light.range) and max(light.intensity) > 0
@@ -74,8 +74,8 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
     if not lights:
         return
     low, high = context.box
-    place = np.array([light.position for light in lights])
-    farthest = np.linalg.norm(np.maximum(np.abs(place - low), np.abs(place - high)), axis=1)
+    position = np.array([light.position for light in lights])
+    farthest = np.linalg.norm(np.maximum(np.abs(position - low), np.abs(position - high)), axis=1)
     ends = [k for k, light in enumerate(lights) if light.range < farthest[k]]
     if ends:
         k = min(ends, key=lambda k: lights[k].range)
@@ -85,7 +85,7 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
             f"{farthest[k]:.3g} m from it, and what lies beyond the range gets none of its light"
         )
         text += f" (so do {len(ends) - 1} further lights with ranges of their own)" if len(ends) > 1 else ""
-        yield RawFinding(text, Place(light.name, light.node), count=len(ends), position=light.position)
+        yield RawFinding(text, Location(light.name, light.node), count=len(ends), position=light.position)
 
 
 @check(
@@ -95,10 +95,10 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
     fix="move the light out of the geometry, or make the shade emissive or see-through",
 )
 def light_inside(context: CheckContext) -> Iterator[RawFinding]:
-    """A point or spot light inside a closed solid, like a lamp inside its own bulb.
+    """A point or spot light inside a closed solid, such as a bulb.
 
-    Every surface blocks light from both sides, so none of it gets out. Rooms, whose surfaces look inwards,
-    and parts with a material that light can pass (MASK, BLEND) are left alone.
+    Every surface blocks light from both sides, so none of it leaves the solid. Rooms, whose surfaces look
+    inwards, and parts with a material that light may cross (MASK, BLEND) are not reported.
     """
     solids = None
     for light in context.scene.lights:
@@ -107,14 +107,14 @@ def light_inside(context: CheckContext) -> Iterator[RawFinding]:
         solids = list(_solids(context)) if solids is None else solids
         for name, corner in solids:
             if first_inside(corner, np.array([light.position])) is not None:
-                place = Place(light.name, light.node)
+                location = Location(light.name, light.node)
                 text = f"the {light.kind} light is inside the closed surface of '{name}'"
-                yield RawFinding(text, place, position=light.position)
+                yield RawFinding(text, location, position=light.position)
                 break
 
 
 def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield name and world corners of every closed part that looks outwards and lets no light through."""
+    """Yield name and world corners (n, 3, 3) of opaque closed parts whose box holds a light."""
     materials = context.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
     position = light_positions(context.scene)
@@ -143,28 +143,30 @@ def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
 def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
     """Lights that are negative, zero or absurdly strong.
 
-    Negative light is an error: a bake refuses it. Absurd is more than 1e6 cd for a point, 1e7 cd for a
-    spot, 2e5 lx for a sun (ours gives 1.2e5) and 1e8 cd/m2 for a surface: often watts or lumens taken for
-    candela. Exporters that convert watts multiply by 683 lm/W: Blender does so with the lighting mode
-    Standard, and writes the numbers as they are with Unitless.
+    Negative light is an error, since a bake refuses it. Absurd is more than 1e6 cd for a point, 1e7 cd for a
+    spot, 2e5 lx for a sun (the real one gives 1.2e5) and 1e8 cd/m2 for a surface: often watts or lumens
+    interpreted as candela. Exporters that convert watts multiply by 683 lm/W: Blender does so with the
+    lighting mode Standard, and writes the numbers unchanged with Unitless.
     """
     for light in context.scene.lights:
-        place = Place(light.name, light.node)
+        location = Location(light.name, light.node)
         kind = kind_of(light)
         at, unit = light.position if kind.has_position else None, kind.unit
         if min(light.intensity) < 0:
-            yield RawFinding(f"the {light.kind} light is negative", place, position=at, severity="error")
+            yield RawFinding(f"the {light.kind} light is negative", location, position=at, severity="error")
         elif max(light.intensity) == 0:
-            yield RawFinding(f"the {light.kind} light has no intensity", place, position=at)
+            yield RawFinding(f"the {light.kind} light has no intensity", location, position=at)
         elif max(light.intensity) > kind.plausible_max:
             most = max(light.intensity)
             text = f"the {light.kind} light has {most:.3g} {unit}; if watts were multiplied by 683 lm/W "
             text += f"(Blender's lighting mode Standard), export it as Unitless: {most / 683:.3g} {unit}"
-            yield RawFinding(text, place, position=at)
+            yield RawFinding(text, location, position=at)
     for k in context.used_materials:
         material = context.scene.materials[k]
         if max(material.emission) > ABSURD_EMISSION:
-            yield RawFinding(f"the material emits {max(material.emission):.3g} cd/m2", Place(material.name))
+            yield RawFinding(
+                f"the material emits {max(material.emission):.3g} cd/m2", Location(material.name)
+            )
 
 
 @check(
@@ -176,10 +178,10 @@ def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
 def albedo(context: CheckContext) -> Iterator[RawFinding]:
     """Materials that reflect over 95 % of the light.
 
-    Nothing in nature does. Light hardly dies away between such surfaces: closed rooms of them get brighter
-    without end. A glTF material without a base colour is white: albedo 1. Where albedo is above 0.98, paths
-    of 20 reflections tell by how much all bounces together multiply the light; a bake tells that number, too,
-    if it is above 20.
+    No natural material does. Light decays very slowly between such surfaces, and closed rooms of them become
+    arbitrarily bright. A glTF material without a base colour is white: albedo 1. For an albedo above 0.98,
+    paths of 20 reflections measure the factor by which all bounces together multiply the light. It is
+    reported if it is above 20; a bake reports it, too.
     """
     gain = None
     reflected = albedos(context)
@@ -195,11 +197,11 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
                 gain = trapped_gain(context, reflected) if gain is None else gain
                 if gain > MOST_GAIN:
                     text += f": all bounces together multiply light by about {gain:.3g}"
-            yield RawFinding(text, context.place(mesh), more={"material": k})
+            yield RawFinding(text, context.location(mesh), more={"material": k})
 
 
 def albedos(context: CheckContext) -> NDArray[np.float64]:
-    """Return the mean albedo of each material that is used, the largest of its colours, (M,) float64."""
+    """Return the mean albedo of each used material, its largest component, (M,) float64; 0 if unused."""
     out = np.zeros(len(context.scene.materials))
     for k in context.used_materials:
         material = context.scene.materials[k]
@@ -211,7 +213,7 @@ def albedos(context: CheckContext) -> NDArray[np.float64]:
 
 
 def _painted(context: CheckContext, material: int) -> float:
-    """Return the brightest vertex colour on a material's surfaces, 1 where there are none."""
+    """Return the largest vertex colour component on a material's surfaces, 1 where there are no colours."""
     brightest = []
     for facts in context.meshes:
         for k, p in enumerate(facts.source.primitives):
@@ -246,13 +248,13 @@ def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
         image = material.emission_texture.image
         if max(material.emission) > 0 and not image[..., :3].any():
             text = f"the emissive texture of material '{material.name}' is all black"
-            yield RawFinding(text, Place(material.name))
+            yield RawFinding(text, Location(material.name))
         elif not max(material.emission) > 0 and image[..., :3].any():
             text = f"material '{material.name}' has an emissive texture, but its emissiveFactor is zero"
-            yield RawFinding(text, Place(material.name), severity="info")
+            yield RawFinding(text, Location(material.name), severity="info")
         elif max(material.emission) > 0 and k not in context.world.material[context.emission.triangle]:
             text = f"all surfaces of material '{material.name}' lie where its emissive texture is black"
-            yield RawFinding(text, Place(material.name))
+            yield RawFinding(text, Location(material.name))
 
 
 @check(
@@ -262,7 +264,7 @@ def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
     fix="turn the light: it shines along its node's -Z",
 )
 def sun_below(context: CheckContext) -> Iterator[RawFinding]:
-    """A sun that comes from below every floor of the scene."""
+    """A directional light that comes from below every floor of the scene."""
     for light in context.scene.lights:
         if kind_of(light).has_position or not max(light.intensity) > 0:
             continue
@@ -270,4 +272,4 @@ def sun_below(context: CheckContext) -> Iterator[RawFinding]:
         floor = world.normal[:, 1] > FLOOR
         lit = world.normal @ -np.array(light.direction) > 1e-6
         if floor.any() and not (floor & lit).any():
-            yield RawFinding("the sun shines from below every floor", Place(light.name, light.node))
+            yield RawFinding("the sun shines from below every floor", Location(light.name, light.node))

@@ -1,8 +1,9 @@
-"""Checks of how faces hang together: edges, vertices, holes, winding."""
+"""Rules about the connections of faces: edges, vertices, holes, winding."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,12 @@ from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.topology.weld import connected, number_by_first
 
-# A piece counts as otherwise closed if its holes have less than this share of its area.
+# A piece counts as closed except for holes if these have less than this share of its area.
 MOST_OPEN = 0.05
 
 
 def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Turn rows of `sheet` into face numbers of the file, sorted, each once."""
+    """Return the sorted unique face numbers of rows of `MeshFacts.sheet`, (n,) int64."""
     return facts.good[facts.sheet[np.unique(rows)]]
 
 
@@ -32,8 +33,8 @@ def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
 def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Edges at which more than two faces meet.
 
-    Inside and outside are not defined there: often a wall inside a wall, or faces left over from a
-    boolean. Faces lying back to back in the same place are not counted: they are two sheets.
+    Inside and outside are not defined there. Causes are walls inside walls and faces left over from boolean
+    operations. Faces back to back at the same position are not counted, since they are two sheets.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -54,7 +55,7 @@ def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
 def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Vertices at which parts of a mesh touch only in a point.
 
-    Harmless for light, but subdivision, simplification and some unwrappers stumble over it.
+    Harmless for light, but subdivision, simplification and some unwrappers fail at them.
     """
     for m, facts in enumerate(context.meshes):
         edges, welded = facts.edges, facts.welded[facts.sheet]
@@ -64,7 +65,7 @@ def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
         n = int(welded.max()) + 1
         pairs = np.unique(welded.reshape(-1) * (int(fan.max()) + 1) + fan)
         fans = np.bincount(pairs // (int(fan.max()) + 1), minlength=n)
-        # At an edge of many faces fans are not defined: its vertices are told about by that check.
+        # Fans are not defined at an edge of more than two faces; `non-manifold-edges` reports its vertices.
         crowded = edges.count > 2
         fans[edges.low[crowded]] = 1
         fans[edges.high[crowded]] = 1
@@ -78,14 +79,14 @@ def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _fans(facts: MeshFacts) -> NDArray[np.int64]:
-    """Return for each corner of `sheet`, (3F,), the fan of faces around its vertex that it belongs to."""
+    """Return the fan of faces around its vertex of each corner of `sheet`, (3S,) int64."""
     edges = facts.edges
     one, two = edges.pairs(edges.count == 2)
     face, corner = edges.face, edges.corner
     same_way = edges.balance[edges.count == 2] != 0
     start = [face[k] * 3 + corner[k] for k in (one, two)]
     end = [face[k] * 3 + (corner[k] + 1) % 3 for k in (one, two)]
-    # Neighbours run along their edge in opposite directions, unless one of them is flipped.
+    # Consistently wound neighbours run along their edge in opposite directions.
     a = np.concatenate([start[0], end[0]])
     b = np.concatenate([np.where(same_way, start[1], end[1]), np.where(same_way, end[1], start[1])])
     n = 3 * len(facts.sheet)
@@ -99,10 +100,10 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
     fix="merge vertices by distance and fill the holes (`repair` fills small ones)",
 )
 def open_edges(context: CheckContext) -> Iterator[RawFinding]:
-    """Open edges in a mesh that is closed but for small holes.
+    """Open edges in a mesh that is closed except for small holes.
 
-    Light leaks through cracks. A part counts if the holes in it have less than 5 % of its surface; a box
-    without a lid or a sheet of terrain is open on purpose.
+    Light leaks through cracks. A part counts if its holes have less than 5 % of its surface; a box without a
+    lid or a sheet of terrain is open on purpose.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -131,7 +132,10 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
 def _loops(
     low: NDArray[np.int64], high: NDArray[np.int64], piece: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], int]:
-    """Return for each open edge the hole that it borders, and how many there are."""
+    """Return the hole at each open edge, (n,) int64, and the number of holes.
+
+    `low` and `high` are the (n,) vertices of the edges, `piece` the (n,) pieces of their faces.
+    """
     n = int(max(low.max(), high.max())) + 1
     ends = np.concatenate([low, high]) + n * np.concatenate([piece, piece]).astype(np.int64)
     _, node = np.unique(ends, return_inverse=True)
@@ -144,7 +148,7 @@ def _loops(
 def _hole_area(
     facts: MeshFacts, border: NDArray[np.int64], hole: NDArray[np.int64], n_holes: int
 ) -> NDArray[np.float64]:
-    """Return the area of the flat disc that each border spans, (n_holes,) float64."""
+    """Return the area of each hole, (n_holes,) float64: of the fan from its border to the centroid."""
     edges = facts.edges
     face, corner = edges.face[edges.first[border]], edges.corner[edges.first[border]]
     around = facts.corner[facts.sheet[face]]
@@ -167,7 +171,7 @@ def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
     """Neighbouring faces wound in opposite directions.
 
     One of them shows its back where the other shows its front. The back of a one-sided surface is black: it
-    neither receives nor reflects light, and points near it count as buried.
+    neither receives nor reflects light, and points near it count as inside geometry.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -181,7 +185,5 @@ def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _counted(found: RawFinding, count: int, whole: int) -> RawFinding:
-    """Return a finding with a count of edges or vertices instead of faces."""
-    from dataclasses import replace
-
+    """Return a finding with a count of edges or vertices instead of faces, `whole` of which are 100 %."""
     return replace(found, count=count, percent=100.0 * count / max(whole, 1))

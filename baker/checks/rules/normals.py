@@ -1,4 +1,4 @@
-"""Checks of vertex normals and of vertices that repeat."""
+"""Rules about vertex normals and duplicate vertices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.core.source_mesh import SourcePrimitive
 from baker.topology.weld import number_rows
 
-# Deviation of a normal's length from 1 that is more than a byte's rounding.
+# Largest deviation of a normal's length from 1 that rounding to normalized bytes causes.
 UNIT_SLACK = 0.02
 
 
@@ -24,7 +24,7 @@ def _parts(facts: MeshFacts) -> Iterator[tuple[int, SourcePrimitive]]:
 
 
 def _faces_at(facts: MeshFacts, part: int, vertex: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the faces of a primitive with a corner among the chosen of its vertices."""
+    """Return the faces of a primitive with a corner in the (V,) mask of its vertices, (n,) int64."""
     rows = np.flatnonzero((facts.primitive == part) & facts.within)
     local = facts.triangle[rows] - facts.vertex_start[part]
     touched: NDArray[np.bool_] = vertex[local].any(axis=1)
@@ -47,7 +47,7 @@ def _length(normal: NDArray[np.float32]) -> NDArray[np.float64]:
 def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
     """Meshes without vertex normals.
 
-    glTF asks for flat normals then: every face gets an edge of its own in the light.
+    glTF requires flat normals for them, so the light has an edge between any two faces.
     """
     for m, facts in enumerate(context.meshes):
         lacking = [k for k, p in _parts(facts) if p.normal is None and len(p.triangle)]
@@ -60,7 +60,7 @@ def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
     "bad-normals",
     group="geometry",
     severity="warning",
-    fix="recalculate normals where the mesh was made; a bake makes these anew from the faces",
+    fix="recalculate normals where the mesh was made; a bake computes these from the faces",
 )
 def bad_normals(context: CheckContext) -> Iterator[RawFinding]:
     """Vertex normals that are NaN, infinite or of no length."""
@@ -106,8 +106,8 @@ def normal_length(context: CheckContext) -> Iterator[RawFinding]:
 def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces whose vertex normals all point to their back.
 
-    The winding says which side is the front and gets light, the normals say from where it is counted: between
-    them nothing is left and the face comes out black.
+    The winding defines the front, which receives light; the normals define the hemisphere from which light is
+    counted. The two have nothing in common, and the face is black.
     """
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
@@ -129,7 +129,7 @@ def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="merge equal vertices on export (`fix` welds them): smaller files, the same picture",
 )
 def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertices that repeat another one of the same primitive in every attribute."""
+    """Vertices that equal another one of the same primitive in every attribute."""
     for m, facts in enumerate(context.meshes):
         double, total = 0, 0
         first: int | None = None
@@ -151,7 +151,7 @@ def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
             some = "1 vertex repeats" if double == 1 else f"{double} of {total} vertices repeat"
             yield RawFinding(
                 f"{some} another one in every attribute",
-                context.place(m),
+                context.location(m),
                 double,
                 percent=100.0 * double / total,
                 primitive=first,

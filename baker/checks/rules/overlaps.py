@@ -1,4 +1,4 @@
-"""Checks of surfaces in each other's way: within a mesh by rays along edges, between objects by planes."""
+"""Rules about intersecting and overlapping surfaces: in a mesh by rays along edges, of objects by planes."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import MOST_FACES, Place, RawFinding
+from baker.checks.finding import MOST_FACES, Location, RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
-from baker.checks.scene_rays import cast
+from baker.checks.world_triangles import cast
 from baker.core.parallel import thread_count
 
-# Shares of an edge at its ends that are not looked at: neighbours touch it there.
+# Share of an edge at each end that rays skip, since neighbours touch it there.
 _ENDS = 1e-4
-# How deep an edge must pierce, as share of the mesh's diagonal, to be more than a touch.
+# Least depth of an intersection, as a share of the mesh's diagonal; less is a touch.
 _DEPTH = 1e-5
-# Rounds in which a ray that met a neighbour goes on behind it.
+# Largest number of hits along an edge; a ray continues behind each neighbour that it hits.
 _ROUNDS = 4
-# Distance of planes that flicker, as share of the scene's diagonal, and its limits in metres.
+# Distance of planes that count as the same, as a share of the scene's diagonal, and its limits in metres.
 COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3
-# Steps of a normal's components that tell planes apart.
+# Steps per unit to which components of plane normals are rounded.
 _TURN = 256.0
 
 
@@ -37,7 +37,7 @@ _TURN = 256.0
 def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one mesh that pierce each other.
 
-    Common and mostly harmless where parts are stuck together; the texels inside the other part are black
+    Common and mostly harmless where parts are joined by overlap: the texels inside the other part are black
     and are filled from their neighbours. Found by rays along all edges; parts that only touch are not
     counted.
     """
@@ -52,9 +52,7 @@ def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
-    """Return (n, 2) pairs of rows of `good`, a face with an edge that pierces another face and that one, and
-    the number of such edges.
-    """
+    """Return pairs of intersecting faces, (n, 2) int64 rows of `good`, and the number of piercing edges."""
     from baker.trace.embree import RayScene
 
     edges = facts.edges
@@ -73,9 +71,9 @@ def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
     for _ in range(_ROUNDS):
         if not len(rows):
             break
-        way = end[rows] - begin[rows]
+        direction = end[rows] - begin[rows]
         far = np.full(len(rows), 1.0 - _ENDS)
-        hit, distance = cast(tree.tracer, threads, begin[rows], way, near[rows], far)
+        hit, distance = cast(tree.tracer, threads, begin[rows], direction, near[rows], far)
         met = hit >= 0
         rows, other, distance = rows[met], hit[met].astype(np.int64), distance[met]
         ends = facts.welded[other]
@@ -97,7 +95,10 @@ def _pierces(
     other: NDArray[np.int64],
     depth: float,
 ) -> NDArray[np.bool_]:
-    """Tell whether edges have their ends on both sides of a face's plane, by more than `depth`."""
+    """Return which edges have their ends on both sides of face `other`, by more than `depth`, (n,) bool.
+
+    `begin` and `end` are (n, 3) positions in object space, `other` the (n,) faces as rows of `good`.
+    """
     normal = facts.area_vector[other] / np.maximum(facts.area[other], 1e-300)[:, None]
     at = facts.corner[other, 0]
     one = np.einsum("nx,nx->n", begin - at, normal)
@@ -112,11 +113,11 @@ def _pierces(
     fix="move one surface by a millimetre, or cut the hidden part away",
 )
 def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
-    """Surfaces of different objects in the same place that look the same way (z-fighting).
+    """Overlapping surfaces of different objects in one plane with the same front (z-fighting).
 
-    Engines show now one, now the other, and each shadows the other at random. Planes count as the same
-    within a millionth of the scene's diagonal. A box that stands on a floor is not meant: the two look at
-    each other.
+    Engines show one or the other by chance, and each shadows the other at random. Planes count as the same
+    within a millionth of the scene's diagonal. A box on a floor is not reported, since the two surfaces look
+    at each other.
     """
     partner = _partners(context)
     world = context.world
@@ -134,12 +135,12 @@ def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
         faces = world.face[chosen]
         shown = a if len(own) else b
         facts = context.meshes[shown.mesh]
-        x, y, z = world.place_of(chosen[0])
+        x, y, z = world.middle_of(chosen[0])
         some = "1 face lies" if len(chosen) == 1 else f"{len(chosen)} faces lie"
         hidden = b if len(own) else a
         yield RawFinding(
             f"{some} in the same plane as '{hidden.name}' and overlap it",
-            Place(shown.name, shown.node),
+            Location(shown.name, shown.node),
             len(chosen),
             percent=100.0 * len(chosen) / max(len(facts.good), 1),
             primitive=facts.primitive_of(faces),
@@ -150,7 +151,7 @@ def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _partners(context: CheckContext) -> NDArray[np.int64]:
-    """Return for each world triangle one of another instance that it overlaps in its plane, or -1."""
+    """Return a triangle of another instance that overlaps each world triangle in its plane, or -1, (T,)."""
     world = context.world
     partner = np.full(len(world.triangle), -1, np.int64)
     if len(context.source.instances) < 2 or not len(world.triangle):
@@ -160,7 +161,8 @@ def _partners(context: CheckContext) -> NDArray[np.int64]:
     away = np.einsum("tx,tx->t", world.normal, corner)
     turn = np.round(world.normal * _TURN).astype(np.int64) + int(_TURN)
     direction = (turn[:, 0] * 1024 + turn[:, 1]) * 1024 + turn[:, 2]
-    # Two grids half a step apart, at numbers that no modeller chooses: equal planes share a cell in one.
+    # Use two grids half a step apart: planes closer than half a step share a cell in one of them. The shifts
+    # keep planes at round numbers away from cell borders.
     for shift in (0.3137, 0.8137):
         step = np.floor(away / (2.0 * tolerance) + shift).astype(np.int64)
         _match(context, direction, step, tolerance, partner)
@@ -174,7 +176,7 @@ def _match(
     tolerance: float,
     partner: NDArray[np.int64],
 ) -> None:
-    """Find overlaps among triangles of equal direction and step; fills `partner`."""
+    """Find overlaps among triangles of equal (T,) `direction` and `step`; write them to `partner`."""
     from baker.checks.kernels.coplanar import coplanar_partners
 
     world = context.world
@@ -191,7 +193,7 @@ def _match(
     order, group = order[keep], group[keep]
     if not len(order):
         return
-    # The two axes that the plane is least tilted against.
+    # Project along the largest component of the normal.
     drop = np.abs(world.normal[order]).argmax(axis=1)
     axes = np.array([[1, 2], [0, 2], [0, 1]])[drop]
     corner = world.position[world.triangle[order]].astype(np.float64)

@@ -1,4 +1,4 @@
-"""Checks of where and how large things stand: scales of nodes, size of the scene."""
+"""Rules about scales of nodes, positions far from the origin and the size of the scene."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from baker.checks.context import CheckContext
-from baker.checks.finding import Place, RawFinding
+from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.cost import estimate_cost
 from baker.core.precision import coarse_objects
 
-# Smallest over largest stretch below which a bake leaves an instance out.
+# Ratio of smallest to largest singular value of the transform below which a bake leaves an instance out.
 FLATTEST = 1e-7
-# Diagonals in metres outside which a wrong unit is likelier than such a scene.
+# Diagonals in metres outside of which a wrong unit is the likely cause.
 SMALLEST, LARGEST = 0.05, 5000.0
 
 
 def _stretches(
     context: CheckContext,
-) -> Iterator[tuple[Place, np.ndarray, float, tuple[float, float, float]]]:
+) -> Iterator[tuple[Location, np.ndarray, float, tuple[float, float, float]]]:
     for instance in context.source.instances:
         matrix = instance.world_from_object[:3, :3]
         stretch = np.linalg.svd(matrix, compute_uv=False)
         x, y, z = (float(v) for v in instance.world_from_object[:3, 3])
-        place = Place(instance.name or context.source.meshes[instance.mesh].name, instance.node)
-        yield place, stretch, float(np.linalg.det(matrix)), (x, y, z)
+        location = Location(instance.name or context.source.meshes[instance.mesh].name, instance.node)
+        yield location, stretch, float(np.linalg.det(matrix)), (x, y, z)
 
 
 @check(
@@ -38,11 +38,11 @@ def _stretches(
 def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes whose scale is zero along an axis.
 
-    Nothing of the object is left to light.
+    The object has no area left.
     """
-    for place, stretch, _, at in _stretches(context):
+    for location, stretch, _, at in _stretches(context):
         if not stretch[2] > FLATTEST * stretch[0]:
-            yield RawFinding("the node's scale is zero along an axis", place, position=at)
+            yield RawFinding("the node's scale is zero along an axis", location, position=at)
 
 
 @check(
@@ -54,11 +54,11 @@ def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
 def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes that mirror their mesh.
 
-    glTF turns the winding over then and so does a bake; some engines and exporters do not.
+    glTF reverses their winding, and so does a bake; some engines and exporters do not.
     """
-    for place, stretch, turn, at in _stretches(context):
+    for location, stretch, turn, at in _stretches(context):
         if turn < 0 and stretch[2] > FLATTEST * stretch[0]:
-            yield RawFinding("the node mirrors its mesh (negative scale)", place, position=at)
+            yield RawFinding("the node mirrors its mesh (negative scale)", location, position=at)
 
 
 @check(
@@ -68,16 +68,16 @@ def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
     fix="apply the scale to the mesh, so that texels stay square in engines that share its lightmap UVs",
 )
 def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
-    """Nodes that stretch their mesh by more than 1 % more along one axis than along another.
+    """Nodes whose scales along two axes differ by more than 1 %.
 
     Lightmap UVs made for the mesh are stretched in the world. A bake measures density in the world.
     """
-    for place, stretch, _, at in _stretches(context):
+    for location, stretch, _, at in _stretches(context):
         if stretch[2] > FLATTEST * stretch[0] and stretch[0] > 1.01 * stretch[2]:
             ratio = float(stretch[0] / stretch[2])
             yield RawFinding(
                 f"the node stretches its mesh {ratio:.3g} times more along one axis than along another",
-                place,
+                location,
                 position=at,
             )
 
@@ -104,7 +104,7 @@ def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
         worst = scene.instances[found.worst]
         x, y, z = (float(v) for v in worst.world_from_object[:3, 3])
         text = f"{found.text}; {found.fix}"
-        yield RawFinding(text, Place(worst.name, worst.node), count=found.count, position=(x, y, z))
+        yield RawFinding(text, Location(worst.name, worst.node), count=found.count, position=(x, y, z))
 
 
 @check(
@@ -114,7 +114,7 @@ def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
     fix="export in metres (`scale` for OBJ, PLY, STL and OFF)",
 )
 def scene_size(context: CheckContext) -> Iterator[RawFinding]:
-    """A scene whose size suggests a wrong unit: a diagonal under 5 cm or over 5 km.
+    """A scene whose size suggests a wrong unit: a diagonal below 5 cm or above 5 km.
 
     Intensities in candela fall off with metres, AO reaches metres, `density` counts texels per metre.
     """

@@ -1,4 +1,4 @@
-"""Checks of a lightmap uv as such: that it is there, finite, in the page, not folded, not degenerate."""
+"""Rules about a lightmap uv itself: present, finite, inside the page, not folded, not degenerate."""
 
 from __future__ import annotations
 
@@ -13,14 +13,9 @@ from baker.checks.finding import MOST_FACES, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.checks.uv_facts import UvFacts
+from baker.uv.check import EDGE_SLACK, MOST_LOST, PAGE_TOLERANCE
 
-# Shares of doubly covered samples that count as no overlap: rounded borders that cross by a hair.
-OVERLAP_TOLERANCE = 1e-3
-# Samples closer to an edge than this share of their spacing count for neither side.
-EDGE_SLACK = 0.05
-# Share of the surface without uv area above which the whole uv is useless.
-MOST_LOST = 0.01
-_UNWRAP = "unwrap the object anew (`fix` does, a bake with `uv='auto'` does so, too)"
+_UNWRAP = "unwrap the object (`fix` does, a bake with `uv='auto'` does so, too)"
 
 
 def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
@@ -32,7 +27,7 @@ def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int
 
 
 def worst_first(faces: NDArray[np.int64], badness: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return faces in the order of falling badness."""
+    """Return (n,) faces in descending order of their (n,) badness."""
     return faces[np.argsort(-badness, kind="stable")]
 
 
@@ -53,8 +48,8 @@ def missing(context: CheckContext) -> Iterator[RawFinding]:
         if lacking:
             some = "it has" if lacking == len(facts.good) else f"{lacking} faces have"
             percent = 100.0 * lacking / len(facts.good)
-            place = context.place(m)
-            yield RawFinding(f"{some} no TEXCOORD_1", place, lacking, percent=percent, severity=severity)
+            location = context.location(m)
+            yield RawFinding(f"{some} no TEXCOORD_1", location, lacking, percent=percent, severity=severity)
 
 
 @check("uv.not_finite", group="uv", severity="error", fix=_UNWRAP)
@@ -68,9 +63,9 @@ def not_finite(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.out_of_range", group="uv", severity="error", fix=_UNWRAP)
 def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that reaches out of 0..1.
+    """A lightmap uv that leaves 0..1.
 
-    A lightmap does not repeat: what lies outside has no texels.
+    A lightmap does not repeat, so faces outside have no texels.
     """
     for m, uv in laid_out(context, valid=False):
         bad = uv.finite & uv.outside
@@ -84,10 +79,10 @@ def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
 def overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one object that share texels.
 
-    Both would show the light of one of them. Given in percent of the texels at the asked resolution, with
-    the first ten pairs of faces; 0.1 % or less is taken for rounding.
+    Both show the light of one of them. The percentage is that of texels at the given resolution; the first
+    ten pairs of faces are listed. 0.1 % or less counts as rounding.
     """
-    from baker.checks.kernels.uv_pairs import cover_pairs
+    from baker.checks.kernels.uv_pairs import COVERED, COVERED_AGAIN, LISTED, OVERLAPPING, cover_pairs
 
     resolution = context.settings.resolution
     side = min(2 * resolution, 8192)
@@ -95,21 +90,21 @@ def overlap(context: CheckContext) -> Iterator[RawFinding]:
         owner = np.zeros((side, side), np.int32)
         pairs, counts = np.zeros((MOST_FACES, 2), np.int64), np.zeros(4, np.int64)
         cover_pairs(np.ascontiguousarray(uv.uv) * side, EDGE_SLACK, owner, pairs, counts)
-        covered, doubled = int(counts[0]), int(counts[1])
-        if doubled > max(2, OVERLAP_TOLERANCE * (covered + doubled)):
+        covered, doubled = int(counts[COVERED]), int(counts[COVERED_AGAIN])
+        if doubled > max(2, PAGE_TOLERANCE * (covered + doubled)):
             percent = 100.0 * doubled / (covered + doubled)
-            noted = uv.faces[pairs[: counts[3]]]
+            noted = uv.faces[pairs[: counts[LISTED]]]
             text = f"{percent:.3g}% of its texels at {resolution} belong to more than one face"
             found = faces_found(context, m, noted[:, 1], text)
             both = tuple((int(a), int(b)) for a, b in uv.facts.local[noted])
-            yield replace(found, count=int(counts[2]), percent=percent, pairs=both)
+            yield replace(found, count=int(counts[OVERLAPPING]), percent=percent, pairs=both)
 
 
 @check("uv.degenerate", group="uv", severity="warning", fix=_UNWRAP)
 def degenerate(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area in the lightmap uv.
 
-    They own no texel. An error if they make up over 1 % of the object's surface, or if the whole layout is
+    They have no texels. An error if they make up over 1 % of the object's surface, or if the whole layout is
     smaller than one texel.
     """
     resolution = context.settings.resolution
@@ -127,7 +122,7 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
 def flipped(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces turned over against the rest of their chart: the layout is folded there."""
+    """Faces mirrored in uv relative to the rest of their chart: the layout is folded there."""
     for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))
@@ -144,13 +139,13 @@ def flipped(context: CheckContext) -> Iterator[RawFinding]:
     fix="mirror these charts if an engine uses tangents of the lightmap uv",
 )
 def mirrored(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that are laid out as in a mirror while others are not.
+    """Charts that are mirrored in uv while others are not.
 
-    Irradiance does not mind; directional lightmaps in tangent space do.
+    Irradiance is not affected; directional lightmaps in tangent space are.
     """
     for m, uv in laid_out(context):
         area = uv.per_chart(uv.signed_area)
-        # v runs downwards: a chart that is not mirrored turns clockwise in uv, or all exporters' way round.
+        # Whether v points up or down depends on the exporter: the larger area defines what is not mirrored.
         usual = np.sign(area.sum()) or 1.0
         odd = np.flatnonzero(area * usual < 0)
         if len(odd):

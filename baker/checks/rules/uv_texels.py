@@ -1,4 +1,4 @@
-"""Checks of a lightmap uv at the asked resolution: chart size, padding, density, stretch, waste."""
+"""Rules about a lightmap uv at the resolution of the bake: chart size, padding, density, stretch, waste."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.checks.rules.uv_layout import laid_out
 from baker.checks.uv_facts import UvFacts
 
-# Texels below which a chart has no room for a shadow.
+# Area in texels below which a chart cannot hold a shadow.
 SMALLEST_CHART = 4.0
-# Factor in texels per metre from the object's middle that counts as an outlier: two mip levels.
+# Factor between a chart's texels per metre and the object's median that counts as an outlier: two mip levels.
 DENSITY_FACTOR = 4.0
-# Ratio of a face's two stretches above which its texels are strips, and the share of surface that may be so.
+# Ratio of singular values above which a face is stretched, and the share of surface that may be.
 STRETCH, MOST_STRETCHED = 4.0, 0.05
-# Share of its own rectangle that a layout should fill.
+# Least share of its bounding rectangle that a layout should fill.
 LEAST_FILLED = 0.4
-# Share of surface whose TEXCOORD_0 has no area in a palette lookup, and the most colours it looks up.
+# Share of the surface without area in TEXCOORD_0 above which the set is a palette lookup.
 PALETTE_SHARE = 0.9
 
 
@@ -36,7 +36,7 @@ PALETTE_SHARE = 0.9
 def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that cover less than four texels.
 
-    Their light is one value, mixed with the neighbours' by every filter.
+    Their light is a single value, which bilinear lookup mixes with the padding.
     """
     resolution = context.settings.resolution
     for m, uv in laid_out(context):
@@ -53,13 +53,13 @@ def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
     "uv.padding",
     group="uv",
     severity="warning",
-    fix="leave at least two texels between charts at the resolution used, or unwrap anew",
+    fix="leave at least two texels between charts at the resolution used, or unwrap again",
 )
 def padding(context: CheckContext) -> Iterator[RawFinding]:
     """Charts so close that bilinear lookup mixes them.
 
-    A lookup at a chart's border reads the next texel, too. If that belongs to another chart, its light
-    bleeds in as a bright or dark line.
+    A lookup at a chart's border also reads the next texel. If that belongs to another chart, its light
+    appears as a bright or dark line.
     """
     for m, uv in laid_out(context):
         close, covered = _close(uv, context.settings.resolution)
@@ -67,7 +67,7 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
             percent = 100.0 * close / covered
             yield RawFinding(
                 f"{percent:.3g}% of its texels touch another chart's: bilinear lookup mixes them",
-                context.place(m),
+                context.location(m),
                 close,
                 percent=percent,
             )
@@ -82,7 +82,7 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
 def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that mix at the asked mip level (`mip`, default 2).
 
-    At level n a texel stands for 2^n of the page. Only lightmaps that are sampled with mipmaps mind.
+    A texel of level n covers 2^n x 2^n texels of the page. This affects only lightmaps sampled with mipmaps.
     """
     coarse = context.settings.resolution >> context.mip
     for m, uv in laid_out(context):
@@ -93,14 +93,14 @@ def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
             percent = 100.0 * close / covered
             yield RawFinding(
                 f"{percent:.3g}% of its texels at mip level {context.mip} touch another chart's",
-                context.place(m),
+                context.location(m),
                 close,
                 percent=percent,
             )
 
 
 def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
-    """Return the texels next to another chart's, and all that are covered."""
+    """Return the number of texels next to another chart's, and of all covered texels."""
     from baker.uv.kernels.uv_overlap import count_close, mark_charts
 
     owner = np.zeros((resolution, resolution), np.int32)
@@ -115,9 +115,9 @@ def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
     fix="scale these charts to the size of the others",
 )
 def density(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts with over four times more or fewer texels per metre than the middle of the object's surface.
+    """Charts whose texels per metre differ from the object's median by a factor of more than four.
 
-    Where they meet others a shadow changes from sharp to blurred.
+    At the border to other charts a shadow changes from sharp to blurred.
     """
     for m, uv in laid_out(context):
         flat, real = uv.per_chart(np.abs(uv.signed_area)), uv.per_chart(uv.area)
@@ -149,12 +149,12 @@ def _weighted_median(value: NDArray[np.float64], weight: NDArray[np.float64]) ->
     "uv.stretch",
     group="uv",
     severity="warning",
-    fix="cut these charts more often, or unwrap anew",
+    fix="cut these charts more often, or unwrap again",
 )
 def stretch(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that stretches over 5 % of the surface more than four times more along one axis.
+    """A lightmap uv that stretches more than 5 % of the surface over four times more along one axis.
 
-    Texels are strips there: shadows look sharp across and blurred along them. The figure is the ratio of the
+    Texels are strips there, and shadows look sharp across and blurred along them. Stretch is the ratio of the
     singular values of the map from surface to uv.
     """
     for m, uv in laid_out(context):
@@ -168,11 +168,11 @@ def stretch(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
-    """Return the ratio of the stretches of each face, (F,) float64; 1 where there is none to speak of."""
+    """Return the ratio of singular values of each face's map to uv, (F,) float64; 1 without uv area."""
     corner = uv.facts.corner[uv.rows]
     e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     length = np.maximum(np.sqrt(np.einsum("fx,fx->f", e1, e1)), 1e-300)
-    # The face in its own plane: e1 along x.
+    # Coordinates of the face in its own plane, with e1 along x.
     x2 = np.einsum("fx,fx->f", e1, e2) / length
     y2 = 2.0 * uv.area / length
     d1, d2 = uv.uv[:, 1] - uv.uv[:, 0], uv.uv[:, 2] - uv.uv[:, 0]
@@ -190,12 +190,12 @@ def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
     "uv.utilisation",
     group="uv",
     severity="info",
-    fix="pack the charts closer, or unwrap anew",
+    fix="pack the charts closer, or unwrap again",
 )
 def utilisation(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv that fills less than 40 % of its own rectangle.
 
-    The rest of the rectangle is memory without light in it.
+    The rest of the rectangle is memory without data.
     """
     for m, uv in laid_out(context):
         low, high = uv.uv.min(axis=(0, 1)), uv.uv.max(axis=(0, 1))
@@ -204,7 +204,7 @@ def utilisation(context: CheckContext) -> Iterator[RawFinding]:
         if rectangle > 0 and filled < LEAST_FILLED * rectangle:
             percent = 100.0 * filled / rectangle
             yield RawFinding(
-                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", context.place(m), percent=percent
+                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", context.location(m), percent=percent
             )
 
 
@@ -215,23 +215,23 @@ def utilisation(context: CheckContext) -> Iterator[RawFinding]:
     fix="nothing to do for a bake; never use TEXCOORD_0 as lightmap uv here",
 )
 def palette(context: CheckContext) -> Iterator[RawFinding]:
-    """Objects whose TEXCOORD_0 only looks colours up in a palette.
+    """Objects whose TEXCOORD_0 only samples colours of a palette.
 
-    Nearly all faces lie in single points of the texture, so the set cannot serve as a lightmap uv, as some
-    engines try where TEXCOORD_1 is missing.
+    Nearly all faces are single points in uv, so the set cannot serve as a lightmap uv. Some engines use it as
+    one where TEXCOORD_1 is missing.
     """
     for m, facts in enumerate(context.meshes):
         uv = UvFacts(facts, 0)
         if not len(uv.rows) or not uv.finite.all():
             continue
-        # Less than a texel of a texture of 1024, counted as if the object filled the texture.
+        # A point is an area of less than one texel of a texture of 1024 x 1024.
         point = np.abs(uv.signed_area) * 1024.0**2 < 1.0
         share = float(uv.area[point].sum()) / max(float(uv.area.sum()), 1e-300)
         if share <= PALETTE_SHARE:
             continue
-        # To the nearest 1/256; one number for both, which sorts ten times faster than rows.
+        # Round to 1/256; combine u and v to one number, which sorts ten times faster than rows.
         step = np.clip(np.round(uv.uv[point].reshape(-1, 2) * 256.0), -(2.0**20), 2.0**20).astype(np.int64)
         colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
         if len(uv.rows) >= 2 * colours:
             text = f"its TEXCOORD_0 looks up {colours} colours for {100 * share:.3g}% of the surface"
-            yield RawFinding(text, context.place(m), int(point.sum()), percent=100.0 * share)
+            yield RawFinding(text, context.location(m), int(point.sum()), percent=100.0 * share)

@@ -1,4 +1,4 @@
-"""Vertex colours that take a material's colour away."""
+"""Vertex colours that make a material black."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 
-# Vertex colour below which a surface reflects nothing, and base colour from which that is likely a mistake.
+# Largest vertex colour that counts as black, and least base colour for which that is probably a mistake.
 BLACK, COLOURED = 0.01, 0.05
 
 
@@ -21,10 +21,10 @@ BLACK, COLOURED = 0.01, 0.05
     fix="take COLOR_0 off the mesh, or paint it white where the material is to be seen as it is",
 )
 def black_colours(context: CheckContext) -> Iterator[RawFinding]:
-    """A mesh whose vertex colours are black all over although its material is not.
+    """A mesh whose vertex colours are all black although its material is not.
 
-    glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Exporters write black
-    layers that an engine's shader uses for something else (wind, wetness) or that were never painted.
+    glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Such layers hold data
+    for an engine's shader (wind, wetness) or were never painted.
     """
     for m, facts in enumerate(context.meshes):
         for k, primitive in enumerate(facts.source.primitives):
@@ -40,4 +40,4 @@ def black_colours(context: CheckContext) -> Iterator[RawFinding]:
                     "the vertex colours (COLOR_0) are black all over and take away the base colour of "
                     f"material '{material.name}'"
                 )
-                yield RawFinding(text, context.place(m), len(faces), primitive=primitive.index)
+                yield RawFinding(text, context.location(m), len(faces), primitive=primitive.index)

@@ -58,11 +58,11 @@ def test_light_levels_are_those_of_the_lit_texel(tmp_path):
 
 def test_surfaces_in_the_black_part_of_a_texture_emit_nothing(tmp_path):
     dark = context(tmp_path, UV * 0.1 + 0.8)
-    assert not dark.glows
+    assert not dark.emits
     assert len(list(no_light(dark))) == 1
     (told,) = emissive_black(dark)
     assert "where its emissive texture is black" in told.message
     lit = context(tmp_path, UV)
-    assert lit.glows
+    assert lit.emits
     assert not list(no_light(lit))
     assert not list(emissive_black(lit))

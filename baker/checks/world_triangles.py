@@ -1,4 +1,4 @@
-"""All good triangles in the world, and rays among them."""
+"""The good triangles of all instances in world space, and rays among them."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from baker.core.stage import Stage
 if TYPE_CHECKING:
     from baker.trace.embree import RayScene, Tracer
 
-# Rays that one call of the kernel takes; also what a thread works on at a time.
+# Rays per call of the kernel, which is one task of a thread.
 _TILE = 1 << 16
 
 
-class World:
-    """Every instance's good faces, in the order of instances.
+class WorldTriangles:
+    """The good faces of every instance, in the order of instances.
 
     Parameters
     ----------
     instances : sequence of SourceInstance
     meshes : sequence of MeshFacts
-        What `SourceInstance.mesh` counts.
+        Indexed by `SourceInstance.mesh`.
     materials : sequence of Material
     origin : (3,) float64, metres, world
-        What positions are relative to: `Scene.origin`.
+        Positions are relative to it: `Scene.origin`.
     threads : int
 
     Attributes
     ----------
     position : (V, 3) float32, metres, world, relative to `origin`
     triangle : (T, 3) int64
-        Wound as the front is seen: nodes that mirror turn the winding over.
+        Counter-clockwise seen from the front: mirroring nodes reverse the winding.
     instance : (T,) int64, index into the source scene's instances
     face : (T,) int64, face number in `MeshFacts`
     normal : (T, 3) float64, unit; area : (T,) float64, m2
@@ -59,9 +59,9 @@ class World:
         self.threads = threads
         position, triangle, instance, face, material = [], [], [], [], []
         start = 0
-        for k, place in enumerate(instances):
-            facts = meshes[place.mesh]
-            matrix = place.world_from_object
+        for k, shown in enumerate(instances):
+            facts = meshes[shown.mesh]
+            matrix = shown.world_from_object
             with np.errstate(over="ignore", invalid="ignore"):
                 world = facts.position.astype(np.float64) @ matrix[:3, :3].T + (matrix[:3, 3] - origin)
             corner = facts.triangle[facts.good]
@@ -81,7 +81,7 @@ class World:
         self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
         sided = np.array([m.double_sided for m in materials], bool)
         self.double_sided: NDArray[np.bool_] = sided[self.material]
-        # Instances squashed flat have faces without area.
+        # Instances that a scale of zero flattens have faces without area.
         a, b, c = (self.position[self.triangle[:, k]].astype(np.float64) for k in range(3))
         cross = np.cross(b - a, c - a)
         length = np.sqrt(np.einsum("tx,tx->t", cross, cross))
@@ -97,23 +97,23 @@ class World:
     def lifted(
         self, point: NDArray[np.float64], triangle: NDArray[np.int64], normal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return ray origins just off points (n, 3) of triangles (n,), along normals (n, 3)."""
-        # Here: it brings the compiler.
+        """Return ray origins: (n, 3) points of (n,) triangles moved off the surface along (n, 3) normals."""
+        # Imported here, since it imports the compiler.
         from baker.kernels.surface import OFFSET, ROUNDING
 
         far, size = np.abs(point).max(axis=1, initial=0.0), self.size[triangle]
         step = np.maximum(ROUNDING * np.maximum(far, size), OFFSET * np.minimum(far, size))
         return np.asarray(point + step[:, None] * normal)
 
-    def place_of(self, triangle: int) -> tuple[float, float, float]:
-        """Return the middle of a triangle, metres, world."""
+    def middle_of(self, triangle: int) -> tuple[float, float, float]:
+        """Return the centroid of a triangle, metres, world."""
         middle = self.position[self.triangle[triangle]].mean(axis=0) + self.origin
         x, y, z = (float(v) for v in middle)
         return x, y, z
 
     @cached_property
     def rays(self) -> RayScene:
-        """Return the ray tree, built once."""
+        """Return the ray tree."""
         from baker.trace.embree import RayScene
 
         return RayScene(self.position, self.triangle.astype(np.uint32), threads=self.threads)
@@ -121,23 +121,30 @@ class World:
     def first_hits(
         self,
         origin: NDArray[np.floating],
-        way: NDArray[np.floating],
+        direction: NDArray[np.floating],
         near: NDArray[np.floating],
         far: NDArray[np.floating],
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Return the triangle (-1 for none) and distance that (n, 3) rays hit between `near` and `far`."""
-        return cast(self.rays.tracer, self.threads, origin, way, near, far)
+        """Return the first hits of n rays: triangle (n,) int32, -1 for none, and distance (n,) float32.
+
+        Parameters
+        ----------
+        origin, direction : (n, 3) float, metres, relative to `Scene.origin`
+        near, far : (n,) float
+            Range of the ray parameter, in lengths of `direction`.
+        """
+        return cast(self.rays.tracer, self.threads, origin, direction, near, far)
 
 
 def cast(
     tracer: Tracer,
     threads: int,
     origin: NDArray[np.floating],
-    way: NDArray[np.floating],
+    direction: NDArray[np.floating],
     near: NDArray[np.floating],
     far: NDArray[np.floating],
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the triangle (-1 for none) and distance of the first hit of (n, 3) rays."""
+    """Return the first hits of n rays through any tracer, see `WorldTriangles.first_hits`."""
     from baker.core.parallel import run_tiles
     from baker.core.progress import silent
     from baker.kernels.cast import first_hits
@@ -145,7 +152,7 @@ def cast(
 
     n = len(origin)
     triangle, distance = np.full(n, -1, np.int32), np.zeros(n, np.float32)
-    a, b, c, d = (np.ascontiguousarray(value, np.float32) for value in (origin, way, near, far))
+    a, b, c, d = (np.ascontiguousarray(value, np.float32) for value in (origin, direction, near, far))
 
     def work(i: int, j: int) -> None:
         first_hits(new_packet_buffers(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
