@@ -28,7 +28,7 @@ from baker.core.parallel import thread_count
 from baker.io.load import load_scene
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.first_hit import first_hits
-from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.radiance import radiance_pass
 from baker.pathtracer.scene import build_reference
@@ -95,7 +95,7 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
             theirs_took = perf_counter() - start
             one = new_estimate(len(met), 1, OPEN_SAMPLES)
             start = perf_counter()
-            openness_pass(reference, one, *where, distance=reach, seed=turn)
+            ambient_occlusion_pass(reference, one, *where, distance=reach, seed=turn)
             own_open = perf_counter() - start
             start = perf_counter()
             share = _mitsuba_ao(other, where[0][:, 0], where[2][:, 0], reach, turn)

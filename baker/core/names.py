@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import TypeVar
 
-from baker.core.errors import SettingsError
+from baker.core.errors import BakerError, SettingsError
+
+E = TypeVar("E", bound=BakerError)
 
 
 def unknown_name(
@@ -16,7 +19,8 @@ def unknown_name(
     file: str | None = None,
     object: str | None = None,
     listed: str | None = None,
-) -> SettingsError:
+    error: type[E] = SettingsError,  # type: ignore[assignment]
+) -> E:
     """Return the error for an unknown name, which suggests the nearest known name and lists all names.
 
     Parameters
@@ -29,15 +33,17 @@ def unknown_name(
     known : iterable of str
         The known names, in the order of the message.
     file : str or None
-        Passed to `SettingsError`.
+        Passed to the error.
     object : str or None
-        Passed to `SettingsError`.
+        Passed to the error.
     listed : str or None
         Text in place of the list of known names, where the list is too long for a sentence.
+    error : type
+        Class of the error: `SettingsError`, or `InputError` for a name in a scene file.
 
     Returns
     -------
-    SettingsError
+    BakerError
         The error, not raised.
     """
     known = list(known)
@@ -45,7 +51,7 @@ def unknown_name(
     near = get_close_matches(_fold(name), folded, n=1)
     names = listed or f"known are {', '.join(known)}"
     hint = f"did you mean '{folded[near[0]]}'? ({names})" if near else names
-    return SettingsError(f"there is no {what} '{name}'; {hint}", file=file, object=object)
+    return error(f"there is no {what} '{name}'; {hint}", file=file, object=object)
 
 
 def _fold(name: str) -> str:

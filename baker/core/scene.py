@@ -7,7 +7,7 @@ transforms them to world space.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -139,7 +139,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class PunctualLight:
-    """A light without area; its kind is described in `core.light_kind` and `baker.lights.families`.
+    """A light without area; its kind is described in `core.light_kind` and `baker.lights.kinds`.
 
     Attributes
     ----------
@@ -153,6 +153,8 @@ class PunctualLight:
     inner_cone, outer_cone : float, radians (spot)
     range : float, metres
         Distance at which a point or spot light has faded to 0; inf for no limit.
+    parameters : mapping
+        Further parameters that only this kind of light has, by name.
     """
 
     kind: str
@@ -164,6 +166,7 @@ class PunctualLight:
     inner_cone: float = 0.0
     outer_cone: float = 0.7853981633974483
     range: float = math.inf
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def inverse_range(self) -> float:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from baker.core.error_mapping import memory_errors
 from baker.core.errors import InputError, SettingsError
-from baker.core.light_kind import check_lights
+from baker.core.light_limits import check_brightness
 from baker.core.registry import Registry
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
@@ -114,7 +114,7 @@ def load_scene(
     with memory_errors(file=str(path)):
         scene = importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
     if not lenient:
-        check_lights(scene)
+        check_brightness(scene)
     return scene
 
 

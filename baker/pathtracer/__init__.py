@@ -2,4 +2,4 @@
 
 from baker.trace.kernel_cache import keep_kernels
 
-keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.lights.families")
+keep_kernels(__file__, "baker.trace", "baker.kernels")

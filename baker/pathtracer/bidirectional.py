@@ -1,12 +1,13 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Paths from lamps and paths from the eye, connected in all ways, many at once in packets.
+"""Bidirectional path tracing: subpaths from lights and from the eye, connected in all ways, in ray packets.
 
-Each sample starts a subpath at a lamp, keeps its vertices, then walks from the eye; every vertex there looks
-at a lamp and at all kept vertices. With a camera, kept vertices look at its pinhole as well: what they send
-there is a *splat* on whatever pixel they are seen through. Weights: `bidirectional_weights`.
+Each sample traces a subpath from a light and stores its vertices, then traces a subpath from the eye. Every
+eye vertex is connected to a light and to all stored vertices. With a camera, stored vertices are connected to
+its pinhole as well; that light is a *splat* on the pixel it is seen through. MIS weights:
+`bidirectional_weights`.
 
-A lamp's subpath has at most `MOST_FROM_LAMP` vertices, the eye's as many as Russian roulette lets live. The
-weights count exactly the ways that are there: what is too long for the lamp's side is made from the eye's.
+A light subpath has at most `MAX_LIGHT_VERTICES` vertices; eye subpaths end by Russian roulette. The weights
+count exactly the techniques that exist within this limit.
 
 Based on: Lafortune and Willems, Bi-directional path tracing, 1993; Veach and Guibas, Bidirectional estimators
 for light transport, 1994; Dutre, Lafortune and Willems, Monte Carlo light tracing with direct computation of
@@ -26,13 +27,14 @@ from baker.pathtracer.bidirectional_lights import (
     fade,
     meet_emitter,
     meet_sky,
-    range_of_lamp,
-    start_at_lamp,
+    range_of_light,
+    start_at_light,
 )
 from baker.pathtracer.bidirectional_weights import (
     BACK,
     CHAIN,
-    MOST_FROM_LAMP,
+    EYE,
+    MAX_LIGHT_VERTICES,
     N_ROWS_BOTH,
     OPEN,
     leave_vertex,
@@ -41,29 +43,29 @@ from baker.pathtracer.bidirectional_weights import (
     pixel_of,
     reach_vertex,
     towards_eye,
-    towards_lamp,
+    towards_light,
 )
 from baker.pathtracer.bsdf import N_PARAMETERS, bsdf_sample
+from baker.pathtracer.emitters import EMITTER_TEXTURED
 from baker.pathtracer.light_table import SHORT, on_whole_triangle
-from baker.pathtracer.light_table import TEXTURED as GLOWS
 from baker.pathtracer.rng import draw, path_state, stratum
 from baker.pathtracer.scene import EMITTER, SHINES, TEXTURED
 from baker.pathtracer.vertex import (
     BETA,
     BOUNCES,
+    COLLECTED,
     DENSITY,
     FRAME,
     GO,
     GRAZE,
-    LIGHT,
     MOST,
     NORMAL,
-    PLACE,
+    POSITION,
     SHADED,
     SURE,
     TO,
     arrive,
-    glow,
+    multiply_emission_texture,
     paint,
     start_path,
 )
@@ -71,19 +73,25 @@ from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
 _IDLE, _RAY, _VERTEX = 0, 1, 2
-# Working memory of a tile; kept vertices stand in column (vertex * MAX_WIDTH + lane).
-_new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
-_new_row, _new_kept_row = (scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MOST_FROM_LAMP))
+# Working memory of a tile; stored vertices are in column vertex * MAX_WIDTH + lane.
+_new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MAX_LIGHT_VERTICES))
+_new_row, _new_kept_row = (
+    scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MAX_LIGHT_VERTICES)
+)
 _new_numbers, _new_state, _new_flags, _new_first = (
     scratch((MAX_WIDTH,), kind) for kind in (np.int64, np.uint64, np.bool_, np.float64)
 )
-_new_value, _new_rgba, _new_way, _new_spot = (scratch((n,), np.float64) for n in (3, 4, 6, 2))
+_new_value, _new_rgba, _new_ray, _new_spot = (scratch((n,), np.float64) for n in (3, 4, 6, 2))
 _new_values = scratch((3, MAX_WIDTH), np.float64)
 
 
 @inner
 def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):
-    """Begin a subpath at a surface point, which counts as white, or (n_subpaths > 0) at a camera."""
+    """Start a subpath at a white surface point, or (n_subpaths > 0) at a camera.
+
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; where, toward, normal, sizes : see `start_path`
+    camera, n_subpaths : see `trace_both_ways`
+    """
     at_surface = n_subpaths == 0.0
     start_path(path, row, lane, where, toward, normal, at_surface, sizes)
     for r in range(BACK, N_ROWS_BOTH):
@@ -99,9 +107,10 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, siz
 
 @inner
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
-    """Choose the direction in which a subpath goes on; return False where it ends.
+    """Sample the next direction of a subpath; return False where it ends.
 
-    eye : whether it began at the eye; choice, u, w : uniform numbers; value, spare : (3,) working memory
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; eye : whether the subpath started at the eye
+    choice, u, w : uniform numbers; value, spare : (3,) float64, working memory
     """
     lx, ly, lz, density, smooth = bsdf_sample(
         row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], choice, u, w, value
@@ -117,7 +126,8 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
         density = reverse = 1.0
         shaded = bx * path[SHADED, lane] + by * path[SHADED + 1, lane] + bz * path[SHADED + 2, lane]
         if shaded <= GRAZE:
-            # The normal was replaced for this viewer: from the other side it is another mirror.
+            # `arrive` replaced the shading normal for this direction; the mirror is another one from the
+            # light.
             if not eye:
                 return False
             reverse = 0.0
@@ -132,7 +142,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
         for c in range(3):
             value[c] *= above / density
     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane] = dx, dy, dz
-    leave_vertex(path, lane, density, reverse, smooth, MOST_FROM_LAMP if eye else 1)
+    leave_vertex(path, lane, density, reverse, smooth, MAX_LIGHT_VERTICES if eye else 1)
     most = 0.0
     for c in range(3):
         path[BETA + c, lane] *= value[c]
@@ -141,14 +151,17 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
 
 
 @inner
-def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):
-    """Connect an eye subpath's end to vertex k of `kept`, the s-th of a lamp's; return if that brings light.
+def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
+    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; return if light
+    passes.
 
-    value : (3,) output, the light if nothing is in the way; way : (6,) output, unit direction and reach
+    path, kept : (N_ROWS_BOTH, n) float64; row, kept_row : (5, n) float64
+    value : (3,) float64, output, the light of an unblocked connection; spare : (3,) float64, working memory
+    ray : (6,) float64, output: unit direction, length in metres, 2 unused
     """
-    dx = kept[PLACE, k] - path[PLACE, lane]
-    dy = kept[PLACE + 1, k] - path[PLACE + 1, lane]
-    dz = kept[PLACE + 2, k] - path[PLACE + 2, lane]
+    dx = kept[POSITION, k] - path[POSITION, lane]
+    dy = kept[POSITION + 1, k] - path[POSITION + 1, lane]
+    dz = kept[POSITION + 2, k] - path[POSITION + 2, lane]
     square = dx * dx + dy * dy + dz * dz
     if square <= 0.0:
         return False
@@ -158,50 +171,52 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, way):
     there = -(dx * kept[NORMAL, k] + dy * kept[NORMAL + 1, k] + dz * kept[NORMAL + 2, k])
     if here <= 0.0 or there <= 0.0:
         return False
-    eye_here, lamp_here = meet(
+    eye_here, light_here = meet(
         path, row, lane, path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane], dx, dy, dz, value
     )
-    eye_there, lamp_there = meet(
+    eye_there, light_there = meet(
         kept, kept_row, k, -dx, -dy, -dz, kept[BACK, k], kept[BACK + 1, k], kept[BACK + 2, k], spare
     )
-    less = towards_lamp(kept, k, eye_here * there / square, eye_there)
-    more = towards_eye(path, lane, lamp_there * here / square, lamp_here, MOST_FROM_LAMP - s)
+    less = towards_light(kept, k, eye_here * there / square, eye_there)
+    more = towards_eye(path, lane, light_there * here / square, light_here, MAX_LIGHT_VERTICES - s)
     scale = here * there / (square * (1.0 + less + more))
     total = 0.0
     for c in range(3):
         value[c] *= path[BETA + c, lane] * kept[BETA + c, k] * spare[c] * scale
         total += value[c]
-    way[0], way[1], way[2], way[3] = dx, dy, dz, length * SHORT
+    ray[0], ray[1], ray[2], ray[3] = dx, dy, dz, length * SHORT
     return total > 0.0
 
 
 @inner
-def show(path, row, lane, camera, n_subpaths, value, way):
-    """Connect a lamp's subpath to the camera; return the pixel it is seen through, or -1.
+def show(path, row, lane, camera, n_subpaths, value, ray):
+    """Connect the end of a light subpath to the camera; return the pixel it is seen through, or -1.
 
-    value : (3,) output, light for the sum over the subpaths of all pixels; way : (6,) output, see `connect`
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
+    value : (3,) float64, output, light for the sum over the subpaths of all pixels
+    ray : (6,) float64, output, see `connect`
     """
     for a in range(3):
-        way[a] = path[PLACE + a, lane] - camera[a]
-    square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+        ray[a] = path[POSITION + a, lane] - camera[EYE + a]
+    square = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]
     if square <= 0.0:
         return -1
     length = math.sqrt(square)
     for a in range(3):
-        way[a] /= length
-    pixel = pixel_of(camera, way)
+        ray[a] /= length
+    pixel = pixel_of(camera, ray)
     cosine = -(
-        way[0] * path[NORMAL, lane] + way[1] * path[NORMAL + 1, lane] + way[2] * path[NORMAL + 2, lane]
+        ray[0] * path[NORMAL, lane] + ray[1] * path[NORMAL + 1, lane] + ray[2] * path[NORMAL + 2, lane]
     )
     if pixel < 0 or cosine <= 0.0:
         return -1
-    density = pixel_density(camera, way) * cosine / square
-    way[0], way[1], way[2], way[3] = -way[0], -way[1], -way[2], length * SHORT
+    density = pixel_density(camera, ray) * cosine / square
+    ray[0], ray[1], ray[2], ray[3] = -ray[0], -ray[1], -ray[2], length * SHORT
     reverse, _ = meet(
-        path, row, lane, way[0], way[1], way[2], path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane],
+        path, row, lane, ray[0], ray[1], ray[2], path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane],
         value,
     )  # fmt: skip
-    less = towards_lamp(path, lane, density, reverse) / n_subpaths
+    less = towards_light(path, lane, density, reverse) / n_subpaths
     total = 0.0
     for c in range(3):
         value[c] *= path[BETA + c, lane] * density / (n_subpaths * (1.0 + less))
@@ -211,32 +226,19 @@ def show(path, row, lane, camera, n_subpaths, value, way):
 
 @kernel
 def trace_both_ways(
-    where,
-    toward,
-    normal,
-    begin,
-    camera,
-    n_subpaths,
-    surfaces,
-    lamps,
-    shading,
-    sphere,
-    buffers,
-    net,
-    how,
-    out,
-    splat_pixel,
-    splat,
-):
+    where, toward, normal, begin, camera, n_subpaths, surfaces, lights, shading, sphere, buffers,
+    sobol_points, how, out, splat_pixel, splat,
+):  # fmt: skip
     """Do what `trace_paths` does, with paths from both ends.
 
-    where, toward, normal, begin, surfaces, lamps, shading, buffers, net, how, out : see `trace_paths`
-    camera : (15,) float64: position, right, up, forward, tangent of half the height, pixels across and down
-    n_subpaths : float, lamps' subpaths that can be seen by one pixel for each of the pixel's own samples,
+    where, toward, normal, begin, surfaces, lights, shading, sobol_points, how, out : see `trace_paths`
+    buffers : `PacketBuffers`
+    camera : (15,) float64, see `bidirectional_weights`
+    n_subpaths : float, lights' subpaths that can be seen by one pixel for each of the pixel's own samples,
         which is the number of pixels; 0 if paths begin at surfaces
     sphere : (4,) float64, `Reference.sphere`
     splat_pixel : (q,) int64 and splat : (q, 3) float64 output, sums as in `out` for pixels anywhere; q at
-        least m n (`MOST_FROM_LAMP` - 1) with a camera
+        min_offset_scale m n (`MAX_LIGHT_VERTICES` - 1) with a camera
 
     Returns
     -------
@@ -245,33 +247,32 @@ def trace_both_ways(
     """
     width, scene, intersect, occluded = buffers.width, buffers.scene, buffers.intersect, buffers.occluded
     valid, floats, words = buffers.valid, buffers.floats, buffers.words
-    surface, material, least, lambertian = (
+    surface, material, min_offset_scale, lambertian = (
         surfaces.row,
         surfaces.material,
-        surfaces.least,
+        surfaces.min_offset_scale,
         surfaces.lambertian,
     )
-    sizes = (least, surfaces.most)
-    triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
-    cumulative, sky = lamps.cumulative, lamps.sky
+    sizes = (min_offset_scale, surfaces.most)
+    emitter, triangle = lights.emitter, lights.triangle
     alpha = len(shading.alpha.slot) > 0
     strata, most_bounces, seed, number_of_pass = how[2], how[4], how[5], how[6]
-    # A path may have so many bounces that a lamp's subpath must end before.
-    most_kept = MOST_FROM_LAMP
+    # A path may have so many bounces that a light's subpath must end before.
+    most_kept = MAX_LIGHT_VERTICES
     if most_bounces >= 0:
-        most_kept = min(MOST_FROM_LAMP, most_bounces + (2 if n_subpaths > 0.0 else 1))
-    lit = cumulative[len(cumulative) - 1] > 0.0
+        most_kept = min(MAX_LIGHT_VERTICES, most_bounces + (2 if n_subpaths > 0.0 else 1))
+    lit = lights.cumulative[len(lights.cumulative) - 1] > 0.0
     path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
-    # Vertices of the lane's subpath from a lamp, the lamp among them.
+    # Vertices of the lane's subpath from a light, the light among them.
     count = _new_numbers()
-    # Its brightest colour at the start, and 1 / range^2 of its lamp.
+    # Its brightest colour at the start, and 1 / range^2 of its light.
     eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
-    value, spare, way, rgba, spot = _new_value(), _new_value(), _new_way(), _new_rgba(), _new_spot()
+    value, spare, ray, rgba, spot = _new_value(), _new_value(), _new_ray(), _new_rgba(), _new_spot()
     values, state = _new_values(), _new_state()
     pixel, stage, job = _new_numbers(), _new_numbers(), _new_numbers()
     for lane in range(MAX_WIDTH):
         job[lane] = -1
-    samples, m, places = len(net), where.shape[0], where.shape[1]
+    samples, m, places = len(sobol_points), where.shape[0], where.shape[1]
     following = rays = shadows = splats = 0
     while True:
         any_ray = any_path = False
@@ -286,17 +287,17 @@ def trace_both_ways(
                 if lit and most_kept > 1:
                     choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
                     a, b = draw(state, lane), draw(state, lane)
-                    lamp = start_at_lamp(
-                        path, lane, triangle, point, cumulative, sky, sphere, least, choice, u, w, a, b, spot
+                    light = start_at_light(
+                        path, lane, lights, sphere, min_offset_scale, choice, u, w, a, b, spot
                     )
-                    if lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
+                    if light < len(emitter) and (alpha or emitter[light, EMITTER_TEXTURED] > 0.0):
                         for c in range(3):
                             value[c] = path[BETA + c, lane]
-                        u, v = on_whole_triangle(triangle, lamp, spot[0], spot[1])
-                        glow(shading, number[lamp], u, v, value, rgba, True)
+                        u, v = on_whole_triangle(emitter, light, spot[0], spot[1])
+                        multiply_emission_texture(shading, triangle[light], u, v, value, rgba, True)
                         for c in range(3):
                             path[BETA + c, lane] = value[c]
-                    inverse_range[lane] = range_of_lamp(point, lamp, len(triangle))
+                    inverse_range[lane] = range_of_light(lights, light)
                     first[lane] = max(path[BETA, lane], path[BETA + 1, lane], path[BETA + 2, lane])
                     if first[lane] > 0.0:
                         eye[lane] = False
@@ -312,7 +313,7 @@ def trace_both_ways(
             if stage[lane] == _RAY:
                 set_ray(
                     floats, words, width, lane,
-                    path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
+                    path[POSITION, lane], path[POSITION + 1, lane], path[POSITION + 2, lane],
                     path[GO, lane], path[GO + 1, lane], path[GO + 2, lane], np.float32(1.0e30),
                 )  # fmt: skip
                 valid[lane] = -1
@@ -336,31 +337,31 @@ def trace_both_ways(
                 prim = np.int64(words[PRIM_ID * width + lane])
                 u = np.float64(floats[HIT_U * width + lane])
                 v = np.float64(floats[HIT_V * width + lane])
-                alive = arrive(path, row, lane, surface, material, prim, u, v, least, lambertian)
+                alive = arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian)
                 if alive and not eye[lane] and count[lane] == 1 and inverse_range[lane] > 0.0:
                     distance = np.float64(floats[TFAR * width + lane])
                     alive = fade(path, lane, distance, inverse_range[lane])
                 if alive:
                     reach_vertex(
                         path, lane, np.float64(floats[TFAR * width + lane]),
-                        MOST_FROM_LAMP if eye[lane] else 1,
+                        MAX_LIGHT_VERTICES if eye[lane] else 1,
                     )  # fmt: skip
                     if eye[lane] and surface[prim, SHINES] > 0.0:
                         e = emitter_at(
-                            node, np.int64(surface[prim, EMITTER]),
+                            lights.node, np.int64(surface[prim, EMITTER]),
                             floats[HIT_U * width + lane], floats[HIT_V * width + lane],
                         )  # fmt: skip
-                        meet_emitter(path, lane, surface, prim, triangle, e, seen, value)
+                        meet_emitter(path, lane, surface, prim, emitter, e, seen, value)
                         if surface[prim, SHINES] > 1.0:
-                            glow(shading, prim, u, v, value, rgba, False)
+                            multiply_emission_texture(shading, prim, u, v, value, rgba, False)
                         for c in range(3):
-                            path[LIGHT + c, lane] += value[c]
+                            path[COLLECTED + c, lane] += value[c]
                     if surface[prim, TEXTURED] > 0.0:
                         paint(row, lane, shading, prim, u, v, material, rgba)
             elif eye[lane]:
-                meet_sky(path, lane, sky, sphere, seen, value)
+                meet_sky(path, lane, lights.sky, sphere, seen, value)
                 for c in range(3):
-                    path[LIGHT + c, lane] += value[c]
+                    path[COLLECTED + c, lane] += value[c]
             if eye[lane]:
                 path[BOUNCES, lane] += 1.0
                 alive = alive and not (most_bounces >= 0 and path[BOUNCES, lane] > most_bounces)
@@ -372,9 +373,9 @@ def trace_both_ways(
                 for r in range(N_PARAMETERS):
                     kept_row[r, k] = row[r, lane]
             stage[lane] = _VERTEX if alive else _IDLE
-        # Connection 0 aims at a lamp or, from a lamp's side, at the camera; the others take kept vertices.
+        # Connection 0 aims at a light or, from a light's side, at the camera; the others take kept vertices.
         step = 0
-        while step < MOST_FROM_LAMP:
+        while step < MAX_LIGHT_VERTICES:
             any_shadow = more = False
             for lane in range(width):
                 valid[lane] = 0
@@ -383,7 +384,7 @@ def trace_both_ways(
                 found = False
                 if not eye[lane]:
                     if step == 0 and n_subpaths > 0.0:
-                        pixel[lane] = show(path, row, lane, camera, n_subpaths, value, way)
+                        pixel[lane] = show(path, row, lane, camera, n_subpaths, value, ray)
                         found = pixel[lane] >= 0
                 elif step == 0:
                     more = more or count[lane] > 1
@@ -391,26 +392,23 @@ def trace_both_ways(
                         choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
                         if strata and path[BOUNCES, lane] == 0.0:
                             u, w = stratum(
-                                net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 0
+                                sobol_points, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 0
                             )
-                        lamp = aim_both_ways(
-                            path, row, lane, triangle, point, cumulative, sky, sphere, choice, u, w, value,
-                            way,
-                        )  # fmt: skip
-                        if 0 <= lamp < len(triangle) and (alpha or triangle[lamp, GLOWS] > 0.0):
-                            u, v = on_whole_triangle(triangle, lamp, way[4], way[5])
-                            glow(shading, number[lamp], u, v, value, rgba, True)
-                        found = lamp >= 0
+                        light = aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray)
+                        if 0 <= light < len(emitter) and (alpha or emitter[light, EMITTER_TEXTURED] > 0.0):
+                            u, v = on_whole_triangle(emitter, light, ray[4], ray[5])
+                            multiply_emission_texture(shading, triangle[light], u, v, value, rgba, True)
+                        found = light >= 0
                 elif step < count[lane]:
                     more = more or step + 1 < count[lane]
                     if most_bounces < 0 or step + path[BOUNCES, lane] <= most_bounces:
                         k = step * MAX_WIDTH + lane
-                        found = connect(path, row, lane, kept, kept_row, k, step + 1, value, spare, way)
+                        found = connect(path, row, lane, kept, kept_row, k, step + 1, value, spare, ray)
                 if found:
                     set_ray(
                         floats, words, width, lane,
-                        path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane],
-                        way[0], way[1], way[2], np.float32(way[3]),
+                        path[POSITION, lane], path[POSITION + 1, lane], path[POSITION + 2, lane],
+                        ray[0], ray[1], ray[2], np.float32(ray[3]),
                     )  # fmt: skip
                     valid[lane] = -1
                     any_shadow = True
@@ -424,7 +422,9 @@ def trace_both_ways(
                         continue
                     if eye[lane]:
                         for c in range(3):
-                            path[LIGHT + c, lane] += values[c, lane] * transmittance(buffers.blend, c, lane)
+                            path[COLLECTED + c, lane] += values[c, lane] * transmittance(
+                                buffers.blend, c, lane
+                            )
                     else:
                         splat_pixel[splats] = pixel[lane]
                         for c in range(3):
@@ -440,7 +440,9 @@ def trace_both_ways(
             if alive:
                 choice, u, w = draw(state, lane), draw(state, lane), draw(state, lane)
                 if eye[lane] and strata and path[BOUNCES, lane] == 0.0:
-                    u, w = stratum(net, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1)
+                    u, w = stratum(
+                        sobol_points, job[lane] // m, begin + job[lane] % m, seed, number_of_pass, 1
+                    )
                 alive = scatter_both(path, row, lane, eye[lane], choice, u, w, value, spare)
                 length = path[BOUNCES, lane] if eye[lane] else np.float64(count[lane] - 1)
                 if alive and length >= SURE:
@@ -454,7 +456,7 @@ def trace_both_ways(
                 continue
             if eye[lane]:
                 for c in range(3):
-                    out[job[lane] % m, c] += path[LIGHT + c, lane]
+                    out[job[lane] % m, c] += path[COLLECTED + c, lane]
                 job[lane] = -1
                 stage[lane] = _IDLE
             else:

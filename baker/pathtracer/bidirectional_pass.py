@@ -17,7 +17,7 @@ from baker.core.progress import Progress
 from baker.core.scene import Camera
 from baker.core.stage import Stage
 from baker.pathtracer.bidirectional import trace_both_ways
-from baker.pathtracer.bidirectional_weights import MOST_FROM_LAMP
+from baker.pathtracer.bidirectional_weights import CAMERA_COLUMNS, MAX_LIGHT_VERTICES
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
@@ -31,15 +31,16 @@ def surface_tile(
     reference: Reference,
     places: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     begin: int,
-    net: NDArray[np.uint32],
+    sobol_points: NDArray[np.uint32],
     setting: NDArray[np.int64],
     out: NDArray[np.float64],
 ) -> tuple[int, int]:
     """Add E / pi of points to `out` (m, 3), see `irradiance_pass`; return closest-hit and shadow rays."""
     rays, shadows, _ = trace_both_ways(
-        *places, begin, np.zeros(15), 0.0, reference.surfaces, reference.lamps, reference.shading,
-        reference.sphere, new_packet_buffers(reference.rays.tracer), net, setting, out, np.zeros(0, np.int64),
-        np.zeros((0, 3)),
+        *places, begin, np.zeros(CAMERA_COLUMNS), 0.0, reference.surfaces, reference.lights,
+        reference.shading, reference.sphere, new_packet_buffers(reference.rays.tracer), sobol_points,
+        setting, out,
+        np.zeros(0, np.int64), np.zeros((0, 3)),
     )  # fmt: skip
     return int(rays), int(shadows)
 
@@ -50,7 +51,7 @@ def picture_pass(
     camera: Camera,
     width: int,
     height: int,
-    net: NDArray[np.uint32],
+    sobol_points: NDArray[np.uint32],
     setting: NDArray[np.int64],
     seed: int,
     progress: Progress,
@@ -76,14 +77,15 @@ def picture_pass(
 
         def work(begin: int, end: int, block: int = block, found: list[Any] = found) -> None:
             pixel = np.arange(block + begin, block + end)
-            way = camera_rays(camera, width, height, pixel, samples, seed, number)
-            origin = np.broadcast_to(eye, way.shape).copy()
-            most = len(pixel) * samples * (MOST_FROM_LAMP - 1)
+            direction = camera_rays(camera, width, height, pixel, samples, seed, number)
+            origin = np.broadcast_to(eye, direction.shape).copy()
+            most = len(pixel) * samples * (MAX_LIGHT_VERTICES - 1)
             splat_pixel, splat = np.zeros(most, np.int64), np.zeros((most, 3))
             span = slice(block + begin, block + end)
             cast, shadows, splats = trace_both_ways(
-                origin, way, way, block + begin, lens, float(n), reference.surfaces, reference.lamps,
-                reference.shading, reference.sphere, new_packet_buffers(reference.rays.tracer), net, setting,
+                origin, direction, direction, block + begin, lens, float(n), reference.surfaces,
+                reference.lights, reference.shading, reference.sphere,
+                new_packet_buffers(reference.rays.tracer), sobol_points, setting,
                 seen[span], splat_pixel, splat,
             )  # fmt: skip
             found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast, shadows)

@@ -1,16 +1,16 @@
 # mypy: disable-error-code="no-untyped-def"
-"""How likely each way to make a path is, beside the way it was made: the weights of `bidirectional`.
+"""MIS weights of `bidirectional`: densities of all techniques relative to the one that made the path.
 
-A path x_0 (lamp) .. x_k-1 (eye) can be made with s vertices from the lamp and t = k - s from the eye, at
+A path x_0 (light) .. x_k-1 (eye) can be made with s vertices from the light and t = k - s from the eye, with
 density p_s (per area):
 
     p_s+1 / p_s = pL(x_s) / pE(x_s)    w_s = 1 / (1 + sum over s' != s of p_s' / p_s)    (balance heuristic)
 
-pL and pE: density of a vertex if it is reached from the lamp's or from the eye's side. Sums towards either
-end are carried along while a subpath grows: a connection costs the same however long both are. Towards the
-lamp no way is missing. Towards the eye the number of lamp vertices is bounded, thus there is one sum for
-each number that may still be added. Mirror reflections take part with density 1, since theirs cancels, and as
-ends of a connection they count 0.
+pL and pE are the densities of a vertex sampled from the light side and from the eye side. Both sums are
+updated while a subpath grows, so that a connection costs the same for subpaths of any length. All techniques
+with fewer light vertices exist. The number of light vertices is bounded, so an eye subpath carries one sum
+for each number of light vertices that may be added. Mirror reflections have density 1, since theirs cancels
+in the ratio, and weight 0 as ends of a connection.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 5.3 (shading normals), 8
 and 10; van Antwerpen, Unbiased physically based rendering on the GPU, 2011 (recursive sums); Georgiev,
@@ -25,27 +25,38 @@ from baker.pathtracer.bsdf import INV_PI, WIDTH, bsdf_cosines, cosines_pdf
 from baker.pathtracer.vertex import DENSITY, GO, GRAZE, N_ROWS, NORMAL, SHADED
 from baker.trace.jit import inner
 
-# Most vertices of a subpath that starts at a lamp, the one on the lamp among them.
-MOST_FROM_LAMP = 8
-# Further rows of a path: unit direction back to the vertex before; 1 / density of this vertex per area; share
-# of the way in which both subpaths end between this vertex and the one before (1, 0 at mirrors, the number of
-# subpaths where ends differ in it); cosine at which the path leaves; what light starts from (0 a place, 1
-# parallel light, 2 the sky; 0 behind the first vertex); first of the sums over all ways farther back.
+# Most vertices of a light subpath, the one on the light among them.
+MAX_LIGHT_VERTICES = 8
+# Further rows of a path:
+#   BACK     unit direction to the previous vertex
+#   INVERSE  1 / density of this vertex, per area
+#   OPEN     weight of the technique that connects this vertex to the previous one: 1; 0 at mirrors; the
+#            number of subpaths where techniques differ in it
+#   LEAVE    cosine to the geometric normal of the direction in which the path leaves
+#   ORIGIN   the light it started at: 0 at a finite distance, 1 parallel light, 2 the sky; 0 from the second
+#            vertex
+#   CHAIN    first of the sums over all techniques further back
 BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3, 4, 5, 6, 7))
-N_ROWS_BOTH = CHAIN + MOST_FROM_LAMP
+N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
+# Columns of a camera: position, right, up, forward, tangent of half the vertical field of view, pixels across
+# and down.
+EYE, RIGHT, UP, FORWARD, TAN_HALF_FOV, PIXELS_ACROSS, PIXELS_DOWN = 0, 3, 6, 9, 12, 13, 14
+CAMERA_COLUMNS = 15
 
 
 @inner
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
     """Evaluate the vertex in column k for light that comes from l and goes to e (unit, world, outwards).
 
-    value : (3,) output, f(e, l) |n.l| / |ng.l| with n the shading and ng the geometric normal: what is left
-    to multiply by are geometric cosines, and the result is the same whichever end the path began at
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64
+    value : (3,) float64, output, f(e, l) |n.l| / |ng.l| with n the shading and ng the geometric normal.
+        Callers multiply by geometric cosines only, so the result does not depend on the end the path started
+        at.
 
     Returns
     -------
     tuple of float
-        Densities per steradian with which a path from the eye samples l, and one from the lamp samples e.
+        Densities per steradian with which a path from the eye samples l, and one from the light samples e.
     """
     value[0] = value[1] = value[2] = 0.0
     ge = ex * path[NORMAL, k] + ey * path[NORMAL + 1, k] + ez * path[NORMAL + 2, k]
@@ -75,12 +86,14 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
 
 @inner
 def leave_vertex(path, lane, density, reverse, smooth, depth):
-    """Carry the sums past a vertex that the path leaves towards `GO`.
+    """Update the sums at a vertex that the path leaves in direction `GO`.
 
+    path : (N_ROWS_BOTH, n) float64
     density : per steradian, of that direction; 1 at a mirror
-    reverse : density with which the other side's subpath samples the way back; 1 at a mirror, 0 if it cannot
-    smooth : whether the direction is a mirror's
-    depth : sums kept, 1 for subpaths from lamps (nothing is bounded there)
+    reverse : density, per steradian, with which a subpath from the other side samples the opposite direction;
+        1 at a mirror, 0 if it cannot
+    smooth : whether the direction is a mirror reflection
+    depth : number of sums, 1 for light subpaths
     """
     near = 0.0 if smooth else path[OPEN, lane]
     inverse = path[INVERSE, lane]
@@ -102,14 +115,20 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):
 
 @inner
 def carry(path, lane, factor, depth):
-    """Multiply the sums by what turns a density per steradian at the next vertex into one per area here."""
+    """Multiply the sums by a factor that converts a density per steradian at the next vertex to one per area
+    here.
+
+    path : (N_ROWS_BOTH, n) float64; depth : number of sums
+    """
     for r in range(depth):
         path[CHAIN + r, lane] *= factor
 
 
 @inner
 def reach_vertex(path, lane, distance, depth):
-    """Do what a vertex asks for on arrival; its geometric normal is in `path`, the ray still in `GO`.
+    """Update a path at a new vertex: its geometric normal is in `path`, the ray's direction still in `GO`.
+
+    path : (N_ROWS_BOTH, n) float64; distance : metres, of the ray; depth : number of sums
 
     Returns
     -------
@@ -128,18 +147,19 @@ def reach_vertex(path, lane, distance, depth):
         # Parallel light: its density per area does not change with the distance.
         path[INVERSE, lane] = 1.0 / (path[DENSITY, lane] * cosine)
         if path[ORIGIN, lane] == 2.0:
-            # Aiming at the sky follows the cosine (c / pi), starting from it does not (1 / 4 pi).
+            # The sky is aimed at with density c / pi and started from with density 1 / 4 pi.
             path[OPEN, lane] = 4.0 * cosine
     return cosine
 
 
 @inner
 def towards_eye(path, lane, density, reverse, left):
-    """Return the sum of p_s' / p_s over more lamp vertices, for an eye subpath that ends in column `lane`.
+    """Return sum p_s' / p_s over techniques with more light vertices, for an eye subpath that ends in `lane`.
 
-    density : per area, with which the lamp's subpath would reach this vertex
-    reverse : per steradian, with which it would go on to the vertex before
-    left : how many vertices a lamp's subpath may still have
+    path : (N_ROWS_BOTH, n) float64
+    density : per area, of this vertex, sampled by the light subpath
+    reverse : per steradian, of the direction to the previous vertex, sampled by the light subpath
+    left : number of vertices that the light subpath may still have
     """
     if left < 1:
         return 0.0
@@ -147,30 +167,50 @@ def towards_eye(path, lane, density, reverse, left):
 
 
 @inner
-def towards_lamp(path, k, density, reverse):
-    """Return the sum of p_s' / p_s over less lamp vertices, for a lamp's subpath that ends in column k."""
+def towards_light(path, k, density, reverse):
+    """Return sum p_s' / p_s over techniques with fewer light vertices, for a light subpath that ends in
+    column k.
+
+    path : (N_ROWS_BOTH, n) float64; density, reverse : as in `towards_eye`, sampled by the eye subpath
+    """
     return density * path[INVERSE, k] * (path[OPEN, k] + reverse * path[CHAIN, k])
 
 
 @inner
-def pixel_density(camera, way):
-    """Return the density per steradian of a pixel's own rays in unit direction `way` (3,); 0 from behind."""
-    cosine = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]
+def pixel_density(camera, direction):
+    """Return the density per steradian of a pixel's own rays; 0 behind the camera.
+
+    camera : (15,) float64, see the column names; direction : (3,) float64, unit, from the eye
+    """
+    cosine = (
+        direction[0] * camera[FORWARD]
+        + direction[1] * camera[FORWARD + 1]
+        + direction[2] * camera[FORWARD + 2]
+    )
     if cosine <= 0.0:
         return 0.0
-    side = 2.0 * camera[12] / camera[14]
+    side = 2.0 * camera[TAN_HALF_FOV] / camera[PIXELS_DOWN]
     return 1.0 / (side * side * cosine * cosine * cosine)
 
 
 @inner
-def pixel_of(camera, way):
-    """Return the number of the pixel that unit direction `way` (3,) from the eye passes, or -1."""
-    z = way[0] * camera[9] + way[1] * camera[10] + way[2] * camera[11]
+def pixel_of(camera, direction):
+    """Return the number of the pixel through which a direction passes, or -1.
+
+    camera : (15,) float64, see the column names; direction : (3,) float64, unit, from the eye
+    """
+    z = (
+        direction[0] * camera[FORWARD]
+        + direction[1] * camera[FORWARD + 1]
+        + direction[2] * camera[FORWARD + 2]
+    )
     if z <= 0.0:
         return -1
-    x = (way[0] * camera[3] + way[1] * camera[4] + way[2] * camera[5]) / z
-    y = (way[0] * camera[6] + way[1] * camera[7] + way[2] * camera[8]) / z
-    width, height, high = camera[13], camera[14], camera[12]
+    x = (
+        direction[0] * camera[RIGHT] + direction[1] * camera[RIGHT + 1] + direction[2] * camera[RIGHT + 2]
+    ) / z
+    y = (direction[0] * camera[UP] + direction[1] * camera[UP + 1] + direction[2] * camera[UP + 2]) / z
+    width, height, high = camera[PIXELS_ACROSS], camera[PIXELS_DOWN], camera[TAN_HALF_FOV]
     column = math.floor((x * height / (high * width) + 1.0) * 0.5 * width)
     line = math.floor((1.0 - y / high) * 0.5 * height)
     if column < 0 or column >= width or line < 0 or line >= height:

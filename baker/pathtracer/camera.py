@@ -72,14 +72,14 @@ def camera_rays(
         The pass.
     """
     lens = np.array([*camera.right, *camera.up, *camera.forward, math.tan(0.5 * camera.fov)])
-    way = np.zeros((len(pixel), samples, 3))
-    _fill(lens, width, height, pixel, _salt(seed, 2 * number), _salt(seed, 2 * number + 1), way)
-    return way
+    direction = np.zeros((len(pixel), samples, 3))
+    _fill(lens, width, height, pixel, _salt(seed, 2 * number), _salt(seed, 2 * number + 1), direction)
+    return direction
 
 
 @kernel
-def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-untyped-def]
-    """Write unit directions to `way` (n, samples, 3).
+def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore[no-untyped-def]
+    """Write unit directions to `direction` (n, samples, 3).
 
     lens : (10,) float64: right, up, forward, tangent of half the height; first, second : uint64 salts
     """
@@ -87,7 +87,7 @@ def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-un
     for i in range(len(pixel)):
         row, column = pixel[i] // width, pixel[i] % width
         u, v = _uniform(pixel[i], first), _uniform(pixel[i], second)
-        for k in range(way.shape[1]):
+        for k in range(direction.shape[1]):
             # Kronecker lattice of the plastic number (Roberts 2018): even for any count.
             x = (k * 0.7548776662466927 + u) % 1.0
             y = (k * 0.5698402909980532 + v) % 1.0
@@ -95,11 +95,11 @@ def _fill(lens, width, height, pixel, first, second, way):  # type: ignore[no-un
             y = (1.0 - 2.0 * (row + y) / height) * high
             square = 0.0
             for a in range(3):
-                way[i, k, a] = lens[6 + a] + x * lens[a] + y * lens[3 + a]
-                square += way[i, k, a] * way[i, k, a]
+                direction[i, k, a] = lens[6 + a] + x * lens[a] + y * lens[3 + a]
+                square += direction[i, k, a] * direction[i, k, a]
             scale = 1.0 / math.sqrt(square)
             for a in range(3):
-                way[i, k, a] *= scale
+                direction[i, k, a] *= scale
 
 
 def _salt(seed: int, number: int) -> np.uint64:

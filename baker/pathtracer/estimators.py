@@ -1,7 +1,7 @@
 """The ways to sample the rendering equation, by name, and what each switches on in a path.
 
-`uniform`, `cosine`, `stratified` and `bsdf` find lamps by chance; `light` aims at them from every vertex;
-`mis` does both and weighs them; `bdpt` connects paths from the eye to paths from lamps. Lights without area
+`uniform`, `cosine`, `stratified` and `bsdf` find lights by chance; `light` aims at them from every vertex;
+`mis` does both and weighs them; `bdpt` connects paths from the eye to paths from lights. Lights without area
 can only be aimed at, or started from, whatever the name.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
@@ -23,13 +23,13 @@ class Estimator(NamedTuple):
     hemisphere : int
         0: directions follow the BSDF; 1: uniform over the hemisphere; 2: cosine over it.
     aim : int
-        Aim at lamps with area and the sky: 0 never, 1 and count nothing found by chance, 2 weighed (MIS).
+        Aim at lights with area and the sky: 0 never, 1 and count nothing found by chance, 2 weighed (MIS).
     strata : int
-        1: the first two random pairs of a pass's samples are a scrambled (0,2)-net.
+        1: the first two random pairs of a pass's samples are a scrambled (0,2)-sobol_points.
     power : int
         MIS by the power heuristic (exponent 2) instead of the balance heuristic.
     both : int
-        1: a second path starts at a lamp, and both are connected in all ways (`bidirectional`).
+        1: a second path starts at a light, and both are connected in all ways (`bidirectional`).
     """
 
     hemisphere: int

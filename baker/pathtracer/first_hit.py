@@ -55,22 +55,24 @@ class FirstHits:
     kept: NDArray[np.float64]
 
 
-def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[np.float64]) -> FirstHits:
+def first_hits(
+    reference: Reference, origin: NDArray[np.float64], direction: NDArray[np.float64]
+) -> FirstHits:
     """Trace rays from one point, or each from its own.
 
     Parameters
     ----------
     origin : (3,) or (n, 3) float64
-    way : (n, 3) float64, unit
+    direction : (n, 3) float64, unit
     """
-    n = len(way)
+    n = len(direction)
     triangle, bary = np.full(n, -1, np.int32), np.zeros((n, 2))
     depth, albedo = np.full(n, np.inf), np.zeros((n, 3))
     surfaces = reference.surfaces
     origin = np.ascontiguousarray(np.broadcast_to(origin, (n, 3)))
     buffers, kept = new_packet_buffers(reference.rays.tracer), np.zeros((n, 3))
     _meet(
-        origin, way, buffers, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
+        origin, direction, buffers, surfaces.row, surfaces.material, reference.shading, triangle, bary, depth,
         albedo, kept,
     )  # fmt: skip
     row = surfaces.row[triangle].astype(np.float64)
@@ -81,32 +83,32 @@ def first_hits(reference: Reference, origin: NDArray[np.float64], way: NDArray[n
     face = row[:, FACE : FACE + 3]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     normal = np.where((normal * face).sum(axis=1, keepdims=True) <= 0, face, normal)
-    front = met & ((face * way).sum(axis=1) < 0)
+    front = met & ((face * direction).sum(axis=1) < 0)
     sign = np.where(front, 1.0, -1.0)[:, None] * met[:, None]
     lit = met & (front | (row[:, TWO_SIDED] > 0))
     return FirstHits(triangle, bary, depth, albedo, position, sign * normal, sign * face, front, lit, kept)
 
 
 @kernel
-def _meet(origin, way, buffers, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
+def _meet(origin, direction, buffers, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
     width, scene, intersect = buffers.width, buffers.scene, buffers.intersect
     valid, floats, words = buffers.valid, buffers.floats, buffers.words
     colour = _new_colour()
-    for group in range(0, len(way), width):
+    for group in range(0, len(direction), width):
         for lane in range(width):
             i = group + lane
-            valid[lane] = -1 if i < len(way) else 0
-            if i < len(way):
+            valid[lane] = -1 if i < len(direction) else 0
+            if i < len(direction):
                 set_ray(
                     floats, words, width, lane, origin[i, 0], origin[i, 1], origin[i, 2],
-                    way[i, 0], way[i, 1], way[i, 2],
+                    direction[i, 0], direction[i, 1], direction[i, 2],
                     np.float32(1.0e30),
                 )  # fmt: skip
         trace(intersect, scene, valid, floats)
         trace_transmittance_packet(buffers.blend, buffers.occluded, width, valid, floats, True)
         for lane in range(width):
             i = group + lane
-            if i >= len(way):
+            if i >= len(direction):
                 continue
             for c in range(3):
                 kept[i, c] = transmittance(buffers.blend, c, lane)

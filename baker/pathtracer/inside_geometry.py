@@ -26,7 +26,7 @@ class Views(NamedTuple):
     black: NDArray[np.int64]
 
 
-def is_buried(views: Views) -> NDArray[np.bool_]:
+def is_inside_geometry(views: Views) -> NDArray[np.bool_]:
     """Tell which places are buried."""
     found: NDArray[np.bool_] = (views.inside >= PROOF) | (views.inside + views.black == views.rays)
     return found
@@ -52,9 +52,9 @@ def look_around(
     for _ in range(rays):
         # The normal and a point of the unit sphere.
         ball = random.standard_normal((len(origin), 3))
-        way = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-        hits = first_hits(reference, origin, way)
+        direction = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+        hits = first_hits(reference, origin, direction)
         told = np.where(hits.triangle >= 0, reference.tells[hits.triangle], 0)
         inside += told == np.where(hits.front, SOLID_FRONT, SOLID_BACK)
         black += (told == BLACK_BACK) & ~hits.front

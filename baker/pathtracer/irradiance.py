@@ -62,8 +62,8 @@ def irradiance_pass(
     how = estimator_named(estimator)
     number, samples = estimate.rounds, estimate.samples
     picked = np.arange(len(position)) if chosen is None else chosen
-    net = sobol_reversed(samples, seed, 1 + number)
-    setting = path_setting(how, how.strata or stratify, max_bounces, seed, number)
+    sobol_points = sobol_reversed(samples, seed, 1 + number)
+    setting = path_settings(how, how.strata or stratify, max_bounces, seed, number)
     counted = np.zeros((-(-len(picked) // _TILE), 2), np.int64)
 
     def work(begin: int, end: int) -> None:
@@ -74,11 +74,11 @@ def irradiance_pass(
             # Here: other estimators need not load its kernels.
             from baker.pathtracer.bidirectional_pass import surface_tile
 
-            counted[begin // _TILE] = surface_tile(reference, places, begin, net, setting, out)
+            counted[begin // _TILE] = surface_tile(reference, places, begin, sobol_points, setting, out)
         else:
             cast = trace_paths(
-                *places, begin, True, reference.surfaces, reference.lamps, reference.shading,
-                new_path_memory(reference.rays), net, setting, out,
+                *places, begin, True, reference.surfaces, reference.lights, reference.shading,
+                new_path_memory(reference.rays), sobol_points, setting, out,
             )  # fmt: skip
             counted[begin // _TILE] = cast
         add_pass(estimate, rows, out * (math.pi / samples))
@@ -91,7 +91,7 @@ def irradiance_pass(
     estimate.segments += int(counted[:, 0].sum())
 
 
-def openness_pass(
+def ambient_occlusion_pass(
     reference: Reference,
     estimate: PointEstimate,
     position: NDArray[np.float64],
@@ -110,12 +110,12 @@ def openness_pass(
         Metres, may be inf.
     """
     number, samples = estimate.rounds, estimate.samples
-    net = sobol_reversed(samples, seed, 1 + number)
+    sobol_points = sobol_reversed(samples, seed, 1 + number)
     shared = shared_bits_mask(samples)
-    reach = np.float32(min(distance, 1.0e30))
-    least = np.float32(reference.surfaces.least)
-    alike = alike_within(reach, least)
-    sizes = (least, np.float32(reference.surfaces.most))
+    max_distance = np.float32(min(distance, 1.0e30))
+    min_offset_scale = np.float32(reference.surfaces.min_offset_scale)
+    alike = alike_within(max_distance, min_offset_scale)
+    sizes = (min_offset_scale, np.float32(reference.surfaces.most))
     dense = are_dense(position[:, 0], float(alike))
     setting = np.array([number, seed_salt(seed)], np.int64)
     arguments = np.stack([arguments_of(coherent=coherent) for coherent in (False, True)])
@@ -128,7 +128,7 @@ def openness_pass(
         found = np.zeros((end - begin, 1))
         open_rays(
             position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.rays),
-            arguments, net, shared, reach, alike, sizes, setting, found,
+            arguments, sobol_points, shared, max_distance, alike, sizes, setting, found,
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 
@@ -141,7 +141,7 @@ def openness_pass(
     estimate.rays += len(position) * samples
 
 
-def path_setting(
+def path_settings(
     how: Estimator, strata: int | bool, max_bounces: int | None, seed: int, number: int
 ) -> NDArray[np.int64]:
     """Return what `trace_paths` calls `how`."""

@@ -1,7 +1,12 @@
-"""Everything that emits, as one table that paths aim at: triangles, lights without area, the sky.
+"""Everything that emits, as one table that paths aim at: emitters, lights without area, the sky.
 
-A lamp is chosen by a fixed chance, half of it by power and half equally among kinds, so that neither a sun
-nor a candle is starved. Whatever the chances, estimates stay unbiased: each is divided by its own.
+A light is chosen with a fixed chance, half of it by power and half equally among kinds, so that neither a sun
+nor a candle is starved. Each estimate is divided by the chance of its light: whatever the chances, its
+expectation is the same.
+
+Lights without area come as `EmissionProfile`s, which the files of `baker.lights.kinds` supply. Kernels tell
+four forms of profile apart: even, cone, parallel, and tabulated. A light whose fall-off is none of the first
+three is a table, which the kernels interpolate; new kinds of light need no change here.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.
@@ -18,165 +23,234 @@ from numpy.typing import NDArray
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.errors import InputError
 from baker.core.geometry import Geometry
-from baker.core.light_kind import Distribution, kind_of
+from baker.core.light_kind import EmissionProfile, kind_of
 from baker.core.scene import PunctualLight, Scene
 from baker.kernels.sampling import triangle_barycentric
 from baker.kernels.shading import Shading
-from baker.lights.emissive import build_emitters
-from baker.lights.families.point import range_window
+from baker.pathtracer.emitters import (
+    EMITTER_AREA,
+    EMITTER_CHANCE,
+    EMITTER_CORNER,
+    EMITTER_NORMAL,
+    EMITTER_PART,
+    EMITTER_RADIANCE,
+    EMITTER_TEXTURED,
+    EMITTER_TWO_SIDED,
+    find_emitters,
+)
 from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# Columns of an emissive triangle or part of one: three corners, face normal, area, two-sided, chance,
-# radiance without texture, textured, which part it is (see `kernels.emitters`).
-CORNER, NORMAL, AREA, TWO_SIDED, CHANCE, RADIANCE, TEXTURED, INSIDE = 0, 9, 12, 13, 14, 15, 18, 19
-# Parts that textured triangles may be cut into: more than in bakes, as each point's radiance is looked up.
-MOST_PARTS = 131072
-# Columns of a light without area: 0 point, 1 spot, 2 directional; position, direction, intensity, outer
-# cosine, one over the cone's width, chance, 1 / range^2 (0 without a range).
-KIND, POSITION, DIRECTION, INTENSITY, OUTER, SCALE, POINT_CHANCE, INVERSE_RANGE = 0, 1, 4, 7, 10, 11, 12, 13
-# Columns of any lamp as `vertex_simd` takes it: a corner (of a light without area its place, of parallel
-# light the way towards it), two edges, normal (a spot's axis), area over chance (or 1 over chance),
-# two-sided (of a light without area 1 / range^2), outer cosine, one over the cone's width, radiance or
-# intensity, and what it is: 0 triangle, 1 point, 2 spot, 3 directional, 4 sky.
-LANE_CORNER, LANE_EDGE, LANE_NORMAL, LANE_GAIN, LANE_TWO_SIDED = 0, 3, 9, 12, 13
-LANE_OUTER, LANE_SCALE, LANE_RADIANCE, LANE_KIND = 14, 15, 16, 19
-LANE_INVERSE_RANGE = LANE_TWO_SIDED
-# The number of each distribution in column KIND: kernels compare it.
-_KINDS = {Distribution.ISOTROPIC: 0.0, Distribution.CONE: 1.0, Distribution.PARALLEL: 2.0}
-# A directional light and the sky end nowhere; rays to other lamps end this share of their way before them.
+# Columns of a light without area: form of its profile; position and axis; intensity; smallest cosine to the
+# axis and cone scale, see `EmissionProfile`; chance to be chosen; 1 / range^2; tangent; first element of its
+# table in `LightTable.falloff`, cosines and azimuths of it.
+DELTA_FORM, DELTA_POSITION, DELTA_AXIS, DELTA_INTENSITY, DELTA_MIN_COSINE, DELTA_CONE_SCALE = (
+    0,
+    1,
+    4,
+    7,
+    10,
+    11,
+)
+DELTA_CHANCE, DELTA_INVERSE_RANGE, DELTA_TANGENT = 12, 13, 14
+DELTA_TABLE, DELTA_COSINES, DELTA_AZIMUTHS = 17, 18, 19
+DELTA_COLUMNS = 20
+# Forms of a profile, in DELTA_FORM.
+EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
+# Columns of any light in single precision, as `vertex_simd` takes it.
+#   ROW_ORIGIN    corner 0 of an emitter, position, or direction towards parallel light
+#   ROW_EDGE      edges from corner 0 of an emitter; else 0
+#   ROW_NORMAL    normal of an emitter, axis of a light without area
+#   ROW_GAIN      area / chance of an emitter, 1 / chance of other lights
+#   ROW_TWO_SIDED 1 for two-sided emitters;  ROW_INVERSE_RANGE, the same column, for lights without area
+#   ROW_KIND      see below
+ROW_ORIGIN, ROW_EDGE, ROW_NORMAL, ROW_GAIN, ROW_TWO_SIDED = 0, 3, 9, 12, 13
+ROW_MIN_COSINE, ROW_CONE_SCALE, ROW_RADIANCE, ROW_KIND = 14, 15, 16, 19
+ROW_INVERSE_RANGE = ROW_TWO_SIDED
+ROW_COLUMNS = 20
+# Kinds of row. Those below KIND_PARALLEL are at a finite distance; kernels make KIND_TABULATED KIND_EVEN.
+KIND_EMITTER, KIND_EVEN, KIND_CONE, KIND_PARALLEL, KIND_SKY, KIND_TABULATED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+_ROW_KIND = {EVEN: KIND_EVEN, CONE: KIND_CONE, PARALLEL: KIND_PARALLEL, TABULATED: KIND_TABULATED}
+# Columns of the sky: radiance, chance.
+SKY_RADIANCE, SKY_CHANCE = 0, 3
+# Rays to parallel light and to the sky have this length; rays to other lights this share of the distance.
 FAR = 1.0e30
 SHORT = 0.9999
 
 
-class LampTable(NamedTuple):
-    """Lamps in the order triangles, lights without area, sky.
+class LightTable(NamedTuple):
+    """E emitters, P lights without area, and the sky: lights are numbered in this order.
 
-    triangle (E, 24), point (P, 16) float64, see the column names; number (E,) int32, triangle of the scene;
-    emitter (T,) int32, what of `triangle` a scene triangle is, in the code of `kernels.emitters.emitter_at`;
-    node (K, 4) int32, see there; cumulative (E + P + 1,) float64, last 1 (0 if nothing emits); sky (4,)
-    float64: radiance, chance; every (E + P + 1, 20) float32, all lamps alike, see the column names; glows
-    int: 1 if any has a texture.
+    Attributes
+    ----------
+    emitter : (E, 24) float64
+        See `emitters`.
+    delta : (P, 20) float64
+        Lights without area, see the column names.
+    triangle : (E,) int32
+        The scene's triangle of each emitter.
+    code : (T,) int32
+        What each triangle of the scene is, see `FoundEmitters`.
+    node : (K, 4) int32
+        See `FoundEmitters`.
+    cumulative : (E + P + 1,) float64
+        Sums of the chances; the last is 1, or 0 if nothing emits.
+    sky : (4,) float64
+        Radiance, cd/m2, and chance.
+    row : (E + P + 1, 20) float32
+        All lights, see the column names.
+    falloff : (N,) float32
+        Tables of the profiles, one after another, cosines by azimuths.
+    textured : int
+        1 if any emitter has a texture.
     """
 
-    triangle: NDArray[np.float64]
-    point: NDArray[np.float64]
-    number: NDArray[np.int32]
-    emitter: NDArray[np.int32]
+    emitter: NDArray[np.float64]
+    delta: NDArray[np.float64]
+    triangle: NDArray[np.int32]
+    code: NDArray[np.int32]
     node: NDArray[np.int32]
     cumulative: NDArray[np.float64]
     sky: NDArray[np.float64]
-    every: NDArray[np.float32]
-    glows: int
+    row: NDArray[np.float32]
+    falloff: NDArray[np.float32]
+    textured: int
 
 
-def build_lamps(
+def build_light_table(
     scene: Scene, geometry: Geometry, shading: Shading, sky: tuple[float, float, float]
-) -> LampTable:
+) -> LightTable:
     """Collect what emits.
 
     Parameters
     ----------
-    sky : radiance of the constant sky, cd/m2, linear Rec.709
-    """
-    found = build_emitters(geometry, shading, MOST_PARTS)
-    n = len(found.triangle)
-    # `build_emitters` shares a cluster's power out among its triangles.
-    power = (
-        found.row[:, 14].astype(np.float64) * found.power[found.row[:, 16].astype(np.int64)]
-        if n
-        else np.zeros(0)
-    )
-    triangle = np.zeros((n, 24))
-    triangle[:, CORNER : CORNER + 9] = found.row[:, :9]
-    triangle[:, NORMAL : NORMAL + 3] = found.row[:, 9:12]
-    triangle[:, AREA], triangle[:, TWO_SIDED] = found.row[:, 12], found.row[:, 13]
-    # `build_emitters` says where to aim; what shines there is looked up in the material itself.
-    material = geometry.material[found.triangle]
-    triangle[:, RADIANCE : RADIANCE + 3] = shading.emission[material]
-    triangle[:, TEXTURED] = shading.emission_texture[material] >= 0
-    triangle[:, INSIDE : INSIDE + 3] = found.row[:, 21:24]
-    disc = math.pi * (0.5 * geometry.diagonal) ** 2
-    point, point_power = _without_area(scene.local_lights, disc)
-    sky_power = float(np.array(sky) @ _LUMINANCE) * math.pi * 4.0 * disc
-    every = np.concatenate([power, point_power, [sky_power]])
-    chance = _chances(every, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(point) + 1))])
-    triangle[:, CHANCE] = chance[:n]
-    point[:, POINT_CHANCE] = chance[n:-1]
-    cumulative = np.cumsum(chance)
-    if cumulative[-1] > 0:
-        cumulative /= cumulative[-1]
-    last = np.array([*sky, chance[-1]])
-    glows = int((triangle[:, TEXTURED] > 0).any())
-    every = all_alike(triangle, point, last)
-    return LampTable(triangle, point, found.triangle, found.root, found.node, cumulative, last, every, glows)
+    scene : Scene
+        Its lights without area.
+    geometry : Geometry
+        The scene's triangles.
+    shading : Shading
+        Their materials.
+    sky : tuple of 3 float
+        Radiance of the constant sky, cd/m2, linear Rec.709.
 
-
-def _without_area(
-    lights: tuple[PunctualLight, ...], disc: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return rows (P, 16), without their chances, and power (P,) of the lights without area that shine.
-
-    disc : float, m2, area of a disc as wide as the scene
+    Returns
+    -------
+    LightTable
 
     Raises
     ------
     InputError
-        If a light is of an unknown kind, or of one that the kernels cannot trace.
+        If a light's kind has no record or no `EmissionProfile`.
     """
-    number = [_kernel_number(light) for light in lights]
-    shining = [(light, n) for light, n in zip(lights, number, strict=True) if max(light.intensity) > 0]
-    point = np.zeros((len(shining), 16))
-    power = np.zeros(len(shining))
-    for row, (light, n) in enumerate(shining):
-        kind, outer = kind_of(light), math.cos(light.outer_cone)
-        point[row, KIND] = n
-        point[row, POSITION : POSITION + 3] = light.position
-        point[row, DIRECTION : DIRECTION + 3] = light.direction
-        point[row, INTENSITY : INTENSITY + 3] = light.intensity
-        point[row, OUTER] = outer
-        point[row, SCALE] = 1.0 / max(0.001, math.cos(light.inner_cone) - outer)
-        point[row, INVERSE_RANGE] = light.inverse_range if kind.has_position else 0.0
-        power[row] = float(np.array(light.intensity) @ _LUMINANCE) * kind.power(light, disc)
-    return point, power
+    found = find_emitters(geometry, shading)
+    emitter, n = found.row, len(found.row)
+    disc = math.pi * (0.5 * geometry.diagonal) ** 2
+    delta, delta_power, falloff = _without_area(scene.local_lights, disc)
+    sky_power = float(np.array(sky) @ _LUMINANCE) * math.pi * 4.0 * disc
+    power = np.concatenate([found.power, delta_power, [sky_power]])
+    chance = _chances(power, [slice(0, n), *(slice(n + i, n + i + 1) for i in range(len(delta) + 1))])
+    emitter[:, EMITTER_CHANCE] = chance[:n]
+    delta[:, DELTA_CHANCE] = chance[n:-1]
+    cumulative = np.cumsum(chance)
+    if cumulative[-1] > 0:
+        cumulative /= cumulative[-1]
+    last = np.array([*sky, chance[-1]])
+    textured = int((emitter[:, EMITTER_TEXTURED] > 0).any())
+    row = light_rows(emitter, delta, last)
+    return LightTable(
+        emitter, delta, found.triangle, found.code, found.node, cumulative, last, row, falloff, textured
+    )
 
 
-def _kernel_number(light: PunctualLight) -> float:
-    """Return the number by which kernels know a light without area."""
+def _without_area(
+    lights: tuple[PunctualLight, ...], disc: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    """Return rows (P, 20) without chances, power (P,), and tables (N,) of the lights without area that shine.
+
+    disc : float, m2, area of a disc as wide as the scene
+    """
+    profiles = [(light, _profile(light)) for light in lights]
+    shining = [(light, profile) for light, profile in profiles if max(light.intensity) > 0]
+    delta, power = np.zeros((len(shining), DELTA_COLUMNS)), np.zeros(len(shining))
+    tables: list[NDArray[np.float32]] = [np.zeros(0, np.float32)]
+    for row, (light, profile) in enumerate(shining):
+        delta[row, DELTA_FORM] = _form(profile)
+        if profile.position is not None:
+            delta[row, DELTA_POSITION : DELTA_POSITION + 3] = profile.position
+            delta[row, DELTA_INVERSE_RANGE] = profile.inverse_range
+        delta[row, DELTA_AXIS : DELTA_AXIS + 3] = profile.axis
+        delta[row, DELTA_INTENSITY : DELTA_INTENSITY + 3] = light.intensity
+        delta[row, DELTA_MIN_COSINE] = profile.min_cosine
+        delta[row, DELTA_CONE_SCALE] = profile.cone_scale or 0.0
+        if profile.table is not None:
+            delta[row, DELTA_TANGENT : DELTA_TANGENT + 3] = profile.tangent
+            delta[row, DELTA_TABLE] = sum(map(len, tables))
+            delta[row, DELTA_COSINES : DELTA_COSINES + 2] = profile.table.shape
+            tables.append(profile.table.astype(np.float32).ravel())
+        power[row] = float(np.array(light.intensity) @ _LUMINANCE) * kind_of(light).power(light, disc)
+    return delta, power, np.concatenate(tables)
+
+
+def _profile(light: PunctualLight) -> EmissionProfile:
+    """Return the profile of a light; raise InputError if its kind has none."""
     kind = kind_of(light)
-    number = _KINDS.get(kind.distribution)
-    if number is None or not kind.delta:
+    if kind.emission is None or not kind.delta:
         message = f"the path tracer has no kernels for {kind.name} lights; leave it out"
         raise InputError(message, object=f"light '{light.name}'")
-    return number
+    return kind.emission(light)
 
 
-def all_alike(
-    triangle: NDArray[np.float64], point: NDArray[np.float64], sky: NDArray[np.float64]
+def _form(profile: EmissionProfile) -> float:
+    """Return the number by which kernels tell the forms of profiles apart."""
+    if profile.position is None:
+        return PARALLEL
+    if profile.table is not None:
+        return TABULATED
+    return EVEN if profile.cone_scale is None else CONE
+
+
+def light_rows(
+    emitter: NDArray[np.float64], delta: NDArray[np.float64], sky: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return all lamps as rows of one kind."""
-    n, p = len(triangle), len(point)
-    row = np.zeros((n + p + 1, 20))
-    area, spot, last = row[:n], row[n : n + p], row[n + p]
-    corner = triangle[:, CORNER : CORNER + 9].reshape(n, 3, 3)
-    area[:, LANE_CORNER : LANE_CORNER + 3] = corner[:, 0]
-    area[:, LANE_EDGE : LANE_EDGE + 6] = (corner[:, 1:] - corner[:, :1]).reshape(n, 6)
-    area[:, LANE_NORMAL : LANE_NORMAL + 3] = triangle[:, NORMAL : NORMAL + 3]
-    area[:, LANE_GAIN] = triangle[:, AREA] / np.maximum(triangle[:, CHANCE], 1e-30)
-    area[:, LANE_TWO_SIDED] = triangle[:, TWO_SIDED]
-    area[:, LANE_RADIANCE : LANE_RADIANCE + 3] = triangle[:, RADIANCE : RADIANCE + 3]
-    way = point[:, DIRECTION : DIRECTION + 3]
-    parallel = point[:, KIND, None] == _KINDS[Distribution.PARALLEL]
-    spot[:, LANE_CORNER : LANE_CORNER + 3] = np.where(parallel, -way, point[:, POSITION : POSITION + 3])
-    spot[:, LANE_NORMAL : LANE_NORMAL + 3] = way
-    spot[:, LANE_GAIN] = 1.0 / np.maximum(point[:, POINT_CHANCE], 1e-30)
-    spot[:, LANE_OUTER], spot[:, LANE_SCALE] = point[:, OUTER], point[:, SCALE]
-    spot[:, LANE_INVERSE_RANGE] = point[:, INVERSE_RANGE]
-    spot[:, LANE_RADIANCE : LANE_RADIANCE + 3] = point[:, INTENSITY : INTENSITY + 3]
-    spot[:, LANE_KIND] = 1.0 + point[:, KIND]
-    last[LANE_GAIN] = 1.0 / max(sky[3], 1e-30)
-    last[LANE_RADIANCE : LANE_RADIANCE + 3] = sky[:3]
-    last[LANE_KIND] = 4.0
+    """Return all lights in the columns that `vertex_simd` takes.
+
+    Parameters
+    ----------
+    emitter : (E, 24) float64
+        See `LightTable`.
+    delta : (P, 20) float64
+        See `LightTable`.
+    sky : (4,) float64
+        See `LightTable`.
+
+    Returns
+    -------
+    (E + P + 1, 20) float32
+    """
+    n, p = len(emitter), len(delta)
+    row = np.zeros((n + p + 1, ROW_COLUMNS))
+    area, point, last = row[:n], row[n : n + p], row[n + p]
+    corner = emitter[:, EMITTER_CORNER : EMITTER_CORNER + 9].reshape(n, 3, 3)
+    area[:, ROW_ORIGIN : ROW_ORIGIN + 3] = corner[:, 0]
+    area[:, ROW_EDGE : ROW_EDGE + 6] = (corner[:, 1:] - corner[:, :1]).reshape(n, 6)
+    area[:, ROW_NORMAL : ROW_NORMAL + 3] = emitter[:, EMITTER_NORMAL : EMITTER_NORMAL + 3]
+    area[:, ROW_GAIN] = emitter[:, EMITTER_AREA] / np.maximum(emitter[:, EMITTER_CHANCE], 1e-30)
+    area[:, ROW_TWO_SIDED] = emitter[:, EMITTER_TWO_SIDED]
+    area[:, ROW_RADIANCE : ROW_RADIANCE + 3] = emitter[:, EMITTER_RADIANCE : EMITTER_RADIANCE + 3]
+    axis = delta[:, DELTA_AXIS : DELTA_AXIS + 3]
+    parallel = delta[:, DELTA_FORM, None] == PARALLEL
+    position = delta[:, DELTA_POSITION : DELTA_POSITION + 3]
+    point[:, ROW_ORIGIN : ROW_ORIGIN + 3] = np.where(parallel, -axis, position)
+    point[:, ROW_NORMAL : ROW_NORMAL + 3] = axis
+    point[:, ROW_GAIN] = 1.0 / np.maximum(delta[:, DELTA_CHANCE], 1e-30)
+    point[:, ROW_MIN_COSINE] = delta[:, DELTA_MIN_COSINE]
+    point[:, ROW_CONE_SCALE] = delta[:, DELTA_CONE_SCALE]
+    point[:, ROW_INVERSE_RANGE] = delta[:, DELTA_INVERSE_RANGE]
+    point[:, ROW_RADIANCE : ROW_RADIANCE + 3] = delta[:, DELTA_INTENSITY : DELTA_INTENSITY + 3]
+    point[:, ROW_KIND] = [_ROW_KIND[form] for form in delta[:, DELTA_FORM]]
+    last[ROW_GAIN] = 1.0 / max(sky[SKY_CHANCE], 1e-30)
+    last[ROW_RADIANCE : ROW_RADIANCE + 3] = sky[:3]
+    last[ROW_KIND] = KIND_SKY
     return row.astype(np.float32)
 
 
@@ -193,8 +267,11 @@ def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.floa
 
 
 @inner
-def pick_lamp(cumulative, u):  # type: ignore[no-untyped-def]
-    """Return the number of the lamp that the uniform number u falls on."""
+def pick_light(cumulative, u):  # type: ignore[no-untyped-def]
+    """Return the number of the light that the uniform number u falls on.
+
+    cumulative : (n,) float64, see `LightTable`
+    """
     low = 0
     high = len(cumulative) - 1
     while low < high:
@@ -207,63 +284,129 @@ def pick_lamp(cumulative, u):  # type: ignore[no-untyped-def]
 
 
 @inner
-def aim_at_triangle(triangle, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the way from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
+def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the vector from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
 
     The density is per steradian and contains the emitter's chance; 0 if its dark side faces the point.
+
+    emitter : (E, 24) float64, see `emitters`; u, w : uniform numbers
     """
     b1, b2 = triangle_barycentric(np.float32(u), np.float32(w))
-    dx = (1.0 - b1 - b2) * triangle[e, 0] + b1 * triangle[e, 3] + b2 * triangle[e, 6] - x
-    dy = (1.0 - b1 - b2) * triangle[e, 1] + b1 * triangle[e, 4] + b2 * triangle[e, 7] - y
-    dz = (1.0 - b1 - b2) * triangle[e, 2] + b1 * triangle[e, 5] + b2 * triangle[e, 8] - z
-    density = triangle_density(triangle, e, dx, dy, dz)
+    dx = (1.0 - b1 - b2) * emitter[e, 0] + b1 * emitter[e, 3] + b2 * emitter[e, 6] - x
+    dy = (1.0 - b1 - b2) * emitter[e, 1] + b1 * emitter[e, 4] + b2 * emitter[e, 7] - y
+    dz = (1.0 - b1 - b2) * emitter[e, 2] + b1 * emitter[e, 5] + b2 * emitter[e, 8] - z
+    density = emitter_density(emitter, e, dx, dy, dz)
     return dx, dy, dz, density, b1, b2
 
 
 @inner
-def on_whole_triangle(triangle, e, b1, b2):  # type: ignore[no-untyped-def]
-    """Return barycentrics of the scene's triangle from those of emitter e, which may be a part of it."""
-    size = triangle[e, INSIDE + 2]
-    return triangle[e, INSIDE] + size * b1, triangle[e, INSIDE + 1] + size * b2
+def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
+    """Return barycentrics of the scene's triangle from those of emitter e, which may be a part of it.
+
+    emitter : (E, 24) float64, see `emitters`
+    """
+    size = emitter[e, EMITTER_PART + 2]
+    return emitter[e, EMITTER_PART] + size * b1, emitter[e, EMITTER_PART + 1] + size * b2
 
 
 @inner
-def triangle_density(triangle, e, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the density per steradian with which a point at the end of d on emitter e is aimed at."""
+def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Return the density per steradian with which a point at the end of d on emitter e is aimed at.
+
+    emitter : (E, 24) float64, see `emitters`
+    """
     square = dx * dx + dy * dy + dz * dz
     if square <= 0.0:
         return 0.0
-    cosine = -(dx * triangle[e, NORMAL] + dy * triangle[e, NORMAL + 1] + dz * triangle[e, NORMAL + 2])
+    cosine = -(
+        dx * emitter[e, EMITTER_NORMAL]
+        + dy * emitter[e, EMITTER_NORMAL + 1]
+        + dz * emitter[e, EMITTER_NORMAL + 2]
+    )
     cosine /= math.sqrt(square)
-    if triangle[e, TWO_SIDED] > 0.0:
+    if emitter[e, EMITTER_TWO_SIDED] > 0.0:
         cosine = abs(cosine)
     if cosine <= 1.0e-9:
         return 0.0
-    return triangle[e, CHANCE] / triangle[e, AREA] * square / cosine
+    return emitter[e, EMITTER_CHANCE] / emitter[e, EMITTER_AREA] * square / cosine
 
 
 @inner
-def aim_at_point_light(point, e, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the way from (x, y, z) to a light without area: dx, dy, dz, reach, irradiance per intensity.
+def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the direction from (x, y, z) to a light without area, its distance, irradiance per intensity.
 
-    The direction is unit, the reach in metres; the irradiance is that of a surface facing the light.
+    The direction is unit; the distance, metres, is a little short; the irradiance is that of a surface facing
+    the light.
+
+    lights : `LightTable`
     """
-    if point[e, KIND] == 2.0:
-        return -point[e, DIRECTION], -point[e, DIRECTION + 1], -point[e, DIRECTION + 2], FAR, 1.0
-    dx, dy, dz = point[e, POSITION] - x, point[e, POSITION + 1] - y, point[e, POSITION + 2] - z
+    delta = lights.delta
+    if delta[e, DELTA_FORM] == PARALLEL:
+        return -delta[e, DELTA_AXIS], -delta[e, DELTA_AXIS + 1], -delta[e, DELTA_AXIS + 2], FAR, 1.0
+    dx = delta[e, DELTA_POSITION] - x
+    dy = delta[e, DELTA_POSITION + 1] - y
+    dz = delta[e, DELTA_POSITION + 2] - z
     square = max(dx * dx + dy * dy + dz * dz, 1.0e-20)
     length = math.sqrt(square)
     dx, dy, dz = dx / length, dy / length, dz / length
-    cosine = -(dx * point[e, DIRECTION] + dy * point[e, DIRECTION + 1] + dz * point[e, DIRECTION + 2])
-    share = spot_share(point, e, cosine)
-    share *= range_window(square, point[e, INVERSE_RANGE])
+    cosine = -(dx * delta[e, DELTA_AXIS] + dy * delta[e, DELTA_AXIS + 1] + dz * delta[e, DELTA_AXIS + 2])
+    share = falloff(lights, e, cosine, -dx, -dy, -dz)
+    share *= range_window(square, delta[e, DELTA_INVERSE_RANGE])
     return dx, dy, dz, length * SHORT, share / square
 
 
 @inner
-def spot_share(point, e, cosine):  # type: ignore[no-untyped-def]
-    """Return the share of its intensity that light e sends at this cosine to its axis; 1 if it is no spot."""
-    if point[e, KIND] != 1.0:
+def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
+    """Return clamp(1 - (r / range)^4, 0, 1) for r^2 and 1 / range^2 (0: no range)."""
+    share = square * inverse_range
+    return max(1.0 - share * share, 0.0)
+
+
+@inner
+def falloff(lights, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Return f of the profile of light e with a position, in unit direction d, at this cosine to its axis.
+
+    lights : `LightTable`
+    """
+    delta = lights.delta
+    if delta[e, DELTA_FORM] == EVEN:
         return 1.0
-    share = min(max((cosine - point[e, OUTER]) * point[e, SCALE], 0.0), 1.0)
+    if delta[e, DELTA_FORM] == TABULATED:
+        return tabulated(lights.falloff, delta, e, cosine, dx, dy, dz)
+    share = (cosine - delta[e, DELTA_MIN_COSINE]) * delta[e, DELTA_CONE_SCALE]
+    share = min(max(share, 0.0), 1.0)
     return share * share
+
+
+@inner
+def tabulated(table, delta, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
+    """Interpolate the table of light e bilinearly; 0 outside its cone.
+
+    table : (N,) float32, `LightTable.falloff`; delta : (P, 20) float64; d : unit direction from the light
+    """
+    low = delta[e, DELTA_MIN_COSINE]
+    rows, columns = np.int64(delta[e, DELTA_COSINES]), np.int64(delta[e, DELTA_AZIMUTHS])
+    if cosine < low:
+        return 0.0
+    # Row: cosine to the axis.
+    r = min(max((cosine - low) / max(1.0 - low, 1.0e-12), 0.0), 1.0) * (rows - 1)
+    i = min(np.int64(r), rows - 2)
+    r -= i
+    # Column: azimuth from the tangent towards axis x tangent.
+    start = np.int64(delta[e, DELTA_TABLE]) + i * columns
+    j = next_j = np.int64(0)
+    q = 0.0
+    if columns > 1:
+        ax, ay, az = delta[e, DELTA_AXIS], delta[e, DELTA_AXIS + 1], delta[e, DELTA_AXIS + 2]
+        tx, ty, tz = delta[e, DELTA_TANGENT], delta[e, DELTA_TANGENT + 1], delta[e, DELTA_TANGENT + 2]
+        along = dx * tx + dy * ty + dz * tz
+        across = dx * (ay * tz - az * ty) + dy * (az * tx - ax * tz) + dz * (ax * ty - ay * tx)
+        q = math.atan2(across, along) / (2.0 * math.pi)
+        q = (q - math.floor(q)) * columns
+        j = np.int64(q)
+        q -= j
+        j %= columns
+        next_j = (j + 1) % columns
+    lower = (1.0 - q) * table[start + j] + q * table[start + next_j]
+    upper = (1.0 - q) * table[start + columns + j] + q * table[start + columns + next_j]
+    return (1.0 - r) * lower + r * upper

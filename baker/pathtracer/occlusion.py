@@ -16,16 +16,16 @@ from baker.kernels.sampling import cosine_direction, reverse_bits, scramble_reve
 from baker.pathtracer.path_blocks import (
     ALIVE,
     BITANGENT,
+    BLOCK_WIDTH,
     CHOICE,
     KEY,
-    LANES,
     LOBE,
     NORMAL,
     SHADED,
     TANGENT,
-    U_WAY,
+    U_DIRECTION,
     VALUE,
-    W_WAY,
+    W_DIRECTION,
 )
 from baker.pathtracer.rng import mix4
 from baker.pathtracer.vertex_simd import stand_lanes
@@ -35,8 +35,9 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree_wi
 _f = np.float32
 _w = np.uint32
 _ZERO, _ONE = _f(0.0), _f(1.0)
-_L = LANES
-# Rays go alike if they start within this share of their reach, or of the scene's size (`_FAR` * least).
+_L = BLOCK_WIDTH
+# A packet is coherent if its rays start within this share of their length, or of the scene's size, which is
+# `_FAR` * min_offset_scale.
 _ALIKE, _FAR = _f(0.125), _f(100.0)
 # Points that are looked at to tell if all are dense.
 _LOOK = 128
@@ -44,9 +45,12 @@ _LOOK = 128
 _SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
 
 
-def alike_within(reach: np.float32, least: np.float32) -> np.float32:
-    """Return how close together, metres, points are whose rays go alike; `least`, metres: see `Surfaces`."""
-    return np.float32(_ALIKE * min(reach, _FAR * least))
+def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.float32:
+    """Return the largest extent, metres, of the points of a coherent packet.
+
+    max_distance, min_offset_scale : float, metres, see `Surfaces`
+    """
+    return np.float32(_ALIKE * min(max_distance, _FAR * min_offset_scale))
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
@@ -69,9 +73,9 @@ def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
 @inner
 def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
     """Write the two scramble seeds of points `group` to `group` + 8."""
-    for lane in range(min(LANES, len(name) - group)):
+    for lane in range(min(BLOCK_WIDTH, len(name) - group)):
         words[KEY * _L + lane] = name[group + lane]
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         x, y, _, _ = mix4(words[KEY * _L + lane], _w(0xFFFFFFFE), _w(number), _w(salt))
         words[CHOICE * _L + lane], words[LOBE * _L + lane] = x, y
 
@@ -80,18 +84,21 @@ def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
     """Write the lanes' uniform numbers, in [1, 2): the shared bits of (first, second), the rest scrambled."""
     one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         x = scramble_reversed(first, words[CHOICE * _L + lane])
         y = scramble_reversed(second, words[LOBE * _L + lane])
         x = reverse_bits(_w((x & own) | (first & shared)))
         y = reverse_bits(_w((y & own) | (second & shared)))
-        words[U_WAY * _L + lane], words[W_WAY * _L + lane] = _w((x >> bits) | one), _w((y >> bits) | one)
+        words[U_DIRECTION * _L + lane], words[W_DIRECTION * _L + lane] = (
+            _w((x >> bits) | one),
+            _w((y >> bits) | one),
+        )
 
 
 @inner
 def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
     """Copy place k of points `group` to `group` + 8 into the lanes."""
-    for lane in range(min(LANES, len(position) - group)):
+    for lane in range(min(BLOCK_WIDTH, len(position) - group)):
         for a in range(3):
             s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
             s[(SHADED + a) * _L + lane] = normal[group + lane, k, a]
@@ -111,10 +118,10 @@ def extent(s, lanes):  # type: ignore[no-untyped-def]
 
 
 @inner
-def point_lanes(s, reach):  # type: ignore[no-untyped-def]
+def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
     """Point the lanes' rays, cosine-weighted. What points below the facet is closed by the facet itself."""
-    for lane in range(LANES):
-        a, b, c = cosine_direction(s[U_WAY * _L + lane] - _ONE, s[W_WAY * _L + lane] - _ONE)
+    for lane in range(BLOCK_WIDTH):
+        a, b, c = cosine_direction(s[U_DIRECTION * _L + lane] - _ONE, s[W_DIRECTION * _L + lane] - _ONE)
         dx = a * s[TANGENT * _L + lane] + b * s[BITANGENT * _L + lane] + c * s[SHADED * _L + lane]
         dy = (
             a * s[(TANGENT + 1) * _L + lane]
@@ -130,40 +137,53 @@ def point_lanes(s, reach):  # type: ignore[no-untyped-def]
             dx * s[NORMAL * _L + lane] + dy * s[(NORMAL + 1) * _L + lane] + dz * s[(NORMAL + 2) * _L + lane]
         )
         s[DIR_X * _L + lane], s[DIR_Y * _L + lane], s[DIR_Z * _L + lane] = dx, dy, dz
-        s[TFAR * _L + lane] = reach
+        s[TFAR * _L + lane] = max_distance
         s[ALIVE * _L + lane] = _ONE if above > _ZERO else _ZERO
 
 
 @inner
 def count_lanes(s):  # type: ignore[no-untyped-def]
     """Count the lanes' rays that have met nothing in `VALUE`."""
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
 
 
 @kernel
 def open_rays(  # type: ignore[no-untyped-def]
-    position, normal, face_normal, name, memory, arguments, net, shared, reach, alike, sizes, how, out
+    position,
+    normal,
+    face_normal,
+    name,
+    memory,
+    arguments,
+    sobol_points,
+    shared,
+    max_distance,
+    alike,
+    sizes,
+    how,
+    out,
 ):
-    """Count the rays of points that meet nothing within reach.
+    """Count the rays of points that meet nothing within max_distance.
 
     position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k;
         rays are fastest if neighbours follow each other
     name : (m,) int64, what random numbers a point has; memory : `PathMemory`
     arguments : (2, 5) int64, `arguments_of` of packets whose rays do not go alike, and do
-    net : (n, 2) uint32; shared : uint32, bits that all points share
-    reach, alike : float32, metres, see `alike_within`; sizes : (2,) float32, `Surfaces.least` and `.most`
+    sobol_points : (n, 2) uint32; shared : uint32, bits that all points share
+    max_distance, alike : float32, metres, see `alike_within`
+    sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.most`
     how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
     """
     scene, occluded = memory.scene, memory.occluded
     on, s, words = memory.on, memory.s, memory.words
-    samples, places = len(net), position.shape[1]
-    for group in range(0, len(position), LANES):
-        lanes = min(LANES, len(position) - group)
+    samples, places = len(sobol_points), position.shape[1]
+    for group in range(0, len(position), BLOCK_WIDTH):
+        lanes = min(BLOCK_WIDTH, len(position) - group)
         seed_lanes(words, name, group, how[0], how[1])
-        for lane in range(LANES):
+        for lane in range(BLOCK_WIDTH):
             on[lane] = -1 if lane < lanes else 0
-            s[VALUE * LANES + lane] = _ZERO
+            s[VALUE * BLOCK_WIDTH + lane] = _ZERO
         for sample in range(samples):
             k = (how[0] * samples + sample) % places
             if sample == 0 or places > 1:
@@ -171,9 +191,9 @@ def open_rays(  # type: ignore[no-untyped-def]
                 stand_lanes(s, 0, sizes[0], sizes[1])
             if sample == 0:
                 asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
-            number_lanes(words, net[sample, 0], net[sample, 1], shared)
-            point_lanes(s, reach)
+            number_lanes(words, sobol_points[sample, 0], sobol_points[sample, 1], shared)
+            point_lanes(s, max_distance)
             call_embree_with(occluded, on, scene, s, asked)
             count_lanes(s)
         for lane in range(lanes):
-            out[group + lane, 0] += s[VALUE * LANES + lane]
+            out[group + lane, 0] += s[VALUE * BLOCK_WIDTH + lane]

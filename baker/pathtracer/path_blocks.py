@@ -37,7 +37,8 @@ from baker.trace.packets import (
 from baker.trace.pointers import prefetch
 
 # Paths in a block, blocks of a tile.
-LANES, BLOCKS = 8, 32
+BLOCK_WIDTH, BLOCKS = 8, 32
+_L = BLOCK_WIDTH
 # Rows behind the packet's. What lasts from ray to ray: throughput, density of the direction (0: emission
 # counts in full), its cosine to the normal it left, bounces (-1 before a camera ray's hit), point in the
 # tile, 1 for a path; as uint32: point, sample, twice the vertices so far.
@@ -45,17 +46,17 @@ BETA, DENSITY, COSINE, BOUNCES, POINT, ALIVE = (ROWS + i for i in (0, 3, 4, 5, 6
 KEY, SAMPLE, COUNT = ROWS + 8, ROWS + 9, ROWS + 10
 # At a vertex: albedo, geometric normal on the side that was hit, shading normal, tangent, bitangent.
 ALBEDO, NORMAL, SHADED, TANGENT, BITANGENT = (ROWS + i for i in (11, 14, 17, 20, 23))
-# Uniform numbers, in [1, 2): two pairs (lamp, direction), one that decides whether the path goes on. As
-# uint32: what chooses a lamp, and a lobe.
-U_LAMP, W_LAMP, U_WAY, W_WAY, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
+# Uniform numbers, in [1, 2): two pairs (light, direction), one that decides whether the path goes on. As
+# uint32: what chooses a light, and a lobe.
+U_LIGHT, W_LIGHT, U_DIRECTION, W_DIRECTION, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
 CHOICE, LOBE = ROWS + 31, ROWS + 32
-# Ray to a lamp: direction, reach, light it brings, barycentrics of its end.
-TO_LAMP, REACH, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
-# Copies of the hit triangle's first columns and of the chosen lamp's row.
-TRIANGLE, LAMP = ROWS + 42, ROWS + 65
+# Ray to a light: direction, max_distance, light it brings, barycentrics of its end.
+TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
+# Copies of the hit triangle's first columns and of the chosen light's row.
+TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
-BLOCK = N_ROWS * LANES
-# Shadow rays wait in as many packets, by lamp; behind the rows of their rays: light, point.
+BLOCK = N_ROWS * _L
+# Shadow rays wait in as many packets, by light; behind the rows of their rays: light, point.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 
@@ -84,11 +85,11 @@ class PathMemory(NamedTuple):
 
 def new_path_memory(rays: RayScene) -> PathMemory:
     """Return memory as Embree wants it; what no kernel changes is set here: time, tnear 0, the mask."""
-    on, s = aligned_floats(LANES).view(np.int32), aligned_floats(BLOCKS * BLOCK)
-    bins = aligned_floats(BINS * BIN_ROWS * LANES)
-    s.view(np.uint32).reshape(BLOCKS, N_ROWS, LANES)[:, MASK] = NO_HIT
-    bins.view(np.uint32).reshape(BINS, BIN_ROWS, LANES)[:, MASK] = NO_HIT
-    intersect, occluded = rays.functions(LANES)
+    on, s = aligned_floats(BLOCK_WIDTH).view(np.int32), aligned_floats(BLOCKS * BLOCK)
+    bins = aligned_floats(BINS * BIN_ROWS * _L)
+    s.view(np.uint32).reshape(BLOCKS, N_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT
+    bins.view(np.uint32).reshape(BINS, BIN_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT
+    intersect, occluded = rays.functions(BLOCK_WIDTH)
     blend_scene, coloured = rays.tracer.blend_scene, rays.tracer.coloured
     blend = None if blend_scene is None else new_blend_buffers(blend_scene, coloured)
     return PathMemory(rays.tracer.scene, intersect, occluded, on, s, s.view(np.uint32), bins, blend)
@@ -103,7 +104,7 @@ def unsigned(place):  # type: ignore[no-untyped-def]
 @inner
 def place_of(lane):  # type: ignore[no-untyped-def]
     """Return where the first row of a lane is; lanes are numbered through all blocks."""
-    return unsigned(lane // LANES * BLOCK + lane % LANES)
+    return unsigned(lane // BLOCK_WIDTH * BLOCK + lane % BLOCK_WIDTH)
 
 
 @inner
@@ -111,10 +112,10 @@ def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
     """Multiply the lanes' throughput by the colours of what their rays passed."""
     if blend is None:
         return
-    trace_transmittance_packet(blend, occluded, LANES, on, s[base : base + BLOCK], True)
+    trace_transmittance_packet(blend, occluded, BLOCK_WIDTH, on, s[base : base + BLOCK], True)
     for c in range(3):
-        for lane in range(LANES):
-            s[base + (BETA + c) * LANES + lane] *= transmittance(blend, c, lane)
+        for lane in range(BLOCK_WIDTH):
+            s[base + (BETA + c) * _L + lane] *= transmittance(blend, c, lane)
 
 
 @inner
@@ -131,19 +132,17 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
     n = 0
     for block in range(blocks):
         base = unsigned(block * BLOCK)
-        for lane in range(LANES):
-            alive = s[base + ALIVE * LANES + lane] > _f(0.0)
+        for lane in range(BLOCK_WIDTH):
+            alive = s[base + ALIVE * _L + lane] > _f(0.0)
             on[lane] = np.int32(-1) if alive else np.int32(0)
             n += 1 if alive else 0
-            s[base + TFAR * LANES + lane] = _f(1.0e30)
-            words[base + GEOM_ID * LANES + lane] = np.uint32(0xFFFFFFFF)
+            s[base + TFAR * _L + lane] = _f(1.0e30)
+            words[base + GEOM_ID * _L + lane] = np.uint32(0xFFFFFFFF)
         call_embree(intersect, on, scene, s[base : base + BLOCK])
         colour_lanes(blend, occluded, s, base, on)
-        for lane in range(LANES):
-            if on[lane] != 0 and words[base + GEOM_ID * LANES + lane] != NO_HIT:
-                row = surface.ctypes.data + 4 * surface.shape[1] * np.int64(
-                    words[base + PRIM_ID * LANES + lane]
-                )
+        for lane in range(BLOCK_WIDTH):
+            if on[lane] != 0 and words[base + GEOM_ID * _L + lane] != NO_HIT:
+                row = surface.ctypes.data + 4 * surface.shape[1] * np.int64(words[base + PRIM_ID * _L + lane])
                 prefetch(row)
                 prefetch(row + 64)
     return n
@@ -152,19 +151,19 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
 @inner
 def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
     """Move paths from the last blocks into the gaps of the first; return how many blocks are left."""
-    low, high = 0, blocks * LANES - 1
+    low, high = 0, blocks * _L - 1
     while True:
-        while low <= high and s[place_of(low) + ALIVE * LANES] > _f(0.0):
+        while low <= high and s[place_of(low) + ALIVE * _L] > _f(0.0):
             low += 1
-        while low <= high and s[place_of(high) + ALIVE * LANES] == _f(0.0):
+        while low <= high and s[place_of(high) + ALIVE * _L] == _f(0.0):
             high -= 1
         if low >= high:
-            return (low + LANES - 1) // LANES
+            return (low + BLOCK_WIDTH - 1) // BLOCK_WIDTH
         to = place_of(low)
         start = place_of(high)
         for a in range(3):
-            s[to + (ORG_X + a) * LANES] = s[start + (ORG_X + a) * LANES]
-            s[to + (DIR_X + a) * LANES] = s[start + (DIR_X + a) * LANES]
+            s[to + (ORG_X + a) * _L] = s[start + (ORG_X + a) * _L]
+            s[to + (DIR_X + a) * _L] = s[start + (DIR_X + a) * _L]
         for r in range(BETA, COUNT + 1):
-            s[to + r * LANES] = s[start + r * LANES]
-        s[start + ALIVE * LANES] = _f(0.0)
+            s[to + r * _L] = s[start + r * _L]
+        s[start + ALIVE * _L] = _f(0.0)

@@ -19,7 +19,13 @@ import numpy as np
 
 from baker.kernels.emitters import emitter_at
 from baker.pathtracer.bsdf import N_PARAMETERS, WIDTH
-from baker.pathtracer.light_table import on_whole_triangle, pick_lamp, triangle_density
+from baker.pathtracer.light_table import (
+    ROW_COLUMNS,
+    SKY_CHANCE,
+    emitter_density,
+    on_whole_triangle,
+    pick_light,
+)
 from baker.pathtracer.path_blocks import (
     ALBEDO,
     ALIVE,
@@ -28,6 +34,7 @@ from baker.pathtracer.path_blocks import (
     BETA,
     BINS,
     BLOCK,
+    BLOCK_WIDTH,
     BLOCKS,
     BOUNCES,
     CHOICE,
@@ -35,29 +42,28 @@ from baker.pathtracer.path_blocks import (
     COUNT,
     DENSITY,
     KEY,
-    LAMP,
-    LANES,
+    LIGHT_ROW,
     LOBE,
+    MAX_DISTANCE,
     NORMAL,
     POINT,
-    REACH,
     ROULETTE,
     SAMPLE,
     SHADED,
-    TO_LAMP,
+    TO_LIGHT,
     TRIANGLE,
-    U_LAMP,
-    U_WAY,
+    U_DIRECTION,
+    U_LIGHT,
     VALUE,
-    W_LAMP,
-    W_WAY,
+    W_DIRECTION,
+    W_LIGHT,
     close_gaps,
     trace_blocks,
     unsigned,
 )
 from baker.pathtracer.rng import random_lanes, spread_lanes
 from baker.pathtracer.scene import EMISSION, EMITTER, FACE, MATERIAL, SHINES, TEXTURED, TWO_SIDED
-from baker.pathtracer.shadow_rays import cast_packet, cast_to_lamps
+from baker.pathtracer.shadow_rays import cast_packet, cast_to_lights
 from baker.pathtracer.vertex import BETA as PATH_BETA
 from baker.pathtracer.vertex import DENSITY as PATH_DENSITY
 from baker.pathtracer.vertex import (
@@ -65,59 +71,69 @@ from baker.pathtracer.vertex import (
     GO,
     MOST,
     N_ROWS,
-    PLACE,
+    POSITION,
     SURE,
     aim,
     arrive,
-    glow,
     heuristic,
+    multiply_emission_texture,
     paint,
     scatter,
     start_path,
 )
-from baker.pathtracer.vertex_simd import aim_lanes, arrive_lanes, scatter_lanes, stand_lanes
+from baker.pathtracer.vertex_simd import (
+    aim_lanes,
+    arrive_lanes,
+    look_up_falloff,
+    scatter_lanes,
+    stand_lanes,
+)
 from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
 _f = np.float32
-# Few lamps are counted through, more are searched.
+_L = BLOCK_WIDTH
+# Few lights are counted through, more are searched.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
 # Working memory of a tile.
-_new_path, _new_row = scratch((N_ROWS, LANES), np.float64), scratch((N_PARAMETERS, LANES), np.float64)
-_new_value, _new_way, _new_rgba = (scratch((n,), np.float64) for n in (3, 6, 4))
-_new_lamp, _new_filled = scratch((LANES,), np.int64), scratch((BINS,), np.int64)
+_new_path, _new_row = (
+    scratch((N_ROWS, BLOCK_WIDTH), np.float64),
+    scratch((N_PARAMETERS, BLOCK_WIDTH), np.float64),
+)
+_new_value, _new_ray, _new_rgba = (scratch((n,), np.float64) for n in (3, 6, 4))
+_new_light, _new_filled = scratch((BLOCK_WIDTH,), np.int64), scratch((BINS,), np.int64)
 
 
 @inner
-def see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value):
+def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
     """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
 
     Its texture is not looked up yet.
     """
     value[0] = value[1] = value[2] = 0.0
     dx, dy, dz = (
-        s[base + DIR_X * LANES + lane],
-        s[base + DIR_Y * LANES + lane],
-        s[base + DIR_Z * LANES + lane],
+        s[base + DIR_X * _L + lane],
+        s[base + DIR_Y * _L + lane],
+        s[base + DIR_Z * _L + lane],
     )
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
     if facing >= 0.0 and surface[prim, TWO_SIDED] == 0.0:
         return
     weight = 1.0
-    if s[base + DENSITY * LANES + lane] > _f(0.0) and mode > 0:
+    if s[base + DENSITY * _L + lane] > _f(0.0) and mode > 0:
         if mode == 1:
             return
-        distance, other = np.float64(s[base + TFAR * LANES + lane]), 0.0
+        distance, other = np.float64(s[base + TFAR * _L + lane]), 0.0
         e = emitter_at(
-            node, np.int64(surface[prim, EMITTER]),
-            s[base + HIT_U * LANES + lane], s[base + HIT_V * LANES + lane],
+            lights.node, np.int64(surface[prim, EMITTER]),
+            s[base + HIT_U * _L + lane], s[base + HIT_V * _L + lane],
         )  # fmt: skip
         if e >= 0:
-            other = triangle_density(triangle, e, dx * distance, dy * distance, dz * distance)
-        weight = heuristic(np.float64(s[base + DENSITY * LANES + lane]), other, power)
+            other = emitter_density(lights.emitter, e, dx * distance, dy * distance, dz * distance)
+        weight = heuristic(np.float64(s[base + DENSITY * _L + lane]), other, power)
     for c in range(3):
-        value[c] = s[base + (BETA + c) * LANES + lane] * np.float64(surface[prim, EMISSION + c]) * weight
+        value[c] = s[base + (BETA + c) * _L + lane] * np.float64(surface[prim, EMISSION + c]) * weight
 
 
 @inner
@@ -125,13 +141,13 @@ def see_sky(s, base, lane, sky, mode, power, value):
     """Do the same for the sky, where a path leaves the scene."""
     value[0] = value[1] = value[2] = 0.0
     weight = 1.0
-    density = np.float64(s[base + DENSITY * LANES + lane])
-    if density > 0.0 and mode > 0 and sky[3] > 0.0:
+    density = np.float64(s[base + DENSITY * _L + lane])
+    if density > 0.0 and mode > 0 and sky[SKY_CHANCE] > 0.0:
         if mode == 1:
             return
-        weight = heuristic(density, sky[3] * max(s[base + COSINE * LANES + lane], 0.0) / math.pi, power)
+        weight = heuristic(density, sky[SKY_CHANCE] * max(s[base + COSINE * _L + lane], 0.0) / math.pi, power)
     for c in range(3):
-        value[c] = s[base + (BETA + c) * LANES + lane] * sky[c] * weight
+        value[c] = s[base + (BETA + c) * _L + lane] * sky[c] * weight
 
 
 @inner
@@ -142,111 +158,121 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
     """
     base = unsigned(base)
     m, places = len(toward), toward.shape[1]
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         if following + lane >= m * samples:
-            s[base + ALIVE * LANES + lane] = _f(0.0)
+            s[base + ALIVE * _L + lane] = _f(0.0)
             continue
         # Neighbouring lanes hold neighbouring points with the same sample.
         sample = (following + lane) // m
         i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % places)
         here = i if len(where) == m else 0
         there = k if where.shape[1] == places else 0
-        s[base + ALIVE * LANES + lane] = _f(1.0)
-        s[base + DENSITY * LANES + lane] = s[base + COSINE * LANES + lane] = _f(0.0)
-        s[base + BOUNCES * LANES + lane] = _f(0.0) if at_surface else _f(-1.0)
-        s[base + POINT * LANES + lane] = i
-        words[base + KEY * LANES + lane], words[base + SAMPLE * LANES + lane] = begin + i, sample
-        words[base + COUNT * LANES + lane] = np.uint32(0)
+        s[base + ALIVE * _L + lane] = _f(1.0)
+        s[base + DENSITY * _L + lane] = s[base + COSINE * _L + lane] = _f(0.0)
+        s[base + BOUNCES * _L + lane] = _f(0.0) if at_surface else _f(-1.0)
+        s[base + POINT * _L + lane] = i
+        words[base + KEY * _L + lane], words[base + SAMPLE * _L + lane] = begin + i, sample
+        words[base + COUNT * _L + lane] = np.uint32(0)
         for a in range(3):
-            s[base + (BETA + a) * LANES + lane] = s[base + (ALBEDO + a) * LANES + lane] = _f(1.0)
-            s[base + (ORG_X + a) * LANES + lane] = where[here, there, a]
-            s[base + (DIR_X + a) * LANES + lane] = s[base + (SHADED + a) * LANES + lane] = toward[i, k, a]
-            s[base + (NORMAL + a) * LANES + lane] = normal[i, k, a]
+            s[base + (BETA + a) * _L + lane] = s[base + (ALBEDO + a) * _L + lane] = _f(1.0)
+            s[base + (ORG_X + a) * _L + lane] = where[here, there, a]
+            s[base + (DIR_X + a) * _L + lane] = s[base + (SHADED + a) * _L + lane] = toward[i, k, a]
+            s[base + (NORMAL + a) * _L + lane] = normal[i, k, a]
 
 
 @inner
 def fetch_lanes(s, words, base, surface, material):
     """Copy what Lambertian vertices are made of: the triangles' rows and base colours."""
     base = unsigned(base)
-    for lane in range(LANES):
-        if s[base + ALIVE * LANES + lane] > _f(0.0):
-            prim = np.int64(words[base + PRIM_ID * LANES + lane])
+    for lane in range(BLOCK_WIDTH):
+        if s[base + ALIVE * _L + lane] > _f(0.0):
+            prim = np.int64(words[base + PRIM_ID * _L + lane])
             for c in range(TWO_SIDED + 1):
-                s[base + (TRIANGLE + c) * LANES + lane] = surface[prim, c]
+                s[base + (TRIANGLE + c) * _L + lane] = surface[prim, c]
             m = unsigned(surface[prim, MATERIAL])
             for c in range(3):
-                s[base + (ALBEDO + c) * LANES + lane] = material[m, c]
+                s[base + (ALBEDO + c) * _L + lane] = material[m, c]
 
 
 @inner
-def choose_lamps(s, words, base, every, cumulative, lamp):
-    """Choose a lamp for each lane: its number to `lamp` (8,) int64, its row of `every` to `s`."""
-    base = unsigned(base)
-    for lane in range(LANES):
-        choice, e = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32, 0
+def choose_lights(s, words, base, lights, light):
+    """Choose a light for each lane: its number to `light` (8,) int64, its row of `every` to `s`."""
+    base, row, cumulative = unsigned(base), lights.row, lights.cumulative
+    for lane in range(BLOCK_WIDTH):
+        choice, e = np.float64(words[base + CHOICE * _L + lane]) * _INV_2_32, 0
         if len(cumulative) > _FEW:
-            e = pick_lamp(cumulative, choice)
+            e = pick_light(cumulative, choice)
         else:
             # The same without a branch that nobody can foresee.
             for k in range(len(cumulative) - 1):
                 e += 1 if cumulative[k] <= choice else 0
-        lamp[lane] = e
-    for lane in range(LANES):
-        e = unsigned(lamp[lane])
-        for c in range(20):
-            s[base + (LAMP + c) * LANES + lane] = every[e, c]
+        light[lane] = e
+    for lane in range(BLOCK_WIDTH):
+        e = unsigned(light[lane])
+        for c in range(ROW_COLUMNS):
+            s[base + (LIGHT_ROW + c) * _L + lane] = row[e, c]
 
 
 @inner
 def turn_alone(path, row, lane, s, words, base, hemisphere, value):
     """Choose the direction in which one lane's path goes on, or end it."""
-    choice = np.float64(words[base + LOBE * LANES + lane]) * _INV_2_32
-    u, w = np.float64(s[base + U_WAY * LANES + lane]) - 1.0, np.float64(s[base + W_WAY * LANES + lane]) - 1.0
+    choice = np.float64(words[base + LOBE * _L + lane]) * _INV_2_32
+    u, w = (
+        np.float64(s[base + U_DIRECTION * _L + lane]) - 1.0,
+        np.float64(s[base + W_DIRECTION * _L + lane]) - 1.0,
+    )
     alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
     survive = 1.0
-    if alive and s[base + BOUNCES * LANES + lane] >= _f(SURE):
+    if alive and s[base + BOUNCES * _L + lane] >= _f(SURE):
         survive = min(max(path[PATH_BETA, lane], path[PATH_BETA + 1, lane], path[PATH_BETA + 2, lane]), MOST)
-        alive = s[base + ROULETTE * LANES + lane] - 1.0 < survive
-    s[base + ALIVE * LANES + lane] = _f(1.0) if alive else _f(0.0)
+        alive = s[base + ROULETTE * _L + lane] - 1.0 < survive
+    s[base + ALIVE * _L + lane] = _f(1.0) if alive else _f(0.0)
     cosine = 0.0
     for a in range(3):
-        s[base + (BETA + a) * LANES + lane] = path[PATH_BETA + a, lane] / survive
-        s[base + (ORG_X + a) * LANES + lane] = path[PLACE + a, lane]
-        s[base + (DIR_X + a) * LANES + lane] = path[GO + a, lane]
+        s[base + (BETA + a) * _L + lane] = path[PATH_BETA + a, lane] / survive
+        s[base + (ORG_X + a) * _L + lane] = path[POSITION + a, lane]
+        s[base + (DIR_X + a) * _L + lane] = path[GO + a, lane]
         cosine += path[GO + a, lane] * path[FRAME + 6 + a, lane]
-    s[base + DENSITY * LANES + lane] = path[PATH_DENSITY, lane]
-    s[base + COSINE * LANES + lane] = cosine
+    s[base + DENSITY * _L + lane] = path[PATH_DENSITY, lane]
+    s[base + COSINE * _L + lane] = cosine
 
 
 @inner
-def aim_alone(path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value, way):
-    """Aim at one lamp from one lane's vertex; return its number, -1 if it brings nothing."""
-    choice = np.float64(words[base + CHOICE * LANES + lane]) * _INV_2_32
+def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
+    """Aim at one light from one lane's vertex; return its number, -1 if it brings nothing."""
+    choice = np.float64(words[base + CHOICE * _L + lane]) * _INV_2_32
     u, w = (
-        np.float64(s[base + U_LAMP * LANES + lane]) - 1.0,
-        np.float64(s[base + W_LAMP * LANES + lane]) - 1.0,
+        np.float64(s[base + U_LIGHT * _L + lane]) - 1.0,
+        np.float64(s[base + W_LIGHT * _L + lane]) - 1.0,
     )
-    lamp = aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way)
+    light = aim(path, row, lane, lights, mode, power, choice, u, w, value, ray)
     for a in range(3):
-        s[base + (VALUE + a) * LANES + lane] = value[a] if lamp >= 0 else 0.0
-        s[base + (TO_LAMP + a) * LANES + lane] = way[a]
-        s[base + (ORG_X + a) * LANES + lane] = path[PLACE + a, lane]
-    s[base + REACH * LANES + lane], s[base + B1 * LANES + lane], s[base + B2 * LANES + lane] = (
-        way[3],
-        way[4],
-        way[5],
+        s[base + (VALUE + a) * _L + lane] = value[a] if light >= 0 else 0.0
+        s[base + (TO_LIGHT + a) * _L + lane] = ray[a]
+        s[base + (ORG_X + a) * _L + lane] = path[POSITION + a, lane]
+    (
+        s[base + MAX_DISTANCE * _L + lane],
+        s[base + B1 * _L + lane],
+        s[base + B2 * _L + lane],
+    ) = (
+        ray[3],
+        ray[4],
+        ray[5],
     )
-    return lamp
+    return light
 
 
 @kernel
-def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shading, memory, net, how, out):
+def trace_paths(
+    where, toward, normal, begin, at_surface, surfaces, lights, shading, memory, sobol_points, how, out
+):
     """Add the light that paths bring to each of m points, and count path segments and shadow rays.
 
     where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its
         point: place, shading normal and geometric normal, or ray origin and direction if not `at_surface`;
         one place (1, 1, 3) may be that of all
-    begin : number of the first point; net : (n, 2) uint32, n samples of a pass as bit-reversed Sobol numbers
+    begin : number of the first point
+    sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     how : (8,) int64: `Estimator` (hemisphere, aim, strata, power), most bounces (-1: unlimited), seed, pass,
         `seed_salt`
     out : (m, 3) float64 sums; at a surface of light leaving a white one, E / pi
@@ -258,23 +284,22 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
     """
     scene, intersect, occluded, blend = memory.scene, memory.intersect, memory.occluded, memory.blend
     on, s, words, bins = memory.on, memory.s, memory.words, memory.bins
-    surface, material, least, lambertian = (
+    surface, material, min_offset_scale, lambertian = (
         surfaces.row,
         surfaces.material,
-        surfaces.least,
+        surfaces.min_offset_scale,
         surfaces.lambertian,
     )
-    triangle, point, number, node = lamps.triangle, lamps.point, lamps.number, lamps.node
-    cumulative, sky, every = lamps.cumulative, lamps.sky, lamps.every
-    # What has to be looked up: alpha or emission of lamps, colours of surfaces.
-    glows = len(shading.alpha.slot) > 0 or lamps.glows != 0
+    emitter, triangle, sky, n_lights = lights.emitter, lights.triangle, lights.sky, len(lights.cumulative)
+    # What has to be looked up: alpha or emission of lights, colours of surfaces.
+    textured = len(shading.alpha.slot) > 0 or lights.textured != 0
     painted = surfaces.painted != 0
     hemisphere, mode, strata, power = how[0], how[1], how[2], how[3]
     most_bounces, number_of_pass, salt = how[4], how[6], how[7]
-    lit = cumulative[len(cumulative) - 1] > 0.0
+    lit = lights.cumulative[n_lights - 1] > 0.0
     path, row = _new_path(), _new_row()
-    value, way, rgba, lamp, filled = _new_value(), _new_way(), _new_rgba(), _new_lamp(), _new_filled()
-    samples, m, places = len(net), toward.shape[0], toward.shape[1]
+    value, ray, rgba, light, filled = _new_value(), _new_ray(), _new_rgba(), _new_light(), _new_filled()
+    samples, m, places = len(sobol_points), toward.shape[0], toward.shape[1]
     total = m * samples
     following = rays = shadows = 0
     # Blocks in use; the one to be shaded next in this round, which begins when all are traced.
@@ -311,113 +336,117 @@ def trace_paths(where, toward, normal, begin, at_surface, surfaces, lamps, shadi
                 number_of_pass * samples,
                 at_surface,
             )
-            following = min(following + LANES, total)
+            following = min(following + BLOCK_WIDTH, total)
             if not at_surface:
                 continue
         plain = hemisphere != 1 and (lambertian != 0 or not met)
         any_vertex = not met
         if met:
-            for lane in range(LANES):
-                if s[base + ALIVE * LANES + lane] == _f(0.0):
+            for lane in range(BLOCK_WIDTH):
+                if s[base + ALIVE * _L + lane] == _f(0.0):
                     continue
-                i = np.int64(s[base + POINT * LANES + lane])
-                if words[base + GEOM_ID * LANES + lane] == NO_HIT:
+                i = np.int64(s[base + POINT * _L + lane])
+                if words[base + GEOM_ID * _L + lane] == NO_HIT:
                     see_sky(s, base, lane, sky, mode, power, value)
                     for c in range(3):
                         out[i, c] += value[c]
-                    s[base + ALIVE * LANES + lane] = _f(0.0)
+                    s[base + ALIVE * _L + lane] = _f(0.0)
                     continue
-                prim = np.int64(words[base + PRIM_ID * LANES + lane])
+                prim = np.int64(words[base + PRIM_ID * _L + lane])
                 if surface[prim, SHINES] > _f(0.0):
-                    see_emitter(s, base, lane, surface, triangle, node, prim, mode, power, value)
+                    see_emitter(s, base, lane, surface, lights, prim, mode, power, value)
                     if surface[prim, SHINES] > _f(1.0):
-                        u = np.float64(s[base + HIT_U * LANES + lane])
-                        v = np.float64(s[base + HIT_V * LANES + lane])
-                        glow(shading, prim, u, v, value, rgba, False)
+                        u = np.float64(s[base + HIT_U * _L + lane])
+                        v = np.float64(s[base + HIT_V * _L + lane])
+                        multiply_emission_texture(shading, prim, u, v, value, rgba, False)
                     for c in range(3):
                         out[i, c] += value[c]
-                s[base + BOUNCES * LANES + lane] += _f(1.0)
-                if most_bounces >= 0 and s[base + BOUNCES * LANES + lane] > most_bounces:
-                    s[base + ALIVE * LANES + lane] = _f(0.0)
-                any_vertex = any_vertex or s[base + ALIVE * LANES + lane] > _f(0.0)
+                s[base + BOUNCES * _L + lane] += _f(1.0)
+                if most_bounces >= 0 and s[base + BOUNCES * _L + lane] > most_bounces:
+                    s[base + ALIVE * _L + lane] = _f(0.0)
+                any_vertex = any_vertex or s[base + ALIVE * _L + lane] > _f(0.0)
         if not any_vertex:
             continue
         random_lanes(words, base, number_of_pass, salt)
         if strata:
-            spread_lanes(words, base, net, number_of_pass, salt)
+            spread_lanes(words, base, sobol_points, number_of_pass, salt)
         if met and plain:
             fetch_lanes(s, words, base, surface, material)
         if met and (painted or not plain):
-            for lane in range(LANES):
-                if s[base + ALIVE * LANES + lane] == _f(0.0):
+            for lane in range(BLOCK_WIDTH):
+                if s[base + ALIVE * _L + lane] == _f(0.0):
                     continue
-                prim = np.int64(words[base + PRIM_ID * LANES + lane])
-                u, v = np.float64(s[base + HIT_U * LANES + lane]), np.float64(s[base + HIT_V * LANES + lane])
+                prim = np.int64(words[base + PRIM_ID * _L + lane])
+                u, v = (
+                    np.float64(s[base + HIT_U * _L + lane]),
+                    np.float64(s[base + HIT_V * _L + lane]),
+                )
                 if not plain:
                     for a in range(3):
-                        path[GO + a, lane] = s[base + (DIR_X + a) * LANES + lane]
-                    if not arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
-                        s[base + ALIVE * LANES + lane] = _f(0.0)
+                        path[GO + a, lane] = s[base + (DIR_X + a) * _L + lane]
+                    if not arrive(
+                        path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian
+                    ):
+                        s[base + ALIVE * _L + lane] = _f(0.0)
                         continue
                 if surface[prim, TEXTURED] > _f(0.0):
                     if plain:
                         for c in range(3):
-                            row[c, lane] = s[base + (ALBEDO + c) * LANES + lane]
+                            row[c, lane] = s[base + (ALBEDO + c) * _L + lane]
                         row[WIDTH, lane] = -1.0
                     paint(row, lane, shading, prim, u, v, material, rgba)
                     for c in range(3):
-                        s[base + (ALBEDO + c) * LANES + lane] = row[c, lane]
+                        s[base + (ALBEDO + c) * _L + lane] = row[c, lane]
         if plain:
             if met:
-                arrive_lanes(s, base, _f(least))
+                arrive_lanes(s, base, _f(min_offset_scale))
             else:
-                stand_lanes(s, base, _f(least), _f(surfaces.most))
+                stand_lanes(s, base, _f(min_offset_scale), _f(surfaces.most))
             if lit:
-                choose_lamps(s, words, base, every, cumulative, lamp)
+                choose_lights(s, words, base, lights, light)
+                if len(lights.falloff) > 0:
+                    look_up_falloff(s, base, lights, light)
                 aim_lanes(s, base, mode, power)
         else:
-            for lane in range(LANES):
-                lamp[lane] = -1
-                if s[base + ALIVE * LANES + lane] == _f(0.0):
+            for lane in range(BLOCK_WIDTH):
+                light[lane] = -1
+                if s[base + ALIVE * _L + lane] == _f(0.0):
                     continue
                 if not met:
                     i, sample = (
-                        np.int64(s[base + POINT * LANES + lane]),
-                        np.int64(words[base + SAMPLE * LANES + lane]),
+                        np.int64(s[base + POINT * _L + lane]),
+                        np.int64(words[base + SAMPLE * _L + lane]),
                     )
                     k = (number_of_pass * samples + sample) % places
-                    sizes = (least, surfaces.most)
+                    sizes = (min_offset_scale, surfaces.most)
                     start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], True, sizes)
                 for c in range(3):
-                    path[PATH_BETA + c, lane] = s[base + (BETA + c) * LANES + lane]
+                    path[PATH_BETA + c, lane] = s[base + (BETA + c) * _L + lane]
                 if lit:
-                    lamp[lane] = aim_alone(
-                        path, row, lane, s, words, base, triangle, point, cumulative, sky, mode, power, value,
-                        way,
+                    light[lane] = aim_alone(
+                        path, row, lane, s, words, base, lights, mode, power, value, ray,
                     )  # fmt: skip
         if lit:
-            if glows:
-                for lane in range(LANES):
-                    e = lamp[lane]
-                    if s[base + ALIVE * LANES + lane] > _f(0.0) and 0 <= e < len(triangle):
+            if textured:
+                for lane in range(BLOCK_WIDTH):
+                    e = light[lane]
+                    if s[base + ALIVE * _L + lane] > _f(0.0) and 0 <= e < len(emitter):
                         for c in range(3):
-                            value[c] = s[base + (VALUE + c) * LANES + lane]
+                            value[c] = s[base + (VALUE + c) * _L + lane]
                         u, v = (
-                            np.float64(s[base + B1 * LANES + lane]),
-                            np.float64(s[base + B2 * LANES + lane]),
+                            np.float64(s[base + B1 * _L + lane]),
+                            np.float64(s[base + B2 * _L + lane]),
                         )
-                        u, v = on_whole_triangle(triangle, e, u, v)
-                        glow(shading, number[e], u, v, value, rgba, True)
+                        u, v = on_whole_triangle(emitter, e, u, v)
+                        multiply_emission_texture(shading, triangle[e], u, v, value, rgba, True)
                         for c in range(3):
-                            s[base + (VALUE + c) * LANES + lane] = value[c]
-            shadows += cast_to_lamps(
-                s, base, lamp, len(cumulative), bins, filled, occluded, scene, blend, on, out
-            )
+                            s[base + (VALUE + c) * _L + lane] = value[c]
+            shadows += cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out)
         if plain:
             scatter_lanes(s, base)
         else:
-            for lane in range(LANES):
-                if s[base + ALIVE * LANES + lane] > _f(0.0):
+            for lane in range(BLOCK_WIDTH):
+                if s[base + ALIVE * _L + lane] > _f(0.0):
                     turn_alone(path, row, lane, s, words, base, hemisphere, value)
     for k in range(BINS):
         if filled[k] > 0:

@@ -11,7 +11,7 @@ from baker.core.stage import Stage
 from baker.kernels.sampling import sobol_reversed
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.estimators import estimator_named
-from baker.pathtracer.irradiance import path_setting
+from baker.pathtracer.irradiance import path_settings
 from baker.pathtracer.path_blocks import new_path_memory
 from baker.pathtracer.paths import trace_paths
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
@@ -39,7 +39,7 @@ def radiance_pass(
     estimate : PointEstimate
         Of (height * width, 3), row 0 on top; changed in place.
     max_bounces : int, optional
-        Reflections between lamp and camera beyond the first; None is unlimited.
+        Reflections between light and camera beyond the first; None is unlimited.
 
     Raises
     ------
@@ -50,24 +50,24 @@ def radiance_pass(
     """
     how = estimator_named(estimator)
     samples, number = estimate.samples, estimate.rounds
-    net = sobol_reversed(samples, seed, 1 + number)
-    setting = path_setting(how, how.strata, max_bounces, seed, number)
+    sobol_points = sobol_reversed(samples, seed, 1 + number)
+    setting = path_settings(how, how.strata, max_bounces, seed, number)
     if how.both:
         # Here: other estimators need not load its kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
-        picture_pass(reference, estimate, camera, width, height, net, setting, seed, progress)
+        picture_pass(reference, estimate, camera, width, height, sobol_points, setting, seed, progress)
         return
     counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
     eye = reference.local(camera.position)[None, None]
 
     def work(begin: int, end: int) -> None:
         pixel = np.arange(begin, end)
-        way = camera_rays(camera, width, height, pixel, samples, seed, number)
+        direction = camera_rays(camera, width, height, pixel, samples, seed, number)
         out = np.zeros((end - begin, 3))
         cast = trace_paths(
-            eye, way, way, begin, False, reference.surfaces, reference.lamps, reference.shading,
-            new_path_memory(reference.rays), net, setting, out,
+            eye, direction, direction, begin, False, reference.surfaces, reference.lights, reference.shading,
+            new_path_memory(reference.rays), sobol_points, setting, out,
         )  # fmt: skip
         counted[begin // _TILE] = cast
         add_pass(estimate, slice(begin, end), out / samples)

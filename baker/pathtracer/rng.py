@@ -13,22 +13,23 @@ import numpy as np
 
 from baker.kernels.sampling import hash_u32, reverse_bits, scramble_reversed, texel_scramble
 from baker.pathtracer.path_blocks import (
+    BLOCK_WIDTH,
     CHOICE,
     COUNT,
     KEY,
-    LANES,
     LOBE,
     ROULETTE,
     SAMPLE,
-    U_LAMP,
-    U_WAY,
-    W_LAMP,
-    W_WAY,
+    U_DIRECTION,
+    U_LIGHT,
+    W_DIRECTION,
+    W_LIGHT,
     unsigned,
 )
 from baker.trace.jit import inner
 
 _w = np.uint32
+_L = BLOCK_WIDTH
 _u = np.uint64
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 _INV_2_53 = 1.0 / 9007199254740992.0
@@ -61,15 +62,15 @@ def draw(state, lane):  # type: ignore[no-untyped-def]
 
 
 @inner
-def stratum(net, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
-    """Return numbers of a scrambled (0,2)-net, scrambled anew for each point, pass and pair."""
+def stratum(sobol_points, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
+    """Return numbers of a scrambled (0,2)-sequence, scrambled for each point, pass and pair."""
     bits = path_state(seed, number_of_pass, point, _u(1) << _u(40 + pair))
     first = np.uint32(bits & _u(0xFFFFFFFF))
     second = np.uint32(bits >> _u(32))
     none = np.uint32(0)
     return (
-        np.float64(texel_scramble(net[sample, 0], first, none)),
-        np.float64(texel_scramble(net[sample, 1], second, none)),
+        np.float64(texel_scramble(sobol_points[sample, 0], first, none)),
+        np.float64(texel_scramble(sobol_points[sample, 1], second, none)),
     )
 
 
@@ -105,40 +106,40 @@ def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
     """
     base = unsigned(base)
     number, salt, one, bits = _w(number), _w(salt), _w(0x3F800000), _w(9)
-    for lane in range(LANES):
-        point, sample = words[base + KEY * LANES + lane], words[base + SAMPLE * LANES + lane]
-        count = words[base + COUNT * LANES + lane]
-        words[base + COUNT * LANES + lane] = _w(count + _w(2))
+    for lane in range(BLOCK_WIDTH):
+        point, sample = words[base + KEY * _L + lane], words[base + SAMPLE * _L + lane]
+        count = words[base + COUNT * _L + lane]
+        words[base + COUNT * _L + lane] = _w(count + _w(2))
         x, y, z, w = mix4(point, sample, number, _w(salt + count))
-        words[base + CHOICE * LANES + lane] = x
-        words[base + U_LAMP * LANES + lane] = _w((y >> bits) | one)
-        words[base + W_LAMP * LANES + lane] = _w((z >> bits) | one)
-        words[base + ROULETTE * LANES + lane] = _w((w >> bits) | one)
+        words[base + CHOICE * _L + lane] = x
+        words[base + U_LIGHT * _L + lane] = _w((y >> bits) | one)
+        words[base + W_LIGHT * _L + lane] = _w((z >> bits) | one)
+        words[base + ROULETTE * _L + lane] = _w((w >> bits) | one)
         x, y, z, w = mix4(point, sample, number, _w(_w(salt + count) + _w(1)))
-        words[base + LOBE * LANES + lane] = x
-        words[base + U_WAY * LANES + lane] = _w((y >> bits) | one)
-        words[base + W_WAY * LANES + lane] = _w((z >> bits) | one)
+        words[base + LOBE * _L + lane] = x
+        words[base + U_DIRECTION * _L + lane] = _w((y >> bits) | one)
+        words[base + W_DIRECTION * _L + lane] = _w((z >> bits) | one)
 
 
 @inner
-def spread_lanes(words, base, net, number, salt):  # type: ignore[no-untyped-def]
+def spread_lanes(words, base, sobol_points, number, salt):  # type: ignore[no-untyped-def]
     """Replace the pairs of lanes at their path's first vertex by numbers of scrambled (0,2)-nets.
 
-    net : (n, 2) uint32; the nets are scrambled anew for each point, pass and pair
+    sobol_points : (n, 2) uint32; the nets are scrambled anew for each point, pass and pair
     """
     base = unsigned(base)
-    for lane in range(LANES):
-        if words[base + COUNT * LANES + lane] == _w(2):
-            sample = unsigned(words[base + SAMPLE * LANES + lane])
-            key = words[base + KEY * LANES + lane]
+    for lane in range(BLOCK_WIDTH):
+        if words[base + COUNT * _L + lane] == _w(2):
+            sample = unsigned(words[base + SAMPLE * _L + lane])
+            key = words[base + KEY * _L + lane]
             x, y, z, w = mix4(key, _w(0xFFFFFFFF), _w(number), _w(salt))
-            words[base + U_LAMP * LANES + lane] = scrambled(net[sample, 0], x)
-            words[base + W_LAMP * LANES + lane] = scrambled(net[sample, 1], y)
-            words[base + U_WAY * LANES + lane] = scrambled(net[sample, 0], z)
-            words[base + W_WAY * LANES + lane] = scrambled(net[sample, 1], w)
+            words[base + U_LIGHT * _L + lane] = scrambled(sobol_points[sample, 0], x)
+            words[base + W_LIGHT * _L + lane] = scrambled(sobol_points[sample, 1], y)
+            words[base + U_DIRECTION * _L + lane] = scrambled(sobol_points[sample, 0], z)
+            words[base + W_DIRECTION * _L + lane] = scrambled(sobol_points[sample, 1], w)
 
 
 @inner
 def scrambled(number, seed):  # type: ignore[no-untyped-def]
-    """Return a scrambled number of a net as the bits of a float32 in [1, 2)."""
+    """Return a scrambled number of a (0,2)-sequence as the bits of a float32 in [1, 2)."""
     return _w((reverse_bits(scramble_reversed(number, seed)) >> _w(9)) | _w(0x3F800000))

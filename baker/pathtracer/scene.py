@@ -1,4 +1,4 @@
-"""A scene as the reference sees it: triangles, materials, lamps, a ray tree; no atlas, no map."""
+"""A scene as the reference sees it: triangles, materials, lights, a ray tree; no atlas, no map."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.core.geometry import Geometry, world_geometry
 from baker.core.parallel import thread_count
 from baker.core.scene import Scene
 from baker.kernels.shading import Shading
-from baker.pathtracer.light_table import LampTable, build_lamps
+from baker.pathtracer.light_table import LightTable, build_light_table
 from baker.shading.materials import resolve_materials
 from baker.shading.ray_tree import build_ray_tree
 from baker.shading.scene_solids import hide_backs
@@ -23,7 +23,7 @@ from baker.trace.embree import RayScene
 from baker.trace.packets import aligned_floats
 
 # Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
-# what it is as a lamp (`LampTable.emitter`), 1 if a texture or a vertex colour changes what the material
+# what it is as a light (`LightTable.code`), 1 if a texture or a vertex colour changes what the material
 # says, radiance without texture, and whether it emits: 0 no, 1 yes, 2 with a texture.
 CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES = (
     0,
@@ -45,15 +45,25 @@ _SMALL = 0.1
 class Surfaces(NamedTuple):
     """What a path needs at a hit.
 
-    row (T, 32) float32, see the column names; material (M, 8) float32: base colour, metallic, roughness, 1 if
-    a texture scales the last two; least, most float, metres: offsets are never computed from smaller
-    coordinates, and from no larger ones where the triangle is not known;
-    lambertian int: 1 if everything reflects as Lambert; painted int: 1 if any triangle is textured.
+    Attributes
+    ----------
+    row : (T, 32) float32
+        See the column names.
+    material : (M, 8) float32
+        Base colour, metallic, roughness, 1 if a texture scales the last two.
+    min_offset_scale : float
+        Metres; coordinates below count as this when origins of rays are offset.
+    most : float
+        Metres; the size of a triangle where it is not known.
+    lambertian : int
+        1 if all surfaces are Lambertian.
+    painted : int
+        1 if any triangle has a texture or vertex colours.
     """
 
     row: NDArray[np.float32]
     material: NDArray[np.float32]
-    least: float
+    min_offset_scale: float
     most: float
     lambertian: int
     painted: int
@@ -69,7 +79,7 @@ class Reference:
         All that is traced is relative to its `origin`.
     shading : Shading
     surfaces : Surfaces
-    lamps : LampTable
+    lights : LightTable
     rays : RayScene
     sphere : (4,) float64
         Centre and radius, metres, of a sphere around everything.
@@ -81,7 +91,7 @@ class Reference:
     geometry: Geometry
     shading: Shading
     surfaces: Surfaces
-    lamps: LampTable
+    lights: LightTable
     rays: RayScene
     sphere: NDArray[np.float64]
     threads: int
@@ -136,13 +146,13 @@ def build_reference(
     geometry = world_geometry(scene, _no_atlas(scene))
     shading = resolve_materials(scene, geometry, reflections=not lambertian)
     rays = build_ray_tree(geometry, shading, threads=count)
-    lamps = build_lamps(scene, geometry, shading, sky)
-    surfaces = _surfaces(geometry, shading, lamps, lambertian)
+    lights = build_light_table(scene, geometry, shading, sky)
+    surfaces = _surfaces(geometry, shading, lights, lambertian)
     tells = np.zeros(len(geometry.triangle), np.uint8)
     if buried:
         # Only for the question what is buried: paths see backs as materials have them.
         tells = hide_backs(scene, geometry, shading)[1]
-    return Reference(geometry, shading, surfaces, lamps, rays, _sphere(geometry), count, tells)
+    return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, tells)
 
 
 def _no_atlas(scene: Scene) -> Atlas:
@@ -175,7 +185,7 @@ def _sphere(geometry: Geometry) -> NDArray[np.float64]:
     return np.array([*(0.5 * (low + high)), radius])
 
 
-def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian: bool) -> Surfaces:
+def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lambertian: bool) -> Surfaces:
     n, material = len(geometry.triangle), geometry.material
     row = aligned_floats(n * ROW_LENGTH).reshape(n, ROW_LENGTH)
     row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
@@ -183,9 +193,9 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     row[:, FACE : FACE + 3] = geometry.face_normal
     row[:, MATERIAL] = material
     row[:, TWO_SIDED] = geometry.double_sided
-    row[:, EMITTER] = lamps.emitter
+    row[:, EMITTER] = lights.code
     row[:, EMISSION : EMISSION + 3] = shading.emission[material]
-    # Not asked of the lamps: light that aiming forgets is found by rays that hit it.
+    # Not asked of the lights: light that aiming forgets is found by rays that hit it.
     emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
     row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
     painted = shading.base_texture >= 0
@@ -196,8 +206,8 @@ def _surfaces(geometry: Geometry, shading: Shading, lamps: LampTable, lambertian
     kinds[:, :3] = shading.base
     kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
     kinds[:, 5] = shading.reflection_texture >= 0
-    least, most = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
-    return Surfaces(row, kinds, least, most, int(lambertian), int(row[:, TEXTURED].any()))
+    min_offset_scale, most = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
+    return Surfaces(row, kinds, min_offset_scale, most, int(lambertian), int(row[:, TEXTURED].any()))
 
 
 def _small_size(geometry: Geometry) -> float:

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays that wait until they fill a packet: rays to the same lamp together, of whichever paths."""
+"""Shadow rays that wait until they fill a packet: rays to the same light together, of whichever paths."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from baker.pathtracer.path_blocks import (
     BIN_ROWS,
     BIN_VALUE,
     BINS,
-    LANES,
+    BLOCK_WIDTH,
+    MAX_DISTANCE,
     POINT,
-    REACH,
-    TO_LAMP,
+    TO_LIGHT,
     VALUE,
     unsigned,
 )
@@ -23,6 +23,7 @@ from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, ORG_X, TFAR
 
 _f = np.float32
+_L = BLOCK_WIDTH
 
 
 @inner
@@ -31,24 +32,24 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
     blend : of the path memory; out : (m, 3) float64
     """
-    n, start = filled[k], unsigned(k * BIN_ROWS * LANES)
-    for lane in range(LANES):
+    n, start = filled[k], unsigned(k * BIN_ROWS * _L)
+    for lane in range(BLOCK_WIDTH):
         on[lane] = -1 if lane < n else 0
-    packet = bins[start : start + BIN_ROWS * LANES]
-    trace_shadow_packet(blend, occluded, scene, LANES, on, packet)
+    packet = bins[start : start + BIN_ROWS * _L]
+    trace_shadow_packet(blend, occluded, scene, BLOCK_WIDTH, on, packet)
     for lane in range(n):
-        if bins[start + TFAR * LANES + lane] >= _f(0.0):
-            point = unsigned(bins[start + BIN_POINT * LANES + lane])
+        if bins[start + TFAR * _L + lane] >= _f(0.0):
+            point = unsigned(bins[start + BIN_POINT * _L + lane])
             for c in range(3):
-                out[point, c] += bins[start + (BIN_VALUE + c) * LANES + lane] * transmittance(blend, c, lane)
+                out[point, c] += bins[start + (BIN_VALUE + c) * _L + lane] * transmittance(blend, c, lane)
     filled[k] = 0
 
 
 @inner
-def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, blend, on, out):
-    """Put the lanes' rays to lamps into packets, those to one lamp together; trace what is full.
+def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
+    """Put the lanes' rays to lights into packets, those to one light together; trace what is full.
 
-    lamp : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
+    light : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
 
     Returns
     -------
@@ -57,23 +58,24 @@ def cast_to_lamps(s, base, lamp, n_lamps, bins, filled, occluded, scene, blend, 
     """
     base = unsigned(base)
     n = 0
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         here = base + lane
         brought = max(
-            max(s[here + VALUE * LANES], s[here + (VALUE + 1) * LANES]), s[here + (VALUE + 2) * LANES]
+            max(s[here + VALUE * _L], s[here + (VALUE + 1) * _L]),
+            s[here + (VALUE + 2) * _L],
         )
-        if s[here + ALIVE * LANES] == _f(0.0) or lamp[lane] < 0 or brought <= _f(0.0):
+        if s[here + ALIVE * _L] == _f(0.0) or light[lane] < 0 or brought <= _f(0.0):
             continue
         n += 1
-        k = unsigned(lamp[lane] if n_lamps <= BINS else lamp[lane] * BINS // n_lamps)
-        place = unsigned(k * BIN_ROWS * LANES + filled[k])
+        k = unsigned(light[lane] if n_lights <= BINS else light[lane] * BINS // n_lights)
+        place = unsigned(k * BIN_ROWS * _L + filled[k])
         for a in range(3):
-            bins[place + (ORG_X + a) * LANES] = s[here + (ORG_X + a) * LANES]
-            bins[place + (DIR_X + a) * LANES] = s[here + (TO_LAMP + a) * LANES]
-            bins[place + (BIN_VALUE + a) * LANES] = s[here + (VALUE + a) * LANES]
-        bins[place + TFAR * LANES] = s[here + REACH * LANES]
-        bins[place + BIN_POINT * LANES] = s[here + POINT * LANES]
+            bins[place + (ORG_X + a) * _L] = s[here + (ORG_X + a) * _L]
+            bins[place + (DIR_X + a) * _L] = s[here + (TO_LIGHT + a) * _L]
+            bins[place + (BIN_VALUE + a) * _L] = s[here + (VALUE + a) * _L]
+        bins[place + TFAR * _L] = s[here + MAX_DISTANCE * _L]
+        bins[place + BIN_POINT * _L] = s[here + POINT * _L]
         filled[k] += 1
-        if filled[k] == LANES:
+        if filled[k] == BLOCK_WIDTH:
             cast_packet(bins, filled, k, occluded, scene, blend, on, out)
     return n

@@ -2,7 +2,7 @@
 """One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
 
 A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
-(`bsdf`). Directions in `path` are world space; only `TO`, the way back, is in the frame of the normal.
+(`bsdf`). Directions in `path` are world space; only `TO`, the direction back, is in the frame of the normal.
 """
 
 from __future__ import annotations
@@ -24,23 +24,35 @@ from baker.pathtracer.bsdf import (
     cosine_sample,
     specular_chance,
 )
+from baker.pathtracer.emitters import EMITTER_RADIANCE
 from baker.pathtracer.light_table import (
+    DELTA_CHANCE,
+    DELTA_INTENSITY,
     FAR,
-    INTENSITY,
-    POINT_CHANCE,
-    RADIANCE,
     SHORT,
-    aim_at_point_light,
-    aim_at_triangle,
-    pick_lamp,
+    SKY_CHANCE,
+    aim_at_delta,
+    aim_at_emitter,
+    pick_light,
 )
 from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
 from baker.trace.jit import inner
 
 # Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
-# emission counts in full), geometric normal, frame (tangent, bitangent, normal), way back, bounces, the
+# emission counts in full), geometric normal, frame (tangent, bitangent, normal), direction back, bounces, the
 # interpolated normal on the geometric one's side.
-PLACE, GO, BETA, LIGHT, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = 0, 3, 6, 9, 12, 13, 16, 25, 28, 29
+POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
+    0,
+    3,
+    6,
+    9,
+    12,
+    13,
+    16,
+    25,
+    28,
+    29,
+)
 N_ROWS = 32
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
@@ -71,16 +83,17 @@ def local(path, lane, dx, dy, dz):
 
 
 @inner
-def place_off(path, lane, x, y, z, least, size):
+def place_off(path, lane, x, y, z, min_offset_scale, size):
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
 
-    least : see `Surfaces`; size : of the triangle, metres, or `Surfaces.most` where it is not known
+    path : (N_ROWS, n) float64; min_offset_scale : metres, see `Surfaces`
+    size : metres, of the triangle, or `Surfaces.most`
     """
     far = max(abs(x), abs(y), abs(z))
-    off = max(ROUNDING * max(far, size), OFFSET * min(max(far, least), size))
-    path[PLACE, lane] = x + off * path[NORMAL, lane]
-    path[PLACE + 1, lane] = y + off * path[NORMAL + 1, lane]
-    path[PLACE + 2, lane] = z + off * path[NORMAL + 2, lane]
+    off = max(ROUNDING * max(far, size), OFFSET * min(max(far, min_offset_scale), size))
+    path[POSITION, lane] = x + off * path[NORMAL, lane]
+    path[POSITION + 1, lane] = y + off * path[NORMAL + 1, lane]
+    path[POSITION + 2, lane] = z + off * path[NORMAL + 2, lane]
 
 
 @inner
@@ -97,16 +110,16 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
     """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
 
     where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
-    sizes : `Surfaces.least` and `.most`
+    sizes : `Surfaces.min_offset_scale` and `.most`
     """
     for c in range(3):
         path[BETA + c, lane] = 1.0
-        path[LIGHT + c, lane] = 0.0
+        path[COLLECTED + c, lane] = 0.0
     path[DENSITY, lane] = 0.0
     path[BOUNCES, lane] = 0.0
     if not at_surface:
         for a in range(3):
-            path[PLACE + a, lane] = where[a]
+            path[POSITION + a, lane] = where[a]
             path[GO + a, lane] = toward[a]
         path[BOUNCES, lane] = -1.0
         return
@@ -120,7 +133,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
 
 
 @inner
-def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
+def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian):
     """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
     b0 = 1.0 - u - v
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
@@ -134,7 +147,7 @@ def arrive(path, row, lane, surface, material, prim, u, v, least, lambertian):
     x = b0 * surface[prim, CORNER] + u * surface[prim, CORNER + 3] + v * surface[prim, CORNER + 6]
     y = b0 * surface[prim, CORNER + 1] + u * surface[prim, CORNER + 4] + v * surface[prim, CORNER + 7]
     z = b0 * surface[prim, CORNER + 2] + u * surface[prim, CORNER + 5] + v * surface[prim, CORNER + 8]
-    place_off(path, lane, x, y, z, least, size_of(surface, prim))
+    place_off(path, lane, x, y, z, min_offset_scale, size_of(surface, prim))
     nx = b0 * surface[prim, SHADING] + u * surface[prim, SHADING + 3] + v * surface[prim, SHADING + 6]
     ny = b0 * surface[prim, SHADING + 1] + u * surface[prim, SHADING + 4] + v * surface[prim, SHADING + 7]
     nz = b0 * surface[prim, SHADING + 2] + u * surface[prim, SHADING + 5] + v * surface[prim, SHADING + 8]
@@ -196,39 +209,44 @@ def heuristic(own, other, power):
 
 
 @inner
-def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, u, w, value, way):
-    """Aim at one lamp; return its number, or -1 if it cannot light the vertex.
+def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
+    """Aim at one light; return its number, or -1 if it cannot light the vertex.
 
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) output, what the path collects if nothing is in the way; way : (6,) output, the ray, its
-    reach and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
+    value : (3,) output, what the path collects if nothing is in the ray; ray : (6,) output, the ray, its
+    max_distance and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
     """
-    n, p = len(triangle), len(point)
-    x, y, z = path[PLACE, lane], path[PLACE + 1, lane], path[PLACE + 2, lane]
-    lamp = pick_lamp(cumulative, choice)
-    reach = FAR
+    emitter, delta, sky = lights.emitter, lights.delta, lights.sky
+    n, p = len(emitter), len(delta)
+    x, y, z = path[POSITION, lane], path[POSITION + 1, lane], path[POSITION + 2, lane]
+    light = pick_light(lights.cumulative, choice)
+    max_distance = FAR
     density = 0.0
     b1 = b2 = 0.0
-    if lamp < n:
+    if light < n:
         if mode == 0:
             return -1
-        dx, dy, dz, density, b1, b2 = aim_at_triangle(triangle, lamp, u, w, x, y, z)
+        dx, dy, dz, density, b1, b2 = aim_at_emitter(emitter, light, u, w, x, y, z)
         if density <= 0.0:
             return -1
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         dx, dy, dz = dx / length, dy / length, dz / length
-        reach = length * SHORT
+        max_distance = length * SHORT
         scale = 1.0 / density
         red, green, blue = (
-            triangle[lamp, RADIANCE],
-            triangle[lamp, RADIANCE + 1],
-            triangle[lamp, RADIANCE + 2],
+            emitter[light, EMITTER_RADIANCE],
+            emitter[light, EMITTER_RADIANCE + 1],
+            emitter[light, EMITTER_RADIANCE + 2],
         )
-    elif lamp < n + p:
-        e = lamp - n
-        dx, dy, dz, reach, share = aim_at_point_light(point, e, x, y, z)
-        scale = share / point[e, POINT_CHANCE]
-        red, green, blue = point[e, INTENSITY], point[e, INTENSITY + 1], point[e, INTENSITY + 2]
+    elif light < n + p:
+        e = light - n
+        dx, dy, dz, max_distance, share = aim_at_delta(lights, e, x, y, z)
+        scale = share / delta[e, DELTA_CHANCE]
+        red, green, blue = (
+            delta[e, DELTA_INTENSITY],
+            delta[e, DELTA_INTENSITY + 1],
+            delta[e, DELTA_INTENSITY + 2],
+        )
     else:
         if mode == 0:
             return -1
@@ -236,7 +254,7 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
         dx = a * path[FRAME, lane] + b * path[FRAME + 3, lane] + c * path[FRAME + 6, lane]
         dy = a * path[FRAME + 1, lane] + b * path[FRAME + 4, lane] + c * path[FRAME + 7, lane]
         dz = a * path[FRAME + 2, lane] + b * path[FRAME + 5, lane] + c * path[FRAME + 8, lane]
-        density = sky[3] * c / math.pi
+        density = sky[SKY_CHANCE] * c / math.pi
         scale = 1.0 / density if density > 0.0 else 0.0
         red, green, blue = sky[0], sky[1], sky[2]
     above = dx * path[NORMAL, lane] + dy * path[NORMAL + 1, lane] + dz * path[NORMAL + 2, lane]
@@ -249,12 +267,12 @@ def aim(path, row, lane, triangle, point, cumulative, sky, mode, power, choice, 
     value[0] *= path[BETA, lane] * red * scale
     value[1] *= path[BETA + 1, lane] * green * scale
     value[2] *= path[BETA + 2, lane] * blue * scale
-    way[0], way[1], way[2], way[3], way[4], way[5] = dx, dy, dz, reach, b1, b2
-    return lamp if value[0] + value[1] + value[2] > 0.0 else -1
+    ray[0], ray[1], ray[2], ray[3], ray[4], ray[5] = dx, dy, dz, max_distance, b1, b2
+    return light if value[0] + value[1] + value[2] > 0.0 else -1
 
 
 @inner
-def glow(shading, prim, u, v, value, rgba, aimed):
+def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
     """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
 
     aimed : also by its alpha: rays that hit it know that already

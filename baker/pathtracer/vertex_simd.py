@@ -17,17 +17,24 @@ import numpy as np
 from baker.kernels.sampling import cosine_direction, tangent_frame, triangle_barycentric
 from baker.pathtracer.light_table import (
     FAR,
-    LANE_CORNER,
-    LANE_EDGE,
-    LANE_GAIN,
-    LANE_INVERSE_RANGE,
-    LANE_KIND,
-    LANE_NORMAL,
-    LANE_OUTER,
-    LANE_RADIANCE,
-    LANE_SCALE,
-    LANE_TWO_SIDED,
+    KIND_CONE,
+    KIND_EMITTER,
+    KIND_EVEN,
+    KIND_PARALLEL,
+    KIND_SKY,
+    KIND_TABULATED,
+    ROW_CONE_SCALE,
+    ROW_EDGE,
+    ROW_GAIN,
+    ROW_INVERSE_RANGE,
+    ROW_KIND,
+    ROW_MIN_COSINE,
+    ROW_NORMAL,
+    ROW_ORIGIN,
+    ROW_RADIANCE,
+    ROW_TWO_SIDED,
     SHORT,
+    tabulated,
 )
 from baker.pathtracer.path_blocks import (
     ALBEDO,
@@ -36,23 +43,23 @@ from baker.pathtracer.path_blocks import (
     B2,
     BETA,
     BITANGENT,
+    BLOCK_WIDTH,
     BOUNCES,
     COSINE,
     DENSITY,
-    LAMP,
-    LANES,
+    LIGHT_ROW,
+    MAX_DISTANCE,
     NORMAL,
-    REACH,
     ROULETTE,
     SHADED,
     TANGENT,
-    TO_LAMP,
+    TO_LIGHT,
     TRIANGLE,
-    U_LAMP,
-    U_WAY,
+    U_DIRECTION,
+    U_LIGHT,
     VALUE,
-    W_LAMP,
-    W_WAY,
+    W_DIRECTION,
+    W_LIGHT,
     unsigned,
 )
 from baker.pathtracer.scene import CORNER, FACE, SHADING, TWO_SIDED
@@ -66,19 +73,20 @@ _ZERO, _ONE = _f(0.0), _f(1.0)
 _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
 _OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
 _SURE, _MOST = _f(SURE), _f(MOST)
-_T = TRIANGLE * LANES
-_M = LAMP * LANES
-_L = LANES
+_EMITTER, _CONE, _PARALLEL, _SKY = _f(KIND_EMITTER), _f(KIND_CONE), _f(KIND_PARALLEL), _f(KIND_SKY)
+_T = TRIANGLE * BLOCK_WIDTH
+_M = LIGHT_ROW * BLOCK_WIDTH
+_L = BLOCK_WIDTH
 
 
 @inner
-def stand(s, base, lane, x, y, z, least, size):
+def stand(s, base, lane, x, y, z, min_offset_scale, size):
     """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
 
-    least, size : float32, metres, see `vertex.place_off`
+    min_offset_scale, size : float32, metres, see `vertex.place_off`
     """
     far = max(max(abs(x), abs(y)), abs(z))
-    off = max(_ROUNDING * max(far, size), _OFFSET * min(max(far, least), size))
+    off = max(_ROUNDING * max(far, size), _OFFSET * min(max(far, min_offset_scale), size))
     s[base + ORG_X * _L + lane] = x + off * s[base + NORMAL * _L + lane]
     s[base + ORG_Y * _L + lane] = y + off * s[base + (NORMAL + 1) * _L + lane]
     s[base + ORG_Z * _L + lane] = z + off * s[base + (NORMAL + 2) * _L + lane]
@@ -94,12 +102,15 @@ def stand(s, base, lane, x, y, z, least, size):
 
 
 @inner
-def stand_lanes(s, base, least, most):
-    """Make the lanes' places on surfaces vertices; least, most : float32, metres, see `Surfaces`."""
+def stand_lanes(s, base, min_offset_scale, most):
+    """Make vertices of the lanes' surface points.
+
+    s : blocks, float32; min_offset_scale, most : float32, metres, see `Surfaces`
+    """
     base = unsigned(base)
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         x, y, z = s[base + ORG_X * _L + lane], s[base + ORG_Y * _L + lane], s[base + ORG_Z * _L + lane]
-        stand(s, base, lane, x, y, z, least, most)
+        stand(s, base, lane, x, y, z, min_offset_scale, most)
 
 
 @inner
@@ -121,13 +132,13 @@ def weighted(s, base, column, lane, b, u, v):
 
 
 @inner
-def arrive_lanes(s, base, least):
+def arrive_lanes(s, base, min_offset_scale):
     """Make the lanes' hits, whose triangles' rows have been copied, vertices; black backs end the path.
 
-    least : float32, metres, see `Surfaces`
+    min_offset_scale : float32, metres, see `Surfaces`
     """
     base = unsigned(base)
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         u, v = s[base + HIT_U * _L + lane], s[base + HIT_V * _L + lane]
         b = _ONE - u - v
         fx, fy, fz = (
@@ -155,39 +166,65 @@ def arrive_lanes(s, base, least):
         s[base + (SHADED + 1) * _L + lane] = scale * (ny if bent else fy)
         s[base + (SHADED + 2) * _L + lane] = scale * (nz if bent else fz)
         size = max(max(edge_lane(s, base, lane, 0), edge_lane(s, base, lane, 1)), edge_lane(s, base, lane, 2))
-        stand(s, base, lane, x, y, z, least, size)
+        stand(s, base, lane, x, y, z, min_offset_scale, size)
+
+
+@inner
+def look_up_falloff(s, base, lights, light):
+    """Multiply the gain of the lanes' tabulated lights by their fall-off; for `aim_lanes` they are even then.
+
+    s : blocks; lights : `LightTable`; light : (8,) int64, numbers of the lanes' lights
+    """
+    base = unsigned(base)
+    n = len(lights.emitter)
+    for lane in range(BLOCK_WIDTH):
+        if s[base + _M + ROW_KIND * _L + lane] != _f(KIND_TABULATED):
+            continue
+        dx = np.float64(s[base + ORG_X * _L + lane]) - s[base + _M + ROW_ORIGIN * _L + lane]
+        dy = np.float64(s[base + ORG_Y * _L + lane]) - s[base + _M + (ROW_ORIGIN + 1) * _L + lane]
+        dz = np.float64(s[base + ORG_Z * _L + lane]) - s[base + _M + (ROW_ORIGIN + 2) * _L + lane]
+        length = math.sqrt(max(dx * dx + dy * dy + dz * dz, 1.0e-20))
+        dx, dy, dz = dx / length, dy / length, dz / length
+        cosine = (
+            dx * s[base + _M + ROW_NORMAL * _L + lane]
+            + dy * s[base + _M + (ROW_NORMAL + 1) * _L + lane]
+            + dz * s[base + _M + (ROW_NORMAL + 2) * _L + lane]
+        )
+        share = tabulated(lights.falloff, lights.delta, light[lane] - n, cosine, dx, dy, dz)
+        s[base + _M + ROW_GAIN * _L + lane] *= _f(share)
+        s[base + _M + ROW_KIND * _L + lane] = _f(KIND_EVEN)
 
 
 @inner
 def aim_lanes(s, base, mode, power):
-    """Aim at the lanes' lamps, whose rows have been copied: write direction, reach and the light they bring.
+    """Aim at the lanes' lights, whose rows have been copied; write direction, distance and unblocked light.
 
-    mode, power : `Estimator.aim` and `.power`. What cannot light a vertex brings 0.
+    s : blocks, float32; mode, power : `Estimator.aim` and `.power`. The light is 0 below the horizon.
     """
     base = unsigned(base)
-    for lane in range(LANES):
-        u, w = s[base + U_LAMP * _L + lane] - _ONE, s[base + W_LAMP * _L + lane] - _ONE
-        kind = s[base + _M + LANE_KIND * _L + lane]
-        sky = kind == _f(4.0)
+    for lane in range(BLOCK_WIDTH):
+        u, w = s[base + U_LIGHT * _L + lane] - _ONE, s[base + W_LIGHT * _L + lane] - _ONE
+        kind = s[base + _M + ROW_KIND * _L + lane]
+        sky = kind == _SKY
         b1, b2 = triangle_barycentric(u, w)
         # Lights without area have no edges; what is infinitely far does not depend on the place.
-        near = _ONE if kind < _f(3.0) else _ZERO
+        near = _ONE if kind < _PARALLEL else _ZERO
         dx = (
-            s[base + _M + LANE_CORNER * _L + lane]
-            + b1 * s[base + _M + LANE_EDGE * _L + lane]
-            + b2 * s[base + _M + (LANE_EDGE + 3) * _L + lane]
+            s[base + _M + ROW_ORIGIN * _L + lane]
+            + b1 * s[base + _M + ROW_EDGE * _L + lane]
+            + b2 * s[base + _M + (ROW_EDGE + 3) * _L + lane]
             - near * s[base + ORG_X * _L + lane]
         )
         dy = (
-            s[base + _M + (LANE_CORNER + 1) * _L + lane]
-            + b1 * s[base + _M + (LANE_EDGE + 1) * _L + lane]
-            + b2 * s[base + _M + (LANE_EDGE + 4) * _L + lane]
+            s[base + _M + (ROW_ORIGIN + 1) * _L + lane]
+            + b1 * s[base + _M + (ROW_EDGE + 1) * _L + lane]
+            + b2 * s[base + _M + (ROW_EDGE + 4) * _L + lane]
             - near * s[base + ORG_Y * _L + lane]
         )
         dz = (
-            s[base + _M + (LANE_CORNER + 2) * _L + lane]
-            + b1 * s[base + _M + (LANE_EDGE + 2) * _L + lane]
-            + b2 * s[base + _M + (LANE_EDGE + 5) * _L + lane]
+            s[base + _M + (ROW_ORIGIN + 2) * _L + lane]
+            + b1 * s[base + _M + (ROW_EDGE + 2) * _L + lane]
+            + b2 * s[base + _M + (ROW_EDGE + 5) * _L + lane]
             - near * s[base + ORG_Z * _L + lane]
         )
         a, b, c = cosine_direction(u, w)
@@ -213,21 +250,23 @@ def aim_lanes(s, base, mode, power):
         length = math.sqrt(square)
         shrink = _ONE / length
         dx, dy, dz = dx * shrink, dy * shrink, dz * shrink
-        at_lamp = -(
-            dx * s[base + _M + LANE_NORMAL * _L + lane]
-            + dy * s[base + _M + (LANE_NORMAL + 1) * _L + lane]
-            + dz * s[base + _M + (LANE_NORMAL + 2) * _L + lane]
+        at_light = -(
+            dx * s[base + _M + ROW_NORMAL * _L + lane]
+            + dy * s[base + _M + (ROW_NORMAL + 1) * _L + lane]
+            + dz * s[base + _M + (ROW_NORMAL + 2) * _L + lane]
         )
-        cosine = abs(at_lamp) if s[base + _M + LANE_TWO_SIDED * _L + lane] > _ZERO else at_lamp
-        inside = (at_lamp - s[base + _M + LANE_OUTER * _L + lane]) * s[base + _M + LANE_SCALE * _L + lane]
+        cosine = abs(at_light) if s[base + _M + ROW_TWO_SIDED * _L + lane] > _ZERO else at_light
+        inside = (at_light - s[base + _M + ROW_MIN_COSINE * _L + lane]) * s[
+            base + _M + ROW_CONE_SCALE * _L + lane
+        ]
         inside = min(max(inside, _ZERO), _ONE)
         # One over the density per steradian; irradiance per intensity and chance of lights without area.
         here = dx * nx + dy * ny + dz * nz
-        gain = s[base + _M + LANE_GAIN * _L + lane]
-        area = kind == _ZERO
+        gain = s[base + _M + ROW_GAIN * _L + lane]
+        area = kind == _EMITTER
         gain *= (cosine if cosine > _f(1.0e-9) else _ZERO) if area else _ONE
-        gain *= inside * inside if kind == _f(2.0) else _ONE
-        faded = square * s[base + _M + LANE_INVERSE_RANGE * _L + lane]
+        gain *= inside * inside if kind == _CONE else _ONE
+        faded = square * s[base + _M + ROW_INVERSE_RANGE * _L + lane]
         gain *= _ONE if area else max(_ONE - faded * faded, _ZERO)
         gain *= _PI / max(c, _f(1.0e-9)) if sky else near / square + (_ONE - near)
         above = (
@@ -246,14 +285,14 @@ def aim_lanes(s, base, mode, power):
                 scale
                 * s[base + (BETA + k) * _L + lane]
                 * s[base + (ALBEDO + k) * _L + lane]
-                * s[base + _M + (LANE_RADIANCE + k) * _L + lane]
+                * s[base + _M + (ROW_RADIANCE + k) * _L + lane]
             )
         (
-            s[base + TO_LAMP * _L + lane],
-            s[base + (TO_LAMP + 1) * _L + lane],
-            s[base + (TO_LAMP + 2) * _L + lane],
+            s[base + TO_LIGHT * _L + lane],
+            s[base + (TO_LIGHT + 1) * _L + lane],
+            s[base + (TO_LIGHT + 2) * _L + lane],
         ) = dx, dy, dz
-        s[base + REACH * _L + lane] = length * _SHORT if near > _ZERO else _FAR
+        s[base + MAX_DISTANCE * _L + lane] = length * _SHORT if near > _ZERO else _FAR
         s[base + B1 * _L + lane], s[base + B2 * _L + lane] = b1, b2
 
 
@@ -261,8 +300,8 @@ def aim_lanes(s, base, mode, power):
 def scatter_lanes(s, base):
     """Choose the directions in which the lanes' paths go on; others end."""
     base = unsigned(base)
-    for lane in range(LANES):
-        u, w = s[base + U_WAY * _L + lane] - _ONE, s[base + W_WAY * _L + lane] - _ONE
+    for lane in range(BLOCK_WIDTH):
+        u, w = s[base + U_DIRECTION * _L + lane] - _ONE, s[base + W_DIRECTION * _L + lane] - _ONE
         a, b, c = cosine_direction(u, w)
         dx = (
             a * s[base + TANGENT * _L + lane]

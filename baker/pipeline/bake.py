@@ -16,7 +16,7 @@ from baker.core.atlas import Atlas
 from baker.core.error_mapping import memory_errors
 from baker.core.executor import LocalTileExecutor, TileExecutor
 from baker.core.export import check_exports
-from baker.core.light_kind import check_lights
+from baker.core.light_limits import check_brightness
 from baker.core.lightmap import BakeResult
 from baker.core.precision import coarse_warnings
 from baker.core.progress import Progress, silent
@@ -86,7 +86,7 @@ def bake(
     with memory_errors():
         with record.stage(Stage.LOAD):
             if isinstance(scene, Scene):
-                check_lights(scene)
+                check_brightness(scene)
             else:
                 scene = load_for_bake(scene, settings)
         compiling = precompile.restart_for_materials(compiling, scene)

@@ -17,11 +17,11 @@ from baker.io.load import load_scene
 from baker.io.scene_hash import scene_sha256
 from baker.pathtracer.first_hit import FirstHits
 from baker.pathtracer.scene import EMISSION, SHINES, Reference
-from baker.pathtracer.vertex import glow
+from baker.pathtracer.vertex import multiply_emission_texture
 from baker.trace.jit import kernel, scratch
 from baker.trace.kernel_cache import keep_kernels
 
-keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.lights.families", "baker.pathtracer")
+keep_kernels(__file__, "baker.trace", "baker.kernels", "baker.pathtracer")
 
 _new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 
@@ -79,7 +79,7 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
     for i in chosen:
         for c in range(3):
             value[c] = surface[triangle[i], EMISSION + c]
-        glow(shading, triangle[i], bary[i, 0], bary[i, 1], value, rgba, False)
+        multiply_emission_texture(shading, triangle[i], bary[i, 0], bary[i, 1], value, rgba, False)
         for c in range(3):
             light[i, c] += value[c]
 

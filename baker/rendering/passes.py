@@ -19,7 +19,7 @@ from baker.core.scene import Camera
 from baker.core.stage import Stage
 from baker.pathtracer.camera import camera_rays
 from baker.pathtracer.first_hit import FirstHits, first_hits
-from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import PointEstimate, add_pass, new_estimate
 from baker.pathtracer.radiance import radiance_pass
 from baker.pathtracer.scene import Reference
@@ -148,7 +148,7 @@ def openness(run: Run, distance: float) -> PointEstimate:
             where = (a[met][:, None] for a in (hits.position, hits.normal, hits.face_normal))
             # Points are numbered from 0 in each block: with one seed all blocks would draw the same numbers.
             seed = (run.settings.seed + 7919 * (begin // _BLOCK)) & 0x7FFFFFFF
-            openness_pass(run.reference, one, *where, distance=distance, seed=seed)
+            ambient_occlusion_pass(run.reference, one, *where, distance=distance, seed=seed)
             share = np.ones((end - begin, 1))
             share[met] = one.mean
             add_pass(estimate, np.arange(begin, end), share)

@@ -16,7 +16,7 @@ from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import texel_places
-from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.scene import Reference
 
@@ -120,7 +120,7 @@ def _trace(
     distance = np.inf if reach is None else float(reach)
     for _ in range(_PASSES):
         if occlusion:
-            openness_pass(reference, estimate, *where, distance=distance, seed=seed)
+            ambient_occlusion_pass(reference, estimate, *where, distance=distance, seed=seed)
         else:
             irradiance_pass(reference, estimate, *where, max_bounces=bounces, seed=seed)
         if time.monotonic() > end:

@@ -19,7 +19,7 @@ from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.surface import OFFSET, ROUNDING
 from baker.metrics.texel_area import TexelPlaces
 from baker.pathtracer.first_hit import first_hits
-from baker.pathtracer.inside_geometry import RAYS, is_buried
+from baker.pathtracer.inside_geometry import RAYS, is_inside_geometry
 from baker.pathtracer.inside_geometry import look_around as cast_around
 from baker.pathtracer.scene import Reference
 
@@ -92,7 +92,7 @@ def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArr
     random = np.random.Generator(np.random.PCG64([seed, 14]))
     # Without a normal directions are even over the sphere.
     views = cast_around(reference, air, np.zeros_like(air), _AROUND, random)
-    return air[~is_buried(views)]
+    return air[~is_inside_geometry(views)]
 
 
 def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[np.bool_]:
@@ -129,7 +129,7 @@ def buried_places(
 ) -> NDArray[np.bool_]:
     """Return (n, k): which of the places (n, k, 3) are buried."""
     origin = lifted(reference, position, face_normal)
-    found = is_buried(cast_around(reference, origin, normal.reshape(-1, 3), RAYS, random))
+    found = is_inside_geometry(cast_around(reference, origin, normal.reshape(-1, 3), RAYS, random))
     return found.reshape(position.shape[:2])
 
 
@@ -210,7 +210,7 @@ def lifted(
     """Return places (n, k, 3) as (n k, 3), off their surface by what rounding needs."""
     position, face = position.reshape(-1, 3), face.reshape(-1, 3)
     far, sizes = np.abs(position).max(axis=1, keepdims=True), reference.surfaces
-    step = OFFSET * np.minimum(np.maximum(far, sizes.least), sizes.most)
+    step = OFFSET * np.minimum(np.maximum(far, sizes.min_offset_scale), sizes.most)
     step = np.maximum(step, ROUNDING * np.maximum(far, sizes.most))
     lifted: NDArray[np.float64] = position + step * face
     return lifted

@@ -21,7 +21,7 @@ from baker.core.stage import Stage
 from baker.metrics.error_metrics import dark_floor
 from baker.metrics.texel_area import TexelPlaces
 from baker.pathtracer.first_hit import first_hits
-from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.scene import Reference
 
@@ -107,7 +107,7 @@ def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) ->
     one = middle[:, None], face[:, None], face[:, None]
     first_hits(reference, middle, face)
     if "ao" in channels:
-        openness_pass(reference, new_estimate(1, 1), *one, distance=1.0)
+        ambient_occlusion_pass(reference, new_estimate(1, 1), *one, distance=1.0)
     if "irradiance" in channels:
         irradiance_pass(reference, new_estimate(1, 3), *one, chosen=np.arange(1))
     return time.monotonic() - started
@@ -121,7 +121,7 @@ def trace_openness(
     goal = effort.passes(estimate)
     started = time.monotonic()
     for number in range(goal or _MOST_OPENNESS):
-        openness_pass(
+        ambient_occlusion_pass(
             reference, estimate, places.position, places.normal, places.face_normal,
             distance=distance, seed=effort.seed,
         )  # fmt: skip

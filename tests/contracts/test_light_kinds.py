@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_scene, world_of
 
-import baker.lights.families
+import baker.lights.kinds
 from baker.checks.context import CheckContext
 from baker.checks.in_bake import bake_warnings
 from baker.checks.run import check_scene
@@ -39,7 +39,7 @@ MOON = '''
 
 import numpy as np
 
-from baker.core.light_kind import LIGHT_KINDS, Distribution, LightKind
+from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightKind
 
 
 def moonlight(light, origin, normal, ray, weight):
@@ -48,7 +48,62 @@ def moonlight(light, origin, normal, ray, weight):
 
 
 MOON = LIGHT_KINDS.register("moon")(
-    LightKind("moon", "lx", True, Distribution.PARALLEL, "moon", 0.3, moonlight, lambda light, disc: disc)
+    LightKind(
+        name="moon", unit="lx", has_position=False, has_direction=True, gltf_type="moon", plausible_max=0.3,
+        read=lambda json, world_from_light: {}, write=lambda light: {},
+        describe=lambda light: {"direction": light.direction}, fill=moonlight,
+        emission=lambda light: EmissionProfile(None, light.direction), power=lambda light, disc: disc,
+    )
+)
+'''
+BEACON = '''
+"""A beacon: I(w) = I max(cos, 0)^n (1 + cos(2 phi)) / 2, with a parameter n of its own."""
+
+import math
+
+import numpy as np
+
+from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightKind
+
+COSINES, AZIMUTHS = 512, 128
+
+
+def frame(light):
+    axis = np.array(light.direction)
+    tangent = np.cross(axis, [0.0, 0.0, 1.0])
+    tangent /= np.linalg.norm(tangent)
+    return axis, tangent, np.cross(axis, tangent)
+
+
+def beam(light, origin, normal, ray, weight):
+    axis, tangent, bitangent = frame(light)
+    ray[..., :3], ray[..., 3] = np.array(light.position) - origin, 0.9999
+    length = np.linalg.norm(ray[..., :3], axis=-1)
+    away = -ray[..., :3] / length[..., None]
+    azimuth = np.arctan2(away @ bitangent, away @ tangent)
+    share = np.maximum(away @ axis, 0) ** light.parameters["sharpness"] * np.cos(azimuth) ** 2
+    weight[:] = np.maximum(-(away * normal).sum(axis=-1), 0) / length**2 * share
+
+
+def emission(light):
+    cosine = np.linspace(0, 1, COSINES)[:, None] ** light.parameters["sharpness"]
+    table = cosine * np.cos(2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS) ** 2
+    tangent = tuple(frame(light)[1])
+    return EmissionProfile(light.position, light.direction, min_cosine=0.0, table=table, tangent=tangent)
+
+
+BEACON = LIGHT_KINDS.register("beacon")(
+    LightKind(
+        name="beacon", unit="cd", has_position=True, has_direction=True, gltf_type="beacon",
+        plausible_max=90.0,
+        read=lambda json, world_from_light: {"parameters": {"sharpness": json.number("sharpness", low=0.0)}},
+        write=lambda light: {"sharpness": light.parameters["sharpness"]},
+        describe=lambda light: {
+            "position": light.position, "direction": light.direction, **light.parameters
+        },
+        fill=beam, emission=emission,
+        power=lambda light, disc: math.pi / (light.parameters["sharpness"] + 1),
+    )
 )
 '''
 
@@ -65,22 +120,28 @@ def shining(kind, intensity=2.0):
 
 
 @pytest.fixture
-def moon(tmp_path, monkeypatch):
-    """Add one file to `baker.lights.families`."""
+def add_kind(tmp_path, monkeypatch):
+    """Return a function that adds one file to `baker.lights.kinds`."""
     LIGHT_KINDS.names()
-    (tmp_path / "moon.py").write_text(MOON)
-    monkeypatch.setattr(baker.lights.families, "__path__", [*baker.lights.families.__path__, str(tmp_path)])
+    monkeypatch.setattr(baker.lights.kinds, "__path__", [*baker.lights.kinds.__path__, str(tmp_path)])
     monkeypatch.setattr(LIGHT_KINDS, "_plugins", dict(LIGHT_KINDS._plugins))
-    monkeypatch.setattr(LIGHT_KINDS, "_searched", False)
-    importlib.invalidate_caches()
-    yield
-    sys.modules.pop("baker.lights.families.moon", None)
-    vars(baker.lights.families).pop("moon", None)
+    added = []
+
+    def add(name, text):
+        (tmp_path / f"{name}.py").write_text(text)
+        monkeypatch.setattr(LIGHT_KINDS, "_searched", False)
+        importlib.invalidate_caches()
+        added.append(name)
+
+    yield add
+    for name in added:
+        sys.modules.pop(f"baker.lights.kinds.{name}", None)
+        vars(baker.lights.kinds).pop(name, None)
 
 
-@pytest.mark.usefixtures("moon")
-def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path):
+def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
     """Baked, written, read, verified, rendered and checked, with the numbers of the sun that it is."""
+    add_kind("moon", MOON)
     out = tmp_path / "out"
     found = bake(lit_by(shining("moon")), settings=SETTINGS, out=out)
     same = bake(lit_by(shining("directional")), settings=SETTINGS)
@@ -105,6 +166,48 @@ def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path):
     report = check_scene(out / "scene.glb", CheckSettings(), SETTINGS)
     (finding,) = (f for f in report.findings if f.code == "light-intensity")
     assert "the moon light has 2 lx" in finding.message
+
+
+def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
+    """Its bake follows its kernel, the path tracer its table: `verify` compares them."""
+    add_kind("beacon", BEACON)
+    out = tmp_path / "out"
+    light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
+    bake(lit_by(light), settings=SETTINGS, out=out)
+    assert json.loads((out / "bake.json").read_text())["lights"][0]["sharpness"] == 3.0
+    verified = verify(out, VerifySettings(texels=200, spp=64))
+    assert verified.bake.scene.lights[0].parameters == {"sharpness": 3.0}
+    assert verified.passed, verified.problems
+    report = check_scene(out / "scene.glb", CheckSettings(), SETTINGS)
+    (finding,) = (f for f in report.findings if f.code == "light-intensity")
+    assert "the beacon light has 100 cd" in finding.message
+
+    # The same light, baked as another one, is found out.
+    text = BEACON.replace("* np.cos(azimuth) ** 2", "* 0.5")
+    assert text != BEACON
+    monstrous = replace(LIGHT_KINDS.get("beacon"), fill=_fill_of(text))
+    LIGHT_KINDS._plugins["beacon"] = monstrous
+    bake(lit_by(light), settings=SETTINGS, out=out, force=True)
+    assert not verify(out, VerifySettings(texels=200, spp=64)).passed
+
+
+def _fill_of(text):
+    names = {}
+    exec(text.split("BEACON = ")[0], names)
+    return names["beam"]
+
+
+@pytest.mark.parametrize("estimator", ["light", "bdpt"])
+def test_all_estimators_agree_on_a_tabulated_light(add_kind, estimator):
+    """Light that starts at it, and light that is aimed at."""
+    add_kind("beacon", BEACON)
+    light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
+    view = RenderSettings(camera="0,1.5,3,0,0.2,0,40", width=8, height=6, spp=256)
+    expected, found = (
+        render(lit_by(light), replace(view, estimator=name)).colour.mean(axis=(0, 1))
+        for name in ("mis", estimator)
+    )
+    np.testing.assert_allclose(found, expected, rtol=0.02)
 
 
 def laser():
@@ -139,7 +242,7 @@ def test_an_unknown_kind_is_an_error_also_of_a_light_that_is_off(name):
     with pytest.raises(InputError) as caught:
         REFUSERS[name](laser())
     assert str(caught.value) == (
-        "light 'night': 'laser' is no known kind of light; known are directional, point, spot"
+        "light 'night': there is no kind of light 'laser'; known are directional, point, spot"
     )
     # The same call with a known kind is no error.
     REFUSERS[name](lit_by(shining("point"), shining("spot", 0.0)))
@@ -162,9 +265,7 @@ def test_a_file_with_an_unknown_kind_is_refused(judge, tmp_path):
         work[judge]()
 
 
-@pytest.mark.parametrize(
-    "change", [{"distribution": "a distribution without kernels"}, {"delta": False}], ids=["shape", "area"]
-)
+@pytest.mark.parametrize("change", [{"emission": None}, {"delta": False}], ids=["shape", "area"])
 def test_the_path_tracer_refuses_what_it_has_no_kernels_for(change, monkeypatch):
     odd = replace(kind_of(shining("point")), name="odd", **change)
     monkeypatch.setattr(LIGHT_KINDS, "_plugins", {**LIGHT_KINDS._plugins, "odd": odd})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from baker.core.light_kind import LIGHT_KINDS, kind_of, kinds_by_gltf_type
 from baker.core.scene import PunctualLight
+from baker.io.gltf.json import JsonObject
 
 POSITION, DIRECTION = np.array([0.3, 2.0, -0.4]), np.array([0.48, -0.8, 0.36])
 INNER, OUTER = 0.3, 0.8
@@ -68,23 +70,63 @@ def test_every_kind_has_a_closed_form():
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_a_record_agrees_with_what_its_light_does(name):
-    """Moving, turning or widening a light changes its irradiance exactly if the record has that property."""
+    """Moving, turning or widening a light changes its irradiance if and only if the manifest lists that."""
     kind, light, (origin, normal) = LIGHT_KINDS.get(name), light_of(name), points()
     assert kind.name == name
     assert kinds_by_gltf_type()[kind.gltf_type] is kind
     assert kind.unit == ("cd" if kind.has_position else "lx")
     before = fill(name, origin, normal, light)[1]
     assert before.max() > 0
-    changes = [
-        (kind.has_position, {"position": (-0.7, 1.5, 0.2)}),
-        (kind.has_position, {"range": 2.0}),
-        (kind.has_direction, {"direction": (0.6, -0.8, 0.0)}),
-        (kind.has_cone, {"inner_cone": 0.5}),
-        (kind.has_cone, {"outer_cone": 0.9}),
-    ]
-    for expected, change in changes:
-        after = fill(name, origin, normal, replace(light, **change))[1]
-        assert (after != before).any() == expected, change
+    changes = {
+        "position": (-0.7, 1.5, 0.2),
+        "range": 2.0,
+        "direction": (0.6, -0.8, 0.0),
+        "inner_cone": 0.5,
+        "outer_cone": 0.9,
+    }
+    for changed, value in changes.items():
+        other = replace(light, **{changed: value})
+        described = kind.describe(other)
+        after = fill(name, origin, normal, other)[1]
+        assert (after != before).any() == (changed in described), changed
+        assert described.get(changed, value) == value
+    assert kind.has_position == ("position" in kind.describe(light))
+    assert kind.has_direction == ("direction" in kind.describe(light))
+    assert kind.describe(light).keys() <= set(changes)
+
+
+@pytest.mark.parametrize("name", sorted(TRUTH))
+@pytest.mark.parametrize("range_", [math.inf, 2.5])
+def test_what_is_written_is_read(name, range_):
+    light = replace(light_of(name), range=range_)
+    kind = LIGHT_KINDS.get(name)
+    fields = kind.read(JsonObject(kind.write(light), "lights[0]", "a.gltf"), np.eye(3))
+    default = {"range": math.inf, "inner_cone": 0.0, "outer_cone": math.pi / 4}
+    assert kind.describe(replace(light, **default | dict(fields))) == kind.describe(light)
+
+
+@pytest.mark.parametrize("name", sorted(TRUTH))
+@pytest.mark.parametrize("range_", [math.inf, 2.0])
+def test_the_profile_for_the_path_tracer_is_the_same_light(name, range_):
+    """The equations of `EmissionProfile`, written out, against what the bake's kernel computes."""
+    light = replace(light_of(name), range=range_)
+    origin, normal = points()
+    expected = fill(name, origin, normal, light)[1]
+    profile = kind_of(light).emission(light)
+    if profile.position is None:
+        found = np.maximum(-(normal.astype(float) @ np.array(profile.axis)), 0)
+    else:
+        away = origin.astype(float) - np.array(profile.position)
+        length = np.linalg.norm(away, axis=-1)
+        cosine = (away @ np.array(profile.axis)) / length
+        share = np.ones_like(cosine)
+        if profile.cone_scale is not None:
+            share = np.clip((cosine - profile.min_cosine) * profile.cone_scale, 0, 1) ** 2
+        window = np.maximum(1 - (length**2 * profile.inverse_range) ** 2, 0)
+        found = np.maximum(-(away * normal).sum(axis=-1), 0) / length**3 * share * window
+    assert profile.table is None
+    np.testing.assert_allclose(found, expected, rtol=3e-5, atol=1e-6)
+    assert (expected > 0).sum() > 20
 
 
 @pytest.mark.parametrize("name", ["point", "spot"])

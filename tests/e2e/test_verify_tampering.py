@@ -23,6 +23,7 @@ from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.bake.read_bake import read_bake
 from baker.lights.emissive import build_emitters
 from baker.metrics.texel_area import instance_map, texel_places
+from baker.pathtracer.emitters import find_emitters
 from baker.pipeline.bake import bake
 from baker.verification.settings import VerifySettings
 from baker.verification.verify import verify
@@ -289,17 +290,23 @@ def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene
     assert any("room" in problem for problem in found.problems)
 
 
-def test_an_emitter_that_both_finders_forget_is_missed_all_the_same(tmp_path, monkeypatch):
-    """The reference aims at what the bake's code lists as emitters, but light is what its rays meet."""
-    real = build_emitters
+def forgetful(find):
+    """Return a finder of emitters that overlooks the dim ones."""
 
-    def forgetful(geometry, shading, *rest):
+    def found(geometry, shading, *rest):
         emission = shading.emission.copy()
         emission[emission.max(axis=1) < 1] = 0
-        return real(geometry, shading._replace(emission=emission), *rest)
+        return find(geometry, shading._replace(emission=emission), *rest)
 
-    for place in ("baker.pipeline.prepare", "baker.pathtracer.light_table"):
-        monkeypatch.setattr(f"{place}.build_emitters", forgetful)
+    return found
+
+
+@pytest.mark.parametrize("both", [False, True], ids=["the bake's", "both"])
+def test_an_emitter_that_a_finder_forgets_is_missed(tmp_path, monkeypatch, both):
+    """The path tracer has a finder of its own; and whatever that one lists, its rays meet what emits."""
+    monkeypatch.setattr("baker.pipeline.prepare.build_emitters", forgetful(build_emitters))
+    if both:
+        monkeypatch.setattr("baker.pathtracer.light_table.find_emitters", forgetful(find_emitters))
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
     found = verify(tmp_path / "out", SETTINGS.changed(texels=300, spp=256))
     # Only what rays meet at the lamp itself is left in the dim room of this bake.

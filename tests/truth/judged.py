@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from baker.core.scene import Scene
-from baker.pathtracer.irradiance import irradiance_pass, openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.scene import Reference, build_reference
 
@@ -66,7 +66,7 @@ def opened(scene: Scene, where: Any, distance: float, *, passes: int = 8, sample
     """Return the ambient occlusion of the reference, 1 = open."""
     with build_reference(scene, threads=2) as reference:
         return _passes(
-            openness_pass, reference, where, 1, passes, samples, {"seed": SEED, "distance": distance}
+            ambient_occlusion_pass, reference, where, 1, passes, samples, {"seed": SEED, "distance": distance}
         )
 
 

@@ -12,7 +12,7 @@ from baker.checks.context import CheckContext
 from baker.comparison.compare import compare
 from baker.core.settings import make_settings
 from baker.pathtracer.camera import look_at
-from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.radiance import radiance_pass
 from baker.pathtracer.scene import build_reference
@@ -142,5 +142,5 @@ def test_the_judge_sees_the_same_wall_below_a_sky_of_100_km():
     with build_reference(builder.build(), threads=2) as reference:
         estimate = new_estimate(len(d), 1, 256)
         for _ in range(16):
-            openness_pass(reference, estimate, place, up, up, distance=0.5)
+            ambient_occlusion_pass(reference, estimate, place, up, up, distance=0.5)
     np.testing.assert_allclose(estimate.mean[:, 0], 0.5 * (1 + d / np.hypot(d, h)), atol=0.02)

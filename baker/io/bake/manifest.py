@@ -179,14 +179,7 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
         entry: dict[str, Any] = {"kind": light.kind, "name": light.name, "node": light.node}
         entry["intensity"] = light.intensity
         entry["unit"] = kind.unit
-        if kind.has_position:
-            entry["position"] = light.position
-            if math.isfinite(light.range):
-                entry["range"] = light.range
-        if kind.has_direction:
-            entry["direction"] = light.direction
-        if kind.has_cone:
-            entry |= {"inner_cone": light.inner_cone, "outer_cone": light.outer_cone}
+        entry |= kind.describe(light)
         lights.append(entry)
     used = {int(m) for i in result.scene.instances for m in np.unique(result.scene.meshes[i.mesh].material)}
     for index in sorted(used):

@@ -201,11 +201,7 @@ def _light(light: PunctualLight) -> Json:
         "color": [float(v) / strength for v in light.intensity],
         "intensity": float(strength),
     }
-    if math.isfinite(light.range):
-        result["range"] = light.range
-    if kind.has_cone:
-        result["spot"] = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
-    return result
+    return result | kind.write(light)
 
 
 def _turn_from_minus_z(direction: tuple[float, float, float]) -> list[float]:

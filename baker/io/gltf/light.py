@@ -48,10 +48,7 @@ def read_light(
     colour = light.numbers("color", 3, (1.0, 1.0, 1.0))
     if min(colour) < 0 and not lenient:
         light.fail("a colour is negative", "color")
-    reach = light.number("range") if "range" in light and kind.has_position else math.inf
-    if not reach > 0:
-        light.fail(f"the light's range is {reach:g}; it must be above 0, or left out for no limit", "range")
-    inner, outer = _cone(light) if kind.has_cone else (0.0, math.pi / 4)
+    fields = kind.read(light, node.matrix[:3, :3])
     axis, share = _axis(node)
     if kind.has_direction and not share > _FLATTEST:
         message = (
@@ -69,9 +66,7 @@ def read_light(
         intensity=(colour[0] * strength, colour[1] * strength, colour[2] * strength),
         position=(px, py, pz),
         direction=(x, y, z),
-        inner_cone=inner,
-        outer_cone=outer,
-        range=reach,
+        **fields,
     )
 
 
@@ -86,13 +81,3 @@ def _axis(node: Placed) -> tuple[NDArray[np.float64], float]:
     if not length > _FLATTEST * stretch:
         return np.array([0.0, 0.0, -1.0]), length / max(stretch, _TINY)
     return axis / length, length / stretch
-
-
-def _cone(light: JsonObject) -> tuple[float, float]:
-    spot = light.child_or_empty("spot")
-    # Exporters write pi/2 in single precision, a little over the limit.
-    outer = spot.number("outerConeAngle", math.pi / 4, low=0.0, high=math.pi / 2 + 1e-3)
-    inner = spot.number("innerConeAngle", 0.0, low=0.0)
-    if inner > outer * (1 + 1e-6):
-        spot.fail(f"the inner angle {inner:g} is larger than the outer angle {outer:g}", "innerConeAngle")
-    return min(inner, outer), min(outer, math.pi / 2)

@@ -44,9 +44,9 @@ def test_files_register_themselves(plugins):
 
 
 def test_a_name_is_taken_once():
-    registry = Registry("baker.lights.families")
+    registry = Registry("baker.lights.kinds")
     assert registry.register("mine")(len) is len
-    with pytest.raises(ValueError, match=r"'mine' is registered twice in baker\.lights\.families"):
+    with pytest.raises(ValueError, match=r"'mine' is registered twice in baker\.lights\.kinds"):
         registry.register("mine")(max)
     assert registry.get("mine") is len
 

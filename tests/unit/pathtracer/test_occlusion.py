@@ -9,7 +9,7 @@ import pytest
 from scenes import SceneBuilder
 
 import baker.pathtracer.irradiance as irradiance
-from baker.pathtracer.irradiance import openness_pass
+from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.occlusion import are_dense, near_together
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.scene import build_reference
@@ -68,7 +68,7 @@ def under_cards():
 def opened(reference, position, distance, samples=64):
     estimate = new_estimate(len(position), 1, samples)
     normal = np.broadcast_to(UP, position.shape)
-    openness_pass(reference, estimate, position, normal, normal, distance=distance, seed=3)
+    ambient_occlusion_pass(reference, estimate, position, normal, normal, distance=distance, seed=3)
     return estimate.mean[:, 0]
 
 

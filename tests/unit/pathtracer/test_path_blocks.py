@@ -7,58 +7,84 @@ import pytest
 from inner import compiled
 from scipy import stats
 
-from baker.pathtracer import light_table as lamp_columns
-from baker.pathtracer.light_table import all_alike
+from baker.pathtracer.emitters import (
+    EMITTER_AREA,
+    EMITTER_CHANCE,
+    EMITTER_COLUMNS,
+    EMITTER_NORMAL,
+    EMITTER_RADIANCE,
+    EMITTER_TWO_SIDED,
+)
+from baker.pathtracer.light_table import (
+    CONE,
+    DELTA_AXIS,
+    DELTA_AZIMUTHS,
+    DELTA_CHANCE,
+    DELTA_COLUMNS,
+    DELTA_CONE_SCALE,
+    DELTA_COSINES,
+    DELTA_FORM,
+    DELTA_INTENSITY,
+    DELTA_MIN_COSINE,
+    DELTA_POSITION,
+    DELTA_TANGENT,
+    EVEN,
+    PARALLEL,
+    TABULATED,
+    LightTable,
+    light_rows,
+)
 from baker.pathtracer.path_blocks import (
     ALBEDO,
     ALIVE,
     BETA,
     BLOCK,
+    BLOCK_WIDTH,
     BLOCKS,
     BOUNCES,
     CHOICE,
     COUNT,
     DENSITY,
     KEY,
-    LANES,
+    MAX_DISTANCE,
     N_ROWS,
     NORMAL,
     POINT,
-    REACH,
     ROULETTE,
     SAMPLE,
     SHADED,
     TANGENT,
-    TO_LAMP,
-    U_LAMP,
-    U_WAY,
+    TO_LIGHT,
+    U_DIRECTION,
+    U_LIGHT,
     VALUE,
-    W_LAMP,
-    W_WAY,
+    W_DIRECTION,
+    W_LIGHT,
     close_gaps,
 )
-from baker.pathtracer.paths import choose_lamps, fetch_lanes
+from baker.pathtracer.paths import choose_lights, fetch_lanes
 from baker.pathtracer.rng import random_lanes, seed_salt
 from baker.pathtracer.scene import ROW_LENGTH
 from baker.pathtracer.vertex import BETA as PATH_BETA
 from baker.pathtracer.vertex import N_ROWS as PATH_ROWS
 from baker.pathtracer.vertex import NORMAL as PATH_NORMAL
-from baker.pathtracer.vertex import PLACE, aim, arrive, set_frame
+from baker.pathtracer.vertex import POSITION, aim, arrive, set_frame
 from baker.pathtracer.vertex import SHADED as PATH_SHADED
-from baker.pathtracer.vertex_simd import aim_lanes, arrive_lanes, scatter_lanes
+from baker.pathtracer.vertex_simd import aim_lanes, arrive_lanes, look_up_falloff, scatter_lanes
 from baker.trace.packets import DIR_X, HIT_U, ORG_X, PRIM_ID
 
 ALPHA = 1e-4
 aim, arrive, set_frame = compiled(aim, arrive, set_frame)
 aim_lanes, arrive_lanes, scatter_lanes = compiled(aim_lanes, arrive_lanes, scatter_lanes)
-choose_lamps, fetch_lanes, random_lanes = compiled(choose_lamps, fetch_lanes, random_lanes)
+(look_up_falloff,) = compiled(look_up_falloff)
+choose_lights, fetch_lanes, random_lanes = compiled(choose_lights, fetch_lanes, random_lanes)
 (close_gaps,) = compiled(close_gaps)
 
 
 def blocks(n=BLOCKS):
     """Return the memory of n blocks as numbers, words, and a view (n, rows, 8)."""
     s = np.zeros(n * BLOCK, np.float32)
-    return s, s.view(np.uint32), s.reshape(n, N_ROWS, LANES)
+    return s, s.view(np.uint32), s.reshape(n, N_ROWS, BLOCK_WIDTH)
 
 
 def unit(vector):
@@ -68,16 +94,16 @@ def unit(vector):
 def many_numbers(seed=3, number=0):
     """Return 5 uniform numbers of 64 points, 64 samples and 8 vertices, as paths take them."""
     _, words, rows = blocks(1)
-    bits = words.reshape(N_ROWS, LANES)
+    bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     found = np.zeros((64, 64, 8, 6))
-    for point in range(0, 64, LANES):
+    for point in range(0, 64, BLOCK_WIDTH):
         for sample in range(64):
-            bits[KEY], bits[SAMPLE], bits[COUNT] = np.arange(point, point + LANES), sample, 0
+            bits[KEY], bits[SAMPLE], bits[COUNT] = np.arange(point, point + BLOCK_WIDTH), sample, 0
             for vertex in range(8):
                 random_lanes(words, 0, number, seed_salt(seed))
-                uniform = rows[0, [U_LAMP, W_LAMP, U_WAY, W_WAY, ROULETTE]] - 1.0
-                found[point : point + LANES, sample, vertex, :5] = uniform.T
-                found[point : point + LANES, sample, vertex, 5] = bits[CHOICE] / 2.0**32
+                uniform = rows[0, [U_LIGHT, W_LIGHT, U_DIRECTION, W_DIRECTION, ROULETTE]] - 1.0
+                found[point : point + BLOCK_WIDTH, sample, vertex, :5] = uniform.T
+                found[point : point + BLOCK_WIDTH, sample, vertex, 5] = bits[CHOICE] / 2.0**32
     return found
 
 
@@ -112,14 +138,14 @@ def test_seeds_and_passes_have_numbers_of_their_own():
 def test_directions_follow_the_cosine_whatever_the_normal():
     s, _, rows = blocks(1)
     rng = np.random.default_rng(2)
-    tilt = unit(rng.normal(size=(LANES, 3)))
-    count = np.zeros((LANES, 12, 12))
+    tilt = unit(rng.normal(size=(BLOCK_WIDTH, 3)))
+    count = np.zeros((BLOCK_WIDTH, 12, 12))
     for k in range(4000):
         rows[0, ALIVE], rows[0, BOUNCES] = 1, 0
         rows[0, BETA : BETA + 3] = 0.5
         rows[0, ALBEDO : ALBEDO + 3] = 0.5
         frame(rows, tilt)
-        rows[0, U_WAY], rows[0, W_WAY] = 1 + rng.random((2, LANES))
+        rows[0, U_DIRECTION], rows[0, W_DIRECTION] = 1 + rng.random((2, BLOCK_WIDTH))
         rows[0, ROULETTE] = 1.5
         scatter_lanes(s, 0)
         way = rows[0, DIR_X : DIR_X + 3].T.astype(float)
@@ -131,10 +157,12 @@ def test_directions_follow_the_cosine_whatever_the_normal():
         turn = np.arctan2((way * a).sum(axis=1), (way * b).sum(axis=1)) / (2 * np.pi) % 1
         # The share of the hemisphere above a cosine is its square.
         count[
-            np.arange(LANES), np.minimum(12 * up**2, 11).astype(int), np.minimum(12 * turn, 11).astype(int)
+            np.arange(BLOCK_WIDTH),
+            np.minimum(12 * up**2, 11).astype(int),
+            np.minimum(12 * turn, 11).astype(int),
         ] += 1
         assert k > 0 or rows[0, ALIVE].all()
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         assert even(count[lane])
 
 
@@ -143,67 +171,80 @@ def frame(rows, normal):
     from baker.kernels.sampling import tangent_frame
 
     rows[0, NORMAL : NORMAL + 3] = rows[0, SHADED : SHADED + 3] = normal.T
-    for lane in range(LANES):
+    for lane in range(BLOCK_WIDTH):
         rows[0, TANGENT : TANGENT + 6, lane] = tangent_frame(*normal[lane].astype(np.float32))
 
 
 def test_roulette_is_fair():
     s, _, rows = blocks(1)
-    frame(rows, np.tile([0.0, 0.0, 1.0], (LANES, 1)))
-    left, n = np.zeros(LANES), 4000
+    frame(rows, np.tile([0.0, 0.0, 1.0], (BLOCK_WIDTH, 1)))
+    left, n = np.zeros(BLOCK_WIDTH), 4000
     for k in range(n):
         rows[0, ALIVE], rows[0, BOUNCES] = 1, [0, 2, 3, 9, 3, 3, 3, 3]
         rows[0, BETA : BETA + 3] = np.array([1, 1, 1, 1, 0.5, 0.25, 0.1, 4])
         rows[0, ALBEDO : ALBEDO + 3] = 0.5
-        rows[0, U_WAY], rows[0, W_WAY], rows[0, ROULETTE] = 1.4, 1.7, 1 + (k + 0.5) / n
+        rows[0, U_DIRECTION], rows[0, W_DIRECTION], rows[0, ROULETTE] = 1.4, 1.7, 1 + (k + 0.5) / n
         scatter_lanes(s, 0)
         left += rows[0, ALIVE] * rows[0, BETA]
     assert np.allclose(left / n, [0.5, 0.5, 0.5, 0.5, 0.25, 0.125, 0.05, 2.0], rtol=1e-3)
 
 
 @pytest.fixture(scope="module")
-def some_lamps():
-    """Return triangles (one- and two-sided), a point, a spot, a sun and the sky, equally likely."""
+def some_lights():
+    """Return triangles (one- and two-sided), a light of each form and the sky, equally likely."""
     rng = np.random.default_rng(5)
-    triangle, point = np.zeros((20, 20)), np.zeros((3, 16))
+    triangle, point = np.zeros((20, EMITTER_COLUMNS)), np.zeros((4, DELTA_COLUMNS))
     triangle[:, :9] = (rng.normal(size=(20, 1, 3)) * 3 + rng.normal(size=(20, 3, 3))).reshape(20, 9)
     corner = triangle[:, :9].reshape(20, 3, 3)
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    triangle[:, 9:12], triangle[:, 12] = unit(cross), 0.5 * np.linalg.norm(cross, axis=1)
-    triangle[:, 13], triangle[:, 14] = np.arange(20) % 2, 1 / 24
-    triangle[:, 15:18] = rng.random((20, 3))
-    point[:, lamp_columns.KIND] = [0, 1, 2]
-    point[:, 1:4], point[:, 4:7] = rng.normal(size=(3, 3)), unit(rng.normal(size=(3, 3)))
-    point[:, 7:10] = rng.random((3, 3))
-    point[:, lamp_columns.OUTER], point[:, lamp_columns.SCALE] = 0.2, 1 / 0.5
-    point[:, lamp_columns.POINT_CHANCE] = 1 / 24
-    sky = np.array([0.3, 0.6, 0.9, 1 / 24])
-    return triangle, point, sky, np.arange(1, 25) / 24, all_alike(triangle, point, sky)
+    triangle[:, EMITTER_NORMAL : EMITTER_NORMAL + 3] = unit(cross)
+    triangle[:, EMITTER_AREA] = 0.5 * np.linalg.norm(cross, axis=1)
+    triangle[:, EMITTER_TWO_SIDED], triangle[:, EMITTER_CHANCE] = np.arange(20) % 2, 1 / 25
+    triangle[:, EMITTER_RADIANCE : EMITTER_RADIANCE + 3] = rng.random((20, 3))
+    point[:, DELTA_FORM] = [EVEN, CONE, PARALLEL, TABULATED]
+    point[:, DELTA_POSITION : DELTA_POSITION + 3] = rng.normal(size=(4, 3))
+    point[:, DELTA_AXIS : DELTA_AXIS + 3] = unit(rng.normal(size=(4, 3)))
+    point[:, DELTA_INTENSITY : DELTA_INTENSITY + 3] = rng.random((4, 3))
+    point[:, DELTA_MIN_COSINE], point[:, DELTA_CONE_SCALE] = 0.2, 1 / 0.5
+    point[:, DELTA_CHANCE] = 1 / 25
+    point[3, DELTA_MIN_COSINE] = -0.6
+    point[3, DELTA_TANGENT : DELTA_TANGENT + 3] = unit(
+        np.cross(point[3, DELTA_AXIS : DELTA_AXIS + 3], [0, 1, 0])
+    )
+    point[3, DELTA_COSINES], point[3, DELTA_AZIMUTHS] = 9, 7
+    falloff = (0.5 + rng.random(63)).astype(np.float32)
+    sky = np.array([0.3, 0.6, 0.9, 1 / 25])
+    none = np.zeros(0, np.int32)
+    return LightTable(
+        triangle, point, none, none, none.reshape(0, 4), np.arange(1, 26) / 25, sky,
+        light_rows(triangle, point, sky), falloff, 0,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("mode", "power"), [(0, 0), (1, 0), (2, 0), (2, 1)])
-def test_lamps_are_aimed_at_as_one_at_a_time(some_lamps, mode, power):
-    triangle, point, sky, cumulative, every = some_lamps
+def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
+    sky = some_lights.sky
     s, words, rows = blocks(1)
-    bits = words.reshape(N_ROWS, LANES)
+    bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     rng = np.random.default_rng(7 + mode + power)
     path, row = np.zeros((PATH_ROWS, 16)), np.zeros((5, 16))
     row[4] = -1
-    lamp = np.zeros(LANES, np.int64)
+    light = np.zeros(BLOCK_WIDTH, np.int64)
     lit = set()
     for _ in range(300):
-        normal = unit(rng.normal(size=(LANES, 3))).astype(np.float32)
-        shaded = unit(normal + 0.2 * rng.normal(size=(LANES, 3))).astype(np.float32)
+        normal = unit(rng.normal(size=(BLOCK_WIDTH, 3))).astype(np.float32)
+        shaded = unit(normal + 0.2 * rng.normal(size=(BLOCK_WIDTH, 3))).astype(np.float32)
         frame(rows, shaded)
         rows[0, NORMAL : NORMAL + 3], rows[0, ALIVE] = normal.T, 1
-        rows[0, ORG_X : ORG_X + 3] = 4 * rng.normal(size=(3, LANES))
-        rows[0, BETA : BETA + 3], rows[0, ALBEDO : ALBEDO + 3] = rng.random((2, 3, LANES))
-        rows[0, U_LAMP], rows[0, W_LAMP] = 1 + rng.random((2, LANES))
-        bits[CHOICE] = rng.integers(0, 2**32, LANES, dtype=np.uint32)
-        choose_lamps(s, words, 0, every, cumulative, lamp)
+        rows[0, ORG_X : ORG_X + 3] = 4 * rng.normal(size=(3, BLOCK_WIDTH))
+        rows[0, BETA : BETA + 3], rows[0, ALBEDO : ALBEDO + 3] = rng.random((2, 3, BLOCK_WIDTH))
+        rows[0, U_LIGHT], rows[0, W_LIGHT] = 1 + rng.random((2, BLOCK_WIDTH))
+        bits[CHOICE] = rng.integers(0, 2**32, BLOCK_WIDTH, dtype=np.uint32)
+        choose_lights(s, words, 0, some_lights, light)
+        look_up_falloff(s, 0, some_lights, light)
         aim_lanes(s, 0, mode, power)
-        for lane in range(LANES):
-            path[PLACE : PLACE + 3, lane] = rows[0, ORG_X : ORG_X + 3, lane]
+        for lane in range(BLOCK_WIDTH):
+            path[POSITION : POSITION + 3, lane] = rows[0, ORG_X : ORG_X + 3, lane]
             path[PATH_NORMAL : PATH_NORMAL + 3, lane] = normal[lane]
             path[PATH_BETA : PATH_BETA + 3, lane] = rows[0, BETA : BETA + 3, lane]
             row[:3, lane] = rows[0, ALBEDO : ALBEDO + 3, lane]
@@ -211,18 +252,18 @@ def test_lamps_are_aimed_at_as_one_at_a_time(some_lamps, mode, power):
             path[27, lane] = 1.0
             value, way = np.zeros(3), np.zeros(6)
             numbers = np.array(
-                [bits[CHOICE, lane] / 2.0**32, rows[0, U_LAMP, lane] - 1.0, rows[0, W_LAMP, lane] - 1.0]
+                [bits[CHOICE, lane] / 2.0**32, rows[0, U_LIGHT, lane] - 1.0, rows[0, W_LIGHT, lane] - 1.0]
             )
-            found = aim(path, row, lane, triangle, point, cumulative, sky, mode, power, *numbers, value, way)
-            assert lamp[lane] == int(numbers[0] * 24)
+            found = aim(path, row, lane, some_lights, mode, power, *numbers, value, way)
+            assert light[lane] == int(numbers[0] * 25)
             own = rows[0, VALUE : VALUE + 3, lane]
-            if lamp[lane] == 23:
+            if light[lane] == 24:
                 # The sky's directions come from the square in another way: only what they bring is compared.
-                cosine = rows[0, TO_LAMP : TO_LAMP + 3, lane] @ shaded[lane]
+                cosine = rows[0, TO_LIGHT : TO_LIGHT + 3, lane] @ shaded[lane]
                 if own.max() > 0:
-                    weight = {1: 1.0, 2: 1 / (1 + 24.0 ** (1 + power))}[mode]
+                    weight = {1: 1.0, 2: 1 / (1 + 25.0 ** (1 + power))}[mode]
                     beta = rows[0, BETA : BETA + 3, lane] * rows[0, ALBEDO : ALBEDO + 3, lane]
-                    assert np.allclose(own, beta * sky[:3] * 24 * weight, rtol=1e-4)
+                    assert np.allclose(own, beta * sky[:3] * 25 * weight, rtol=1e-4)
                     assert cosine > 0
                     lit.add("sky")
                 continue
@@ -230,28 +271,29 @@ def test_lamps_are_aimed_at_as_one_at_a_time(some_lamps, mode, power):
                 assert own.max() <= 1e-6
                 continue
             lit.add(found)
-            # float32 loses digits where a lamp is seen at a grazing angle.
+            # float32 loses digits where a light is seen at a grazing angle.
             assert np.allclose(own, value, rtol=2e-3, atol=1e-6)
-            assert np.allclose(rows[0, TO_LAMP : TO_LAMP + 3, lane], way[:3], atol=1e-5)
-            assert np.isclose(rows[0, REACH, lane], way[3], rtol=1e-5)
-    assert len(lit) == {0: 3}.get(mode, 24)
+            assert np.allclose(rows[0, TO_LIGHT : TO_LIGHT + 3, lane], way[:3], atol=1e-5)
+            assert np.isclose(rows[0, MAX_DISTANCE, lane], way[3], rtol=1e-5)
+    assert len(lit) == {0: 4}.get(mode, 25)
 
 
-def test_few_lamps_and_many_are_chosen_alike():
+def test_few_lights_and_many_are_chosen_alike(some_lights):
     s, words, _ = blocks(1)
-    bits = words.reshape(N_ROWS, LANES)
+    bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     rng = np.random.default_rng(3)
-    lamp = np.zeros(LANES, np.int64)
+    light = np.zeros(BLOCK_WIDTH, np.int64)
     for n in (1, 2, 16, 17, 300):
         chance = rng.random(n) * (rng.random(n) < 0.7)
         chance[-1] = 1
         cumulative = np.cumsum(chance) / chance.sum()
         cumulative[-1] = 1.0
         for _ in range(50):
-            bits[CHOICE] = rng.integers(0, 2**32, LANES, dtype=np.uint32)
+            bits[CHOICE] = rng.integers(0, 2**32, BLOCK_WIDTH, dtype=np.uint32)
             choice = bits[CHOICE] / 2.0**32
-            choose_lamps(s, words, 0, np.zeros((n, 20), np.float32), cumulative, lamp)
-            assert (lamp == np.searchsorted(cumulative, choice, side="right")).all()
+            lights = some_lights._replace(row=np.zeros((n, 20), np.float32), cumulative=cumulative)
+            choose_lights(s, words, 0, lights, light)
+            assert (light == np.searchsorted(cumulative, choice, side="right")).all()
 
 
 def test_hits_become_vertices_as_one_at_a_time():
@@ -268,18 +310,18 @@ def test_hits_become_vertices_as_one_at_a_time():
     surface[:, 21], surface[:, 22] = rng.integers(0, 4, n), rng.random(n) < 0.5
     material = rng.random((4, 8)).astype(np.float32)
     s, words, rows = blocks(1)
-    bits = words.reshape(N_ROWS, LANES)
+    bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     path, row = np.zeros((PATH_ROWS, 16)), np.zeros((5, 16))
     black = 0
-    for first in range(0, n, LANES):
-        way = unit(rng.normal(size=(LANES, 3)))
-        u = rng.random(LANES)
-        v = (1 - u) * rng.random(LANES)
+    for first in range(0, n, BLOCK_WIDTH):
+        way = unit(rng.normal(size=(BLOCK_WIDTH, 3)))
+        u = rng.random(BLOCK_WIDTH)
+        v = (1 - u) * rng.random(BLOCK_WIDTH)
         rows[0, DIR_X : DIR_X + 3], rows[0, HIT_U], rows[0, HIT_U + 1] = way.T, u, v
-        bits[PRIM_ID], rows[0, ALIVE] = np.arange(first, first + LANES), 1
+        bits[PRIM_ID], rows[0, ALIVE] = np.arange(first, first + BLOCK_WIDTH), 1
         fetch_lanes(s, words, 0, surface, material)
         arrive_lanes(s, 0, np.float32(0.1))
-        for lane in range(LANES):
+        for lane in range(BLOCK_WIDTH):
             path[3:6, lane] = rows[0, DIR_X : DIR_X + 3, lane]
             barycentric = [float(x) for x in rows[0, HIT_U : HIT_U + 2, lane]]
             alive = arrive(path, row, lane, surface, material, first + lane, *barycentric, 0.1, 1)
@@ -287,7 +329,9 @@ def test_hits_become_vertices_as_one_at_a_time():
             black += not alive
             if alive:
                 assert np.allclose(rows[0, ALBEDO : ALBEDO + 3, lane], row[:3, lane])
-                assert np.allclose(rows[0, ORG_X : ORG_X + 3, lane], path[PLACE : PLACE + 3, lane], atol=1e-6)
+                assert np.allclose(
+                    rows[0, ORG_X : ORG_X + 3, lane], path[POSITION : POSITION + 3, lane], atol=1e-6
+                )
                 for own, one in ((NORMAL, PATH_NORMAL), (SHADED, PATH_SHADED)):
                     assert np.allclose(rows[0, own : own + 3, lane], path[one : one + 3, lane], atol=1e-5)
     assert 20 < black < 200
@@ -299,14 +343,16 @@ def test_gaps_are_closed_and_no_path_is_lost(share):
     s, words, rows = blocks()
     for _ in range(20):
         used = int(rng.integers(1, BLOCKS + 1))
-        alive = rng.random((used, LANES)) < share
+        alive = rng.random((used, BLOCK_WIDTH)) < share
         rows[:] = 0
         rows[:used, ALIVE] = alive
-        rows[:used, POINT] = np.arange(used * LANES).reshape(used, LANES)
-        words.reshape(rows.shape)[:used, SAMPLE] = 7 + np.arange(used * LANES).reshape(used, LANES)
+        rows[:used, POINT] = np.arange(used * BLOCK_WIDTH).reshape(used, BLOCK_WIDTH)
+        words.reshape(rows.shape)[:used, SAMPLE] = 7 + np.arange(used * BLOCK_WIDTH).reshape(
+            used, BLOCK_WIDTH
+        )
         before = rows[:used, POINT][alive]
         left = close_gaps(s, used)
-        assert left == -(-len(before) // LANES)
+        assert left == -(-len(before) // BLOCK_WIDTH)
         flag = rows[:, ALIVE].ravel()
         assert flag[: len(before)].all()
         assert not flag[len(before) :].any()

@@ -7,27 +7,45 @@ Based on: KHR_lights_punctual, "Directional".
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.light_kind import LIGHT_KINDS, Distribution, LightKind
+from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, LightKind
 from baker.core.scene import PunctualLight
 from baker.trace.jit import kernel, larger
 
 
-def directional_light(
+def _read(light: LightJson, world_from_light: NDArray[np.float64]) -> dict[str, Any]:
+    return {}
+
+
+def _write(light: PunctualLight) -> dict[str, Any]:
+    return {}
+
+
+def _describe(light: PunctualLight) -> dict[str, Any]:
+    return {"direction": light.direction}
+
+
+def _fill(
     light: PunctualLight,
     origin: NDArray[np.float32],
     normal: NDArray[np.float32],
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
-    """Fill rays and weights of a directional light (see `FillRays`)."""
-    _parallel(np.array(light.direction, np.float64), normal, ray, weight)
+    _fill_parallel(np.array(light.direction, np.float64), normal, ray, weight)
 
 
 @kernel
-def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
+def _fill_parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
+    """Fill rays and weights (see `FillRays`) of parallel light.
+
+    direction : (3,) float64, unit, where the light goes, world
+    normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
+    """
     for i in range(ray.shape[0]):
         for k in range(ray.shape[1]):
             for a in range(3):
@@ -41,6 +59,10 @@ def _parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
             weight[i, k] = larger(cosine, 0.0)
 
 
+def _emission(light: PunctualLight) -> EmissionProfile:
+    return EmissionProfile(position=None, axis=light.direction)
+
+
 def _power(light: PunctualLight, disc: float) -> float:
     return disc
 
@@ -49,12 +71,16 @@ DIRECTIONAL = LIGHT_KINDS.register("directional")(
     LightKind(
         name="directional",
         unit="lx",
-        delta=True,
-        distribution=Distribution.PARALLEL,
+        has_position=False,
+        has_direction=True,
         gltf_type="directional",
         # The sun at its highest gives 1.2e5 lx.
         plausible_max=2e5,
-        fill=directional_light,
+        read=_read,
+        write=_write,
+        describe=_describe,
+        fill=_fill,
+        emission=_emission,
         power=_power,
     )
 )

@@ -1,0 +1,113 @@
+"""Spot light: a point light inside a cone with glTF's fall-off.
+
+    E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
+        * clamp(1 - (r / range)^4, 0, 1)
+
+Based on: KHR_lights_punctual, "Inner and Outer Cone Angles" and "Range Property".
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, LightKind
+from baker.core.scene import PunctualLight
+from baker.lights.kinds.point import fill_inverse_square, finite_range, read_range
+from baker.trace.jit import kernel, larger, smaller
+
+
+def _read(light: LightJson, world_from_light: NDArray[np.float64]) -> dict[str, Any]:
+    fields: dict[str, Any] = {"range": read_range(light)}
+    spot = light.child_or_empty("spot")
+    # Exporters write pi/2 in single precision, a little over the limit.
+    outer = spot.number("outerConeAngle", math.pi / 4, low=0.0, high=math.pi / 2 + 1e-3)
+    inner = spot.number("innerConeAngle", 0.0, low=0.0)
+    if inner > outer * (1 + 1e-6):
+        spot.fail(f"the inner angle {inner:g} is larger than the outer angle {outer:g}", "innerConeAngle")
+    return fields | {"inner_cone": min(inner, outer), "outer_cone": min(outer, math.pi / 2)}
+
+
+def _write(light: PunctualLight) -> dict[str, Any]:
+    cone = {"innerConeAngle": light.inner_cone, "outerConeAngle": light.outer_cone}
+    return {**finite_range(light), "spot": cone}
+
+
+def _describe(light: PunctualLight) -> dict[str, Any]:
+    return {
+        "position": light.position,
+        **finite_range(light),
+        "direction": light.direction,
+        "inner_cone": light.inner_cone,
+        "outer_cone": light.outer_cone,
+    }
+
+
+def _cone_scale(light: PunctualLight) -> float:
+    """Return 1 / (cos inner - cos outer), at most 1000."""
+    return 1.0 / max(0.001, math.cos(light.inner_cone) - math.cos(light.outer_cone))
+
+
+def _fill(
+    light: PunctualLight,
+    origin: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    ray: NDArray[np.float32],
+    weight: NDArray[np.float32],
+) -> None:
+    position = np.array(light.position, np.float64)
+    fill_inverse_square(position, light.inverse_range, origin, normal, ray, weight)
+    direction = np.array(light.direction, np.float64)
+    _multiply_by_cone(direction, math.cos(light.outer_cone), _cone_scale(light), ray, weight)
+
+
+@kernel
+def _multiply_by_cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
+    """Multiply weights by the cone's fall-off.
+
+    direction : (3,) float64, unit, the cone's axis, world
+    outer, scale : float, cosine of the outer angle and `_cone_scale`
+    ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`; rays are read
+    """
+    for i in range(ray.shape[0]):
+        for k in range(ray.shape[1]):
+            dx, dy, dz = ray[i, k, 0], ray[i, k, 1], ray[i, k, 2]
+            length = math.sqrt(larger(dx * dx + dy * dy + dz * dz, 1.0e-20))
+            cosine = -(dx * direction[0] + dy * direction[1] + dz * direction[2]) / length
+            share = smaller(larger((cosine - outer) * scale, 0.0), 1.0)
+            weight[i, k] *= share * share
+
+
+def _emission(light: PunctualLight) -> EmissionProfile:
+    return EmissionProfile(
+        light.position,
+        light.direction,
+        min_cosine=math.cos(light.outer_cone),
+        cone_scale=_cone_scale(light),
+        inverse_range=light.inverse_range,
+    )
+
+
+def _power(light: PunctualLight, disc: float) -> float:
+    return 2 * math.pi * (1 - math.cos(light.outer_cone))
+
+
+SPOT = LIGHT_KINDS.register("spot")(
+    LightKind(
+        name="spot",
+        unit="cd",
+        has_position=True,
+        has_direction=True,
+        gltf_type="spot",
+        plausible_max=1e7,
+        read=_read,
+        write=_write,
+        describe=_describe,
+        fill=_fill,
+        emission=_emission,
+        power=_power,
+    )
+)
