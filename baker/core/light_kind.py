@@ -181,10 +181,12 @@ def kind_of(light: PunctualLight) -> LightKind:
     Parameters
     ----------
     light : PunctualLight
+        Its `kind` is looked up.
 
     Returns
     -------
     LightKind
+        Registered by the file of that name.
 
     Raises
     ------
@@ -209,6 +211,7 @@ def kinds_by_gltf_type() -> dict[str, LightKind]:
     Returns
     -------
     dict of str to LightKind
+        Kinds with `gltf_type` None are not in it.
     """
     kinds = [LIGHT_KINDS.get(name) for name in LIGHT_KINDS.names()]
     return {kind.gltf_type: kind for kind in kinds if kind is not None and kind.gltf_type is not None}
@@ -220,6 +223,7 @@ def light_positions(scene: Scene) -> NDArray[np.float64]:
     Parameters
     ----------
     scene : Scene
+        All its lights are of known kinds.
 
     Returns
     -------
@@ -236,6 +240,7 @@ def check_light_kinds(scene: Scene) -> None:
     Parameters
     ----------
     scene : Scene
+        Its lights are checked.
 
     Raises
     ------

@@ -16,6 +16,7 @@ def check_brightness(scene: Scene) -> None:
     Parameters
     ----------
     scene : Scene
+        Its lights and materials are checked.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Emissive triangles as one light: a table of who emits how much, in clusters of neighbours.
+"""The bake's emitters: emissive triangles with their power, in clusters of neighbours.
 
-    power = pi * area * mean luminance, or brightness of a texture (twice that if two-sided)
+    power = pi area L (twice that if two-sided)      L: luminance, or mean of RGB of a textured part
 
 Textured triangles are cut into parts (`emissive_texture`), and each part has a row like a triangle. A part
-whose texture is constant, or too fine for the parts that there may be, shines with its exact mean.
+has its exact mean radiance if its texture is constant, or too fine for the largest number of parts.
 
 Based on: see `kernels.emitters`.
 """
@@ -35,23 +35,24 @@ from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# At most so many clusters are weighed for every tile of texels.
+# Largest number of clusters, each of which is weighted for every tile of texels.
 MAX_CLUSTERS = 256
-# Parts that all textured triangles together are cut into, beside what they were.
+# Parts that cutting may add to the textured triangles.
 MOST_PARTS = 32768
-# For clusters the parts of one triangle count as so many triangles at most.
+# The parts of one triangle count as at most this number of triangles when clusters are formed.
 _CROWD = 64.0
-# A part counts as constant below the first variance over squared mean (a thousandth of its radiance). Above
-# the second it shines with its mean, too, if no parts are left to spend: samples of it would be mostly black.
+# A part counts as constant below the first variance over squared mean (standard deviation of a thousandth).
+# Above the second it has its mean radiance, too: no parts were left to cut it, and samples would be mostly
+# black.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Parts at most a texel wide and this share of the scene's diagonal shine with their mean: nothing is so near
-# that the difference could be seen, and their noise would have to be sampled away.
+# Parts at most a texel wide and this share of the scene's diagonal have their mean radiance. From farther
+# away the difference cannot be seen, and the noise of sampling the texture is avoided.
 _SMALL = 1.0 / 128.0
 
 
 @dataclass(frozen=True)
 class _Pieces:
-    """Rows of the table to be: whole triangles, then parts.
+    """Rows of the table before they are ordered: whole triangles, then parts.
 
     triangle (m,) int64; inside (m, 3) float64, see `emissive_texture.Parts`; radiance (m, 3) float64, means;
     brightness (m,) float64, one number for them; textured (m,) bool; node (k, 4), root (T,) int32, see
@@ -73,10 +74,16 @@ def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_
     Parameters
     ----------
     geometry : Geometry
+        The scene's triangles.
     shading : Shading
-        Materials as kernels see them.
+        Their materials.
     most_parts : int
-        Parts that textured triangles may be cut into, beside what they were.
+        Parts that cutting may add to the textured triangles.
+
+    Returns
+    -------
+    Emitters
+        In spatial order, in at most `MAX_CLUSTERS` clusters.
     """
     piece = _find_pieces(geometry, shading, most_parts)
     area = (geometry.area[piece.triangle] * piece.inside[:, 2] ** 2).astype(np.float32)
@@ -86,12 +93,8 @@ def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_
     corner = _corners(geometry, piece)
     order = _spatial_order(corner)
     chosen = order[power[order] > 0]
-    triangle, power, two_sided, corner = (
-        piece.triangle[chosen],
-        power[chosen],
-        two_sided[chosen],
-        corner[chosen],
-    )
+    triangle, power = piece.triangle[chosen], power[chosen]
+    two_sided, corner = two_sided[chosen], corner[chosen]
     first = _cluster_bounds(triangle)
     n_clusters = len(first) - 1
     cluster = np.repeat(np.arange(n_clusters, dtype=np.int32), np.diff(first))
@@ -112,25 +115,20 @@ def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_
     row[:, RADIANCE : RADIANCE + 3] = np.where(textured[:, None], factor, piece.radiance[chosen])
     row[:, TEXTURED] = textured
     row[:, INSIDE : INSIDE + 3] = piece.inside[chosen]
+    node, root = _renumbered(piece, chosen)
+    number, weight = triangle.astype(np.int32), cluster_power.astype(np.float32)
+    return Emitters(row, number, first, centre, radius, weight, axis, spread, node, root)
+
+
+def _renumbered(piece: _Pieces, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the codes of nodes and triangles for rows `chosen`; parts without power count as black."""
     number = np.full(len(piece.triangle) + 1, -1, np.int32)
     number[chosen] = np.arange(len(chosen))
-    # Codes of parts are their rows now; what has no power counts as black.
     node, root = (
         np.where(code >= -1, number[np.maximum(code, -1)], code).astype(np.int32)
         for code in (piece.node, piece.root)
     )
-    return Emitters(
-        row,
-        triangle.astype(np.int32),
-        first,
-        centre,
-        radius,
-        cluster_power.astype(np.float32),
-        axis,
-        spread,
-        node,
-        root,
-    )
+    return node, root
 
 
 def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Pieces:
@@ -152,21 +150,21 @@ def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Piec
         _SMALL * geometry.diagonal / _longest(geometry.position[geometry.triangle[image]]),
         most_parts,
     )
-    plain = candidate[~textured]
-    root[plain] = np.arange(len(plain))
-    # Where alpha is looked up, light and alpha belong to the same point: no part shines with its mean.
+    untextured = candidate[~textured]
+    root[untextured] = np.arange(len(untextured))
+    # With alpha, radiance and alpha must be those of the same point: no part has its mean radiance.
     varied = (parts.spread > _CONSTANT) & (parts.spread <= _SPARSE)
     if len(shading.alpha.slot):
         varied |= shading.alpha.slot[image][parts.owner] >= 0
-    shift = np.int32(len(plain))
+    shift = np.int32(len(untextured))
     node = np.where(parts.node >= 0, parts.node + shift, parts.node).astype(np.int32)
     root[image] = np.where(parts.root >= 0, parts.root + shift, parts.root)
     return _Pieces(
-        np.concatenate([plain, image[parts.owner]]),
+        np.concatenate([untextured, image[parts.owner]]),
         np.concatenate([whole[~textured], parts.inside]),
         np.concatenate([radiance[~textured], parts.mean]),
         np.concatenate([radiance[~textured] @ _LUMINANCE, brightness(parts.mean)]),
-        np.concatenate([np.zeros(len(plain), bool), varied]),
+        np.concatenate([np.zeros(len(untextured), bool), varied]),
         node,
         root,
     )
@@ -193,13 +191,13 @@ def _corners(geometry: Geometry, piece: _Pieces) -> NDArray[np.float32]:
 
 
 def _cluster_bounds(triangle: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return where clusters (C + 1,) begin among emitters in spatial order, and the end of the last."""
+    """Return the first emitter of each cluster, and the end of the last, (C + 1,)."""
     n = len(triangle)
     n_clusters = min(n, MAX_CLUSTERS)
     _, which, count = np.unique(triangle, return_inverse=True, return_counts=True)
     if not n or count.max() == 1:
         return np.linspace(0, n, n_clusters + 1).round().astype(np.int32)
-    # A screen of a thousand parts must not leave other lamps without clusters of their own.
+    # Limit the weight of a screen of a thousand parts, so that other emitters keep clusters of their own.
     weight = np.cumsum(np.minimum(_CROWD / count, 1.0)[which.reshape(-1)])
     bound = np.searchsorted(weight, np.linspace(0, weight[-1], n_clusters + 1)[1:-1])
     return np.unique(np.concatenate([[0], bound, [n]])).astype(np.int32)

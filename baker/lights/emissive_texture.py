@@ -1,7 +1,7 @@
-"""Textured emission: exact means over triangles, and triangles cut until light can be aimed at lit texels.
+"""Textured emission: exact means over triangles, and triangles cut into parts of little variance.
 
-A triangle is cut at the middles of its edges into four, again and again where its texture varies most, for
-its power. What is left is black, constant, or varies so little that a uniform point of it does.
+A triangle is cut at the midpoints of its edges into four parts, repeatedly, where power times variance of the
+texture is largest. Black parts are dropped; uniform points of the others are samples of low variance.
 
     noise = sum share (E[L^2] / E[L]^2 - 1)      over the parts of a triangle, share: of its power
 
@@ -22,32 +22,32 @@ from baker.kernels.textures import TexturePack
 from baker.lights.texture_levels import TextureLevels, fair_limit
 from baker.lights.uv_integral import uv_means
 
-# A triangle whose noise is lower is cut no further.
+# A triangle with less noise is not cut further.
 ENOUGH = 0.05
-# Parts of a triangle this small are cut no further: float32 barycentrics could not tell them apart.
+# Parts of this size are not cut further: float32 barycentrics would not distinguish their parts.
 _SMALLEST = 2.0**-14
-# Parts are cut together whose gain is within this factor of the largest.
+# Parts with at least this share of the largest gain are cut in the same round.
 _TOGETHER = 0.125
-# Texel lines that the edges of all parts may cross together, about a second. What would cross more is
-# averaged over a smaller version of its texture; parts that cross no more than the second number never are.
+# Texel lines that the edges of all parts may cross together, about a second. Parts beyond that are averaged
+# over a smaller version of their texture; parts that cross at most the second number never are.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
-# A round of cutting may always use this share of what is left of them.
+# Share of the remaining texel lines that a round of cutting may always use.
 _ROUND = 0.25
-# Lines that are crossed in one call of the kernel: signals are handled between two.
+# Lines that are crossed in one call of the kernel; signals are handled between calls.
 _CALL = 2.5e5
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What n textured triangles were cut into.
+    """Parts of n textured triangles.
 
     Attributes
     ----------
     owner : (m,) int64
-        Which of the triangles each part belongs to.
+        The triangle of each part.
     inside : (m, 3) float64
-        Barycentrics b1, b2 of the part's corner 0 in its triangle and its size, negative if it is turned: its
-        point (u, v) is (b1 + size u, b2 + size v).
+        Barycentrics b1, b2 of the part's corner 0 in its triangle, and its size, negative if it is turned:
+        its point (u, v) is (b1 + size u, b2 + size v).
     mean : (m, 3) float64
         Mean radiance, cd/m2; black parts are left out.
     spread : (m,) float64
@@ -55,7 +55,7 @@ class Parts:
     node : (k, 4) int32
         Parts of what was cut, see `kernels.emitters.emitter_at`: a part's number, -1 black, -2 - k node k.
     root : (n,) int32
-        What each triangle is, in the same code.
+        Each triangle, in the same code.
     """
 
     owner: NDArray[np.int64]
@@ -67,7 +67,7 @@ class Parts:
 
 
 class EmissiveTextures:
-    """The emission of textured triangles, ready to be averaged over any part of them."""
+    """The emission of textured triangles, which can be averaged over any part of them."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class EmissiveTextures:
     ) -> None:
         """Prepare triangles: texture (n,) in the pack, radiance without it (n, 3), image uv (n, 3, 2)."""
         self.pack, self.factor, self.uv = pack, factor, uv.copy()
-        # Materials alike but for their brightness share one set of sums.
+        # Materials that differ in brightness only share one set of sums.
         scaled = self.factor / np.maximum(self.factor.max(axis=1, keepdims=True), 1e-300)
         key = np.column_stack([texture, scaled])
         kinds, kind = np.unique(key, axis=0, return_inverse=True)
@@ -101,7 +101,7 @@ class EmissiveTextures:
         return cls(shading.pack, shading.emission_texture[material], factor, uv)
 
     def _bring_near(self) -> None:
-        """Move uv by whole repeats to the first ones."""
+        """Shift uv by whole repeats of the texture, so that they are near 0."""
         for k, levels in enumerate(self.levels):
             own = np.flatnonzero(self.kind == k)
             uv = self.uv[own]
@@ -113,7 +113,7 @@ class EmissiveTextures:
     def means(
         self, owner: NDArray[np.int64], inside: NDArray[np.float64], ahead: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean radiance (m, 3) and spread (m,) of parts, see `Parts`; `ahead` may be asked for yet."""
+        """Return mean radiance (m, 3) and spread (m,) of parts, see `Parts`; `ahead` more may follow."""
         corner = self.uv[owner]
         edge = corner[:, 1:] - corner[:, :1]
         first = corner[:, 0] + np.einsum("mk,mka->ma", inside[:, :2], edge)
@@ -147,7 +147,18 @@ class EmissiveTextures:
 
 
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how bright radiance (n, 3) is when parts are chosen: by luminance blue would get few samples."""
+    """Return the mean of R, G and B, by which parts are chosen; by luminance, blue would get few samples.
+
+    Parameters
+    ----------
+    radiance : (n, 3) float64
+        cd/m2.
+
+    Returns
+    -------
+    (n,) float64
+        cd/m2.
+    """
     mean: NDArray[np.float64] = radiance.mean(axis=1)
     return mean
 
@@ -155,15 +166,23 @@ def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
 def cut(
     textures: EmissiveTextures, area: NDArray[np.float64], finest: NDArray[np.float64], most: int
 ) -> Parts:
-    """Cut triangles until aiming at their parts is little noisier than if each were constant.
+    """Cut triangles until sampling their parts has little more variance than if each were constant.
 
     Parameters
     ----------
-    area : (n,) float64, m2
+    textures : EmissiveTextures
+        Of n triangles.
+    area : (n,) float64
+        m2.
     finest : (n,) float64
-        Size from which on parts that are at most a texel wide count as constant.
+        Size, as in `Parts.inside`, below which parts at most a texel wide count as constant.
     most : int
         Parts that cutting may add.
+
+    Returns
+    -------
+    Parts
+        Black parts are left out.
     """
     n = len(area)
     owner = np.arange(n)
@@ -171,7 +190,7 @@ def cut(
     finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
     mean, spread = _means_of_parts(textures, owner, inside, finest, n + 4 * max(most // 3, 0))
     whole = area * brightness(mean)
-    # Half of the parts go where the power is, half to all alike: a dim room has lamps of its own.
+    # Half of the parts are distributed by power, half equally: emitters of dim rooms are cut, too.
     lit = max(int((whole > 0).sum()), 1)
     weight = 0.5 * whole / max(float(whole.sum()), 1e-300) + 0.5 / lit
     child = np.full(n, -1, np.int64)

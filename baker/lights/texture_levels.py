@@ -1,7 +1,7 @@
 """Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
-A smaller texture holds the exact means of its texels' areas and, in its fourth column, the variance that was
-averaged away. Both axes are halved independently: a strip of many repeats keeps its resolution across.
+A smaller texture holds the exact means of the areas of its texels and, in its fourth column, the variance
+inside each texel. The axes are halved independently: a strip of many repeats keeps its resolution across.
 
 Based on: Heckbert, Survey of texture mapping, 1986 (box-filtered levels).
 """
@@ -17,7 +17,7 @@ from baker.kernels.textures import TexturePack
 from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
-# Rows that are averaged together: bounds the memory of what lies between two levels.
+# Rows that are averaged together; this bounds the working memory.
 _STRIP = 256
 
 
@@ -31,7 +31,7 @@ class Level(NamedTuple):
 
 
 class TextureLevels:
-    """One texture of a pack at all resolutions; each is made when it is first asked for."""
+    """One texture of a pack at all resolutions; each is made on first use."""
 
     def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
         """Prepare a texture; weight (3,): factor of each channel in the sum of squares."""
@@ -45,7 +45,7 @@ class TextureLevels:
         self._sizes = [_halvings(w), _halvings(h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
-        """Return the texture halved so many times along u and v; beyond one texel nothing changes."""
+        """Return the texture after `along_u` and `along_v` halvings; beyond one texel nothing changes."""
         key = min(along_u, len(self._sizes[0]) - 1), min(along_v, len(self._sizes[1]) - 1)
         if key not in self._made:
             u, v = key
@@ -60,7 +60,7 @@ class TextureLevels:
     def crossed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the texel lines (n, 2) along u and v that the edges of triangles (n, 3, 2) cross."""
         lines = np.abs(uv - uv[:, [1, 2, 0]]) * self.size
-        # No lines are met outside of a clamped texture.
+        # Outside of a clamped texture there are no lines.
         most = np.where(self.wrap[:2] == _CLAMP, self.size + 2.0, np.inf)
         total: NDArray[np.float64] = np.minimum(lines, most).sum(axis=1)
         return total
@@ -73,18 +73,18 @@ class TextureLevels:
         Parameters
         ----------
         lines : (n, 2) float64
-            What they cross at the finest one, see `crossed`.
+            Texel lines crossed at the finest resolution, see `crossed`.
 
         Returns
         -------
         halved : (n, 2) int64
-            Times that the texture is halved along u and v. A number that is too large even for one texel says
-            that the triangle may be projected along that axis: the texture is constant there.
+            Number of halvings along u and v. More halvings than lead to one texel mean that the triangle may
+            be projected along that axis: the texture is constant there.
         crossed : (n,) float64
-            Texel lines that are crossed then.
+            Texel lines crossed at that resolution.
         """
         halved = np.zeros((len(lines), 2), np.int64)
-        # The share of lines that is left at each level; none of them if the axis is projected away.
+        # Share of the lines at each level; 0 if the axis is projected away.
         left = [np.append(np.array(sizes) / sizes[0], 0.0) for sizes in self._sizes]
         now = lines.copy()
         while len(over := np.flatnonzero(now.sum(axis=1) > most)):
@@ -96,7 +96,7 @@ class TextureLevels:
         return halved, now.sum(axis=1)
 
     def is_constant(self, axis: int, halved: int) -> bool:
-        """Say whether triangles with so many halvings are projected along an axis."""
+        """Return whether triangles are projected along an axis after `halved` halvings."""
         return halved >= len(self._sizes[axis])
 
 
@@ -104,7 +104,7 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
     """Return the largest limit with which wanted amounts (n,), each cut to it, add up to `total` at most."""
     ascending = np.sort(wanted)
     before = np.concatenate([[0.0], np.cumsum(ascending)[:-1]])
-    # If amount k and all larger ones get the same, each gets this.
+    # The equal share of amount k and all larger ones.
     equal = (total - before) / np.arange(len(wanted), 0, -1)
     short = np.flatnonzero(equal < ascending)
     return float(equal[short[0]]) if len(short) else np.inf
@@ -135,7 +135,7 @@ def _halvings(n: int) -> list[int]:
 def _halved(
     image: NDArray[np.float32], axis: int, weight: NDArray[np.float64], has_variance: bool
 ) -> NDArray[np.float32]:
-    """Average texels (h, w, 4) along an axis; those of an odd number are shared out among neighbours."""
+    """Average texels (h, w, 4) along an axis; for odd numbers, texels are divided between neighbours."""
     shape = list(image.shape)
     n = shape[axis]
     shape[axis] = (n + 1) // 2

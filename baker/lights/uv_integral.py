@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 from baker.kernels.textures import wrapped
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Running sums are kept for every so many texels of a row; the rest is added up when it is asked for.
+# Running sums are stored for each 32nd texel of a row; the others are added on demand.
 BLOCK = 32
-# Columns of what is integrated: red, green, blue, sum of their weighted squares.
+# Columns of the integrand: red, green, blue, sum of their weighted squares.
 N_SUMS = 4
 # Triangles with less area than this share of their longest edge's square are integrated along that edge.
 _THIN = 1.0e-9
 # Cells a side of the uv box up to which the variation of a bilinear texture is measured at points.
 _FEW_CELLS = 3.0
-# What cancels to this share of the terms is rounding: the triangle is black.
+# A sum below this share of its terms is rounding: the triangle is black.
 _ROUNDING = 1.0e-12
-# The spread of a triangle that is lit where no measured point lies.
+# The spread of a triangle that is lit only between the measured points.
 _UNSEEN = 15.0
 _four, _prefix, _texel = scratch((4,), np.float64), scratch((4,), np.float64), scratch((4,), np.float64)
 _row_terms = scratch((2, 3, 4), np.float64)
@@ -55,6 +55,8 @@ def fill_row_sums(pixels, offset, weight, block):
     """Fill `block` (see `RowSums`) with the sums of w texels a row from `pixels[offset]` on.
 
     The order of additions is that of `_sum_before`, so black texels change no bit of a sum.
+
+    pixels : (H * W, 4) float32; offset : first texel; weight : (4,) float64
     """
     h, n_blocks = block.shape[0], block.shape[1]
     w = len(pixels) // h
@@ -74,6 +76,7 @@ def fill_row_sums(pixels, offset, weight, block):
 
 @inner
 def _add_texel(pixels, at, weight, sums):
+    """Add texel `at` of pixels (H * W, 4) to sums (4,) float64; weight (4,) float64, see `RowSums`."""
     square = weight[3] * np.float64(pixels[at, 3])
     for c in range(3):
         value = np.float64(pixels[at, c])
@@ -84,7 +87,10 @@ def _add_texel(pixels, at, weight, sums):
 
 @inner
 def _sum_before(pixels, w, weight, block, j, i, out):
-    """Write the sums of texels 0 to i (0 <= i <= w) of row j."""
+    """Write the sums of texels 0 to i (0 <= i <= w) of row j to out (4,) float64.
+
+    pixels : (H * W, 4) float32; weight, block : see `RowSums`
+    """
     b = i // BLOCK
     for c in range(4):
         out[c] = block[j, b, c]
@@ -94,6 +100,7 @@ def _sum_before(pixels, w, weight, block, j, i, out):
 
 @inner
 def _read(pixels, w, weight, j, i, out):
+    """Write texel i of row j of pixels (H * W, 4) to out (4,) float64; weight (4,) float64, see `RowSums`."""
     for c in range(4):
         out[c] = 0.0
     _add_texel(pixels, j * w + i, weight, out)
@@ -101,7 +108,10 @@ def _read(pixels, w, weight, j, i, out):
 
 @inner
 def _running(pixels, w, weight, block, mode, j, i, out, spare):
-    """Write the sums of row j from texel 0 to any whole number i, continued by the wrap mode."""
+    """Write the sums of row j from texel 0 to any integer i, continued by the wrap mode, to out (4,).
+
+    pixels : (H * W, 4) float32; weight, block : see `RowSums`; spare : (4,) float64, working memory
+    """
     if mode == 2:
         inside = smaller(larger(i, 0), w)
         _sum_before(pixels, w, weight, block, j, inside, out)
@@ -124,7 +134,11 @@ def _running(pixels, w, weight, block, mode, j, i, out, spare):
 
 @inner
 def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
-    """Write the filtered texel at lattice coordinates, and the weighted sum of its squares."""
+    """Write the filtered texel at lattice coordinates, and the weighted sum of its squares, to out (4,).
+
+    pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
+    spare : (4,) float64, working memory
+    """
     i, j = np.int64(math.floor(x)), np.int64(math.floor(y))
     if nearest:
         _read(pixels, w, weight, wrapped(j, h, wrap[1]), wrapped(i, w, wrap[0]), out)
@@ -146,7 +160,12 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
 
 @inner
 def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):
-    """Write what F is made of in cell (i, j), of two rows: sums since column `first`, both texels."""
+    """Write the coefficients of F in cell (i, j) to terms (2, 3, 4): of two rows, the sum since column
+    `first` and both texels.
+
+    pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
+    a, b : (4,) float64, working memory
+    """
     for r in range(1 if nearest else 2):
         line = wrapped(j + r, h, wrap[1])
         _running(pixels, w, weight, block, wrap[0], line, i, a, b)
@@ -159,7 +178,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
         for c in range(4):
             terms[r, 1, c] = terms[r, 2, c] = a[c]
         if not nearest:
-            # The integral of lines between texels: half of the first one and of the last one is missing.
+            # Trapezoids between texel centres: subtract half of the first and of the last texel.
             _read(pixels, w, weight, line, wrapped(first, w, wrap[0]), b)
             for c in range(4):
                 terms[r, 0, c] += 0.5 * (a[c] - b[c])
@@ -170,7 +189,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
 
 @inner
 def _primitive(terms, nearest, c, fx, fy):
-    """Return F of one channel at (fx, fy) inside the loaded cell."""
+    """Return F of channel c at (fx, fy) inside the cell of terms (2, 3, 4), see `_load_cell`."""
     upper = terms[0, 0, c] + terms[0, 1, c] * fx
     if nearest:
         return upper
@@ -181,7 +200,7 @@ def _primitive(terms, nearest, c, fx, fy):
 
 @inner
 def _next(at, step, start, low, high):
-    """Return where on an edge (0 to 1) the lattice line `at` is met; 2 if never or outside of low to high."""
+    """Return the parameter at which an edge crosses line `at`; 2 if it does not or not in low to high."""
     if step == 0.0 or (step > 0.0 and at > high) or (step < 0.0 and at < low):
         return 2.0
     return (at - start) / step
@@ -189,17 +208,18 @@ def _next(at, step, start, low, high):
 
 @inner
 def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total, size):
-    """Add an edge to `total` (4,) and the sizes of its terms to `size` (4,).
+    """Add the integral along an edge to `total` (4,) and the magnitudes of its terms to `size` (4,).
 
-    ends : x, y of both ends, and the weights at both ends of the integral of f along the edge; with `along`
-        that one is added, else the integral of F dy
+    pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
+    ends : 6 float, x, y of both ends and the weights of f at both ends
+    along : whether to add the weighted integral of f along the edge; else the integral of F dy
     """
     x0, y0, x1, y1, first_weight, last_weight = ends
     dx, dy = x1 - x0, y1 - y0
     if not along and dy == 0.0:
         return
     terms, a, b = _row_terms(), _prefix(), _texel()
-    # Outside of a clamped texture nothing changes: no line is met there.
+    # Outside of a clamped texture there are no lines.
     low_x, high_x = (-1.0, w + 1.0) if wrap[0] == 2 else (-1.0e30, 1.0e30)
     low_y, high_y = (-1.0, h + 1.0) if wrap[1] == 2 else (-1.0e30, 1.0e30)
     line_x = math.floor(x0) + 1.0 if dx > 0.0 else math.ceil(x0) - 1.0
@@ -220,7 +240,7 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
         if along:
             for k in range(3):
                 s = t if k == 0 else (middle if k == 1 else end)
-                # At the ends of a piece a texel's own border decides: look just inside.
+                # Evaluate just inside the piece: at its ends two texels meet.
                 inside = middle + (s - middle) * (1.0 - 1.0e-9)
                 _value(pixels, w, h, weight, wrap, nearest, x0 + inside * dx, y0 + inside * dy, a, b)
                 share = (4.0 if k == 1 else 1.0) / 6.0 * (end - t)
@@ -243,7 +263,10 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
 
 @inner
 def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):
-    """Return E[f^2] / E[f]^2 - 1 from the centroids of sixteen equal parts of a triangle."""
+    """Return E[f^2] / E[f]^2 - 1 from the centroids of sixteen equal parts of a triangle, corner (3, 2).
+
+    pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
+    """
     a, b, mean = _prefix(), _texel(), _four()
     for part in range(16):
         i, j = 0, part
@@ -299,7 +322,7 @@ def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
             _value(pixels, w, h, weight, wrap, nearest, corner[0, 0], corner[0, 1], total, size)
             area = 1.0
         elif thin:
-            # The triangle lies on a line: its density along the longest edge is a tent over the third corner.
+            # Integrate a degenerate triangle along its longest edge; its density is a tent over corner `top`.
             p, q = (top + 1) % 3, (top + 2) % 3
             way_x, way_y = corner[q, 0] - corner[p, 0], corner[q, 1] - corner[p, 1]
             at = (corner[top, 0] - corner[p, 0]) * way_x + (corner[top, 1] - corner[p, 1]) * way_y

@@ -27,6 +27,7 @@ def read_range(light: LightJson) -> float:
     Parameters
     ----------
     light : LightJson
+        The light in the file.
 
     Returns
     -------
@@ -50,10 +51,12 @@ def finite_range(light: PunctualLight) -> dict[str, float]:
     Parameters
     ----------
     light : PunctualLight
+        A light with a position.
 
     Returns
     -------
     dict of str to float
+        "range", or empty.
     """
     return {"range": light.range} if math.isfinite(light.range) else {}
 
