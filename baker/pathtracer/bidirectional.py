@@ -227,23 +227,23 @@ def show(path, row, lane, camera, n_subpaths, value, ray):
 @kernel
 def trace_both_ways(
     where, toward, normal, begin, camera, n_subpaths, surfaces, lights, shading, sphere, buffers,
-    sobol_points, how, out, splat_pixel, splat,
+    sobol_points, settings, out, splat_pixel, splat,
 ):  # fmt: skip
-    """Do what `trace_paths` does, with paths from both ends.
+    """Add the light of all paths to the sums of m points, with subpaths from both ends; see `trace_paths`.
 
-    where, toward, normal, begin, surfaces, lights, shading, sobol_points, how, out : see `trace_paths`
+    where, toward, normal, begin, surfaces, lights, shading, sobol_points, settings, out : see `trace_paths`
     buffers : `PacketBuffers`
     camera : (15,) float64, see `bidirectional_weights`
-    n_subpaths : float, lights' subpaths that can be seen by one pixel for each of the pixel's own samples,
-        which is the number of pixels; 0 if paths begin at surfaces
+    n_subpaths : float, light subpaths that one pixel can see for each of its own samples: the number of
+        pixels; 0 if paths start at surfaces
     sphere : (4,) float64, `Reference.sphere`
-    splat_pixel : (q,) int64 and splat : (q, 3) float64 output, sums as in `out` for pixels anywhere; q at
-        min_offset_scale m n (`MAX_LIGHT_VERTICES` - 1) with a camera
+    splat_pixel : (q,) int64, splat : (q, 3) float64, outputs, light for pixels anywhere, in the units of
+        `out`; q at least m n (`MAX_LIGHT_VERTICES` - 1) with a camera
 
     Returns
     -------
     tuple of int
-        Closest-hit rays, shadow rays, splats.
+        Numbers of closest-hit rays, shadow rays and splats.
     """
     width, scene, intersect, occluded = buffers.width, buffers.scene, buffers.intersect, buffers.occluded
     valid, floats, words = buffers.valid, buffers.floats, buffers.words
@@ -253,28 +253,31 @@ def trace_both_ways(
         surfaces.min_offset_scale,
         surfaces.lambertian,
     )
-    sizes = (min_offset_scale, surfaces.most)
+    sizes = (min_offset_scale, surfaces.default_size)
     emitter, triangle = lights.emitter, lights.triangle
     alpha = len(shading.alpha.slot) > 0
-    strata, most_bounces, seed, number_of_pass = how[2], how[4], how[5], how[6]
-    # A path may have so many bounces that a light's subpath must end before.
+    strata, max_bounces = settings.strata, settings.max_bounces
+    seed, number_of_pass = settings.seed, settings.number_of_pass
+    # With a limit of bounces, light subpaths are shorter.
     most_kept = MAX_LIGHT_VERTICES
-    if most_bounces >= 0:
-        most_kept = min(MAX_LIGHT_VERTICES, most_bounces + (2 if n_subpaths > 0.0 else 1))
+    if max_bounces >= 0:
+        most_kept = min(MAX_LIGHT_VERTICES, max_bounces + (2 if n_subpaths > 0.0 else 1))
     lit = lights.cumulative[len(lights.cumulative) - 1] > 0.0
     path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
-    # Vertices of the lane's subpath from a light, the light among them.
+    # Vertices of the lane's light subpath, the one on the light among them.
     count = _new_numbers()
-    # Its brightest colour at the start, and 1 / range^2 of its light.
+    # Whether the lane traces an eye subpath; largest throughput at the start of its light subpath; 1 /
+    # range^2.
     eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
     value, spare, ray, rgba, spot = _new_value(), _new_value(), _new_ray(), _new_rgba(), _new_spot()
     values, state = _new_values(), _new_state()
     pixel, stage, job = _new_numbers(), _new_numbers(), _new_numbers()
     for lane in range(MAX_WIDTH):
         job[lane] = -1
-    samples, m, places = len(sobol_points), where.shape[0], where.shape[1]
+    samples, m, n_positions = len(sobol_points), where.shape[0], where.shape[1]
     following = rays = shadows = splats = 0
     while True:
+        # Start subpaths in idle lanes, and set the rays of all lanes that need one
         any_ray = any_path = False
         for lane in range(width):
             if stage[lane] == _IDLE and following < m * samples:
@@ -303,7 +306,7 @@ def trace_both_ways(
                         eye[lane] = False
                         stage[lane] = _RAY
                 if eye[lane]:
-                    k = (number_of_pass * samples + s) % places
+                    k = (number_of_pass * samples + s) % n_positions
                     start_at_eye(
                         path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
                     )
@@ -321,6 +324,7 @@ def trace_both_ways(
                 rays += 1
         if not any_path:
             break
+        # Trace the rays
         if any_ray:
             trace(intersect, scene, valid, floats)
             trace_transmittance_packet(buffers.blend, occluded, width, valid, floats, True)
@@ -328,6 +332,7 @@ def trace_both_ways(
                 if stage[lane] == _RAY:
                     for c in range(3):
                         path[BETA + c, lane] *= transmittance(buffers.blend, c, lane)
+        # Make vertices of hits: add emission to eye subpaths, store vertices of light subpaths
         for lane in range(width):
             if stage[lane] != _RAY:
                 continue
@@ -364,7 +369,7 @@ def trace_both_ways(
                     path[COLLECTED + c, lane] += value[c]
             if eye[lane]:
                 path[BOUNCES, lane] += 1.0
-                alive = alive and not (most_bounces >= 0 and path[BOUNCES, lane] > most_bounces)
+                alive = alive and not (max_bounces >= 0 and path[BOUNCES, lane] > max_bounces)
             elif alive:
                 k = count[lane] * MAX_WIDTH + lane
                 count[lane] += 1
@@ -373,7 +378,7 @@ def trace_both_ways(
                 for r in range(N_PARAMETERS):
                     kept_row[r, k] = row[r, lane]
             stage[lane] = _VERTEX if alive else _IDLE
-        # Connection 0 aims at a light or, from a light's side, at the camera; the others take kept vertices.
+        # Cast connections: 0 to a light or, from a light subpath, to the camera; others to stored vertices
         step = 0
         while step < MAX_LIGHT_VERTICES:
             any_shadow = more = False
@@ -401,7 +406,7 @@ def trace_both_ways(
                         found = light >= 0
                 elif step < count[lane]:
                     more = more or step + 1 < count[lane]
-                    if most_bounces < 0 or step + path[BOUNCES, lane] <= most_bounces:
+                    if max_bounces < 0 or step + path[BOUNCES, lane] <= max_bounces:
                         k = step * MAX_WIDTH + lane
                         found = connect(path, row, lane, kept, kept_row, k, step + 1, value, spare, ray)
                 if found:
@@ -433,6 +438,8 @@ def trace_both_ways(
             if not more:
                 break
             step += 1
+        # Sample the next directions, with Russian roulette; finish eye subpaths, and begin them after light
+        # subpaths
         for lane in range(width):
             alive = stage[lane] == _VERTEX
             if alive and not eye[lane]:
@@ -461,7 +468,7 @@ def trace_both_ways(
                 stage[lane] = _IDLE
             else:
                 i, s = job[lane] % m, job[lane] // m
-                k = (number_of_pass * samples + s) % places
+                k = (number_of_pass * samples + s) % n_positions
                 start_at_eye(
                     path, row, lane, where[i, k], toward[i, k], normal[i, k], camera, n_subpaths, sizes
                 )

@@ -56,15 +56,15 @@ from baker.pathtracer.light_table import (
 )
 from baker.pathtracer.scene import EMISSION, FACE
 from baker.pathtracer.scene import TWO_SIDED as SURFACE_TWO_SIDED
-from baker.pathtracer.vertex import BETA, DENSITY, GO, NORMAL, POSITION, place_off, size_of
+from baker.pathtracer.vertex import BETA, DENSITY, GO, NORMAL, POSITION, offset_origin, size_of
 from baker.trace.jit import inner
 
 _INV_4_PI = 0.25 / math.pi
 
 
 @inner
-def turned(nx, ny, nz, a, b, c):
-    """Return direction (a, b, c) of the frame around the unit normal n, in world space."""
+def to_world(nx, ny, nz, a, b, c):
+    """Return in world space the direction (a, b, c) of the frame around the unit normal n."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     return a * tx + b * bx + c * nx, a * ty + b * by + c * ny, a * tz + b * bz + c * nz
 
@@ -82,9 +82,11 @@ def start_density(delta, e):
 
 @inner
 def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a, b, spot):
-    """Begin a path at a light, ready for its first ray; choice, u, w, a, b : uniform numbers.
+    """Start a path at a light: write its position, direction, throughput and densities.
 
-    spot : (2,) output, for a triangle the barycentrics of the start (its texture is not looked up yet)
+    path : (N_ROWS_BOTH, n) float64; lights : `LightTable`; sphere : (4,) float64, `Reference.sphere`
+    choice, u, w, a, b : uniform numbers
+    spot : (2,) float64, output, barycentrics of the start on an emitter; the caller applies its texture
 
     Returns
     -------
@@ -114,7 +116,7 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         spot[0], spot[1] = b1, b2
         b0 = 1.0 - b1 - b2
         path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane] = nx, ny, nz
-        place_off(
+        offset_origin(
             path, lane,
             b0 * emitter[light, 0] + b1 * emitter[light, 3] + b2 * emitter[light, 6],
             b0 * emitter[light, 1] + b1 * emitter[light, 4] + b2 * emitter[light, 7],
@@ -123,10 +125,10 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         )  # fmt: skip
         dx, dy, dz = cosine_sample(a, b)
         cosine = dz
-        dx, dy, dz = turned(nx, ny, nz, dx, dy, dz)
+        dx, dy, dz = to_world(nx, ny, nz, dx, dy, dz)
         path[DENSITY, lane] = max(cosine, 1.0e-12) * INV_PI / sides
         path[LEAVE, lane] = cosine
-        # Met by chance instead: the cosine at the light turns directions into area.
+        # Density of finding this point by chance; the cosine at the light converts it to one per area.
         path[CHAIN, lane] = 1.0 / density
         scale = math.pi * sides / density
         red, green, blue = (
@@ -154,7 +156,7 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
             cosine = 1.0 - u * (1.0 - min_cosine)
             r = math.sqrt(max(1.0 - cosine * cosine, 0.0))
             phi = 2.0 * math.pi * w
-            dx, dy, dz = turned(
+            dx, dy, dz = to_world(
                 delta[e, DELTA_AXIS], delta[e, DELTA_AXIS + 1], delta[e, DELTA_AXIS + 2],
                 r * math.cos(phi), r * math.sin(phi), cosine,
             )  # fmt: skip
@@ -189,9 +191,10 @@ def range_of_light(lights, light):
 
 @inner
 def fade(path, lane, distance, inverse_range):
-    """Fade light that has gone `distance` metres from a point light of a range; return if any is left.
+    """Multiply throughput by the range window at the first hit of a light subpath; return if any is left.
 
-    The light's own share is not known before its first hit; its densities do not depend on it.
+    path : (N_ROWS_BOTH, n) float64; distance : metres from the light
+    The window does not affect densities.
     """
     share = range_window(distance * distance, inverse_range)
     for c in range(3):
@@ -201,11 +204,14 @@ def fade(path, lane, distance, inverse_range):
 
 @inner
 def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
-    """Put the start of parallel light of direction d on a disc in front of everything."""
+    """Start parallel light of direction d on a disc in front of the scene.
+
+    path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`
+    """
     radius = sphere[3]
     r = radius * math.sqrt(u)
     phi = 2.0 * math.pi * w
-    x, y, z = turned(dx, dy, dz, r * math.cos(phi), r * math.sin(phi), -radius)
+    x, y, z = to_world(dx, dy, dz, r * math.cos(phi), r * math.sin(phi), -radius)
     path[POSITION, lane], path[POSITION + 1, lane], path[POSITION + 2, lane] = (
         sphere[0] + x,
         sphere[1] + y,
@@ -217,9 +223,11 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
 
 @inner
 def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
-    """Aim at one light from an eye subpath's end; see `vertex.aim`, whose arguments and answer these are.
+    """Aim at one light from the end of an eye subpath; see `vertex.aim`. The weight is that of all
+    techniques.
 
-    The light is weighed against all other ways to make the same path.
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; sphere : (4,) float64, `Reference.sphere`
+    value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -236,7 +244,7 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
         dx, dy, dz = dx / length, dy / length, dz / length
         max_distance = length * SHORT
         scale = 1.0 / density
-        # Density per area (but for the cosine here) with which light that starts there arrives here.
+        # Density per area, without the cosine here, of this vertex if sampled from the light.
         onward = emitter_cosine(emitter, light, dx, dy, dz) * emission_density(emitter, light) / square
         red, green, blue = (
             emitter[light, EMITTER_RADIANCE],
@@ -257,7 +265,7 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
         )
     else:
         a, b, c = cosine_sample(u, w)
-        dx, dy, dz = turned(path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane], a, b, c)
+        dx, dy, dz = to_world(path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane], a, b, c)
         density = sky[SKY_CHANCE] * c * INV_PI
         scale = 1.0 / density if density > 0.0 else 0.0
         onward = 0.25 / max(c, 1.0e-12) * far
@@ -280,7 +288,10 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
 
 @inner
 def emitter_cosine(emitter, e, dx, dy, dz):
-    """Return the cosine at emitter e of a ray of unit direction d; below 0 if it meets the dark side."""
+    """Return the cosine at emitter e of a ray of unit direction d; below 0 at the dark side.
+
+    emitter : (E, 24) float64, see `emitters`
+    """
     cosine = -(
         dx * emitter[e, EMITTER_NORMAL]
         + dy * emitter[e, EMITTER_NORMAL + 1]
@@ -291,18 +302,22 @@ def emitter_cosine(emitter, e, dx, dy, dz):
 
 @inner
 def emission_density(emitter, e):
-    """Return the density per steradian and cosine of directions that start on emitter e."""
+    """Return the density per projected solid angle of directions from emitter e.
+
+    emitter : (E, 24) float64, see `emitters`
+    """
     return INV_PI * (0.5 if emitter[e, EMITTER_TWO_SIDED] > 0.0 else 1.0)
 
 
 @inner
 def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
-    """Write to `value` (3,) what triangle prim, met by the eye's subpath, sends along the path, weighed.
+    """Write to `value` (3,) the light of triangle prim, hit by the eye subpath, with its MIS weight.
 
-    Its texture is not looked up yet.
+    The caller multiplies by the texture.
 
-    e : emitter that it is there, -1 if no light's subpath starts there
-    seen : whether the path comes straight from a camera: nothing else makes such a path
+    path : (N_ROWS_BOTH, n) float64; surface : (T, 32) float32; emitter : (E, 24) float64
+    e : the emitter that was hit, -1 if no light subpath starts there
+    seen : whether the path comes straight from a camera; no other technique makes such paths
     """
     value[0] = value[1] = value[2] = 0.0
     cosine = -(
@@ -325,7 +340,11 @@ def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
 
 @inner
 def meet_sky(path, lane, sky, sphere, seen, value):
-    """Do the same for the sky, where the path leaves the scene."""
+    """Write to `value` (3,) the light of the sky for an eye subpath that leaves the scene, with its MIS
+    weight.
+
+    path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`; value : (3,) float64, output
+    """
     weight = 1.0
     if not seen and sky[SKY_CHANCE] > 0.0:
         far = 1.0 / (math.pi * sphere[3] * sphere[3])

@@ -1,7 +1,7 @@
 """Passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
 
-Splats land anywhere in a picture. Each tile lists its own; the lists are added up tile after tile, so the
-sums do not depend on threads, and block by block, so that not many are in memory at a time.
+A splat may be in any pixel. Each tile returns a list of its splats; the lists are added in the order of
+tiles, so that sums do not depend on threads, and block by block, which bounds the memory.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from baker.core.stage import Stage
 from baker.pathtracer.bidirectional import trace_both_ways
 from baker.pathtracer.bidirectional_weights import CAMERA_COLUMNS, MAX_LIGHT_VERTICES
 from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.estimators import PathSettings
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
 from baker.trace.packets import new_packet_buffers
@@ -29,17 +30,20 @@ _BLOCK = 64 * _TILE
 
 def surface_tile(
     reference: Reference,
-    places: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    points: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     begin: int,
     sobol_points: NDArray[np.uint32],
-    setting: NDArray[np.int64],
+    settings: PathSettings,
     out: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Add E / pi of points to `out` (m, 3), see `irradiance_pass`; return closest-hit and shadow rays."""
+    """Add E / pi of points to `out` (m, 3); return the numbers of closest-hit and shadow rays.
+
+    points : position, normal and face normal, see `irradiance_pass`
+    """
     rays, shadows, _ = trace_both_ways(
-        *places, begin, np.zeros(CAMERA_COLUMNS), 0.0, reference.surfaces, reference.lights,
+        *points, begin, np.zeros(CAMERA_COLUMNS), 0.0, reference.surfaces, reference.lights,
         reference.shading, reference.sphere, new_packet_buffers(reference.rays.tracer), sobol_points,
-        setting, out,
+        settings, out,
         np.zeros(0, np.int64), np.zeros((0, 3)),
     )  # fmt: skip
     return int(rays), int(shadows)
@@ -49,14 +53,13 @@ def picture_pass(
     reference: Reference,
     estimate: PointEstimate,
     camera: Camera,
-    width: int,
-    height: int,
+    size: tuple[int, int],
     sobol_points: NDArray[np.uint32],
-    setting: NDArray[np.int64],
-    seed: int,
+    settings: PathSettings,
     progress: Progress,
 ) -> None:
-    """Add one pass of radiance through every pixel; see `radiance_pass`."""
+    """Add one pass of radiance through every pixel; size : width, height in pixels; see `radiance_pass`."""
+    width, height = size
     n, samples, number = width * height, estimate.samples, estimate.rounds
     eye = reference.local(camera.position)
     lens = np.array(
@@ -77,7 +80,7 @@ def picture_pass(
 
         def work(begin: int, end: int, block: int = block, found: list[Any] = found) -> None:
             pixel = np.arange(block + begin, block + end)
-            direction = camera_rays(camera, width, height, pixel, samples, seed, number)
+            direction = camera_rays(camera, width, height, pixel, samples, settings.seed, number)
             origin = np.broadcast_to(eye, direction.shape).copy()
             most = len(pixel) * samples * (MAX_LIGHT_VERTICES - 1)
             splat_pixel, splat = np.zeros(most, np.int64), np.zeros((most, 3))
@@ -85,16 +88,18 @@ def picture_pass(
             cast, shadows, splats = trace_both_ways(
                 origin, direction, direction, block + begin, lens, float(n), reference.surfaces,
                 reference.lights, reference.shading, reference.sphere,
-                new_packet_buffers(reference.rays.tracer), sobol_points, setting,
+                new_packet_buffers(reference.rays.tracer), sobol_points, settings,
                 seen[span], splat_pixel, splat,
             )  # fmt: skip
             found[begin // _TILE] = (splat_pixel[:splats].copy(), splat[:splats].copy(), cast, shadows)
 
-        def told(stage: str, fraction: float, detail: str = "", block: int = block, span: int = span) -> Any:
+        def report(
+            stage: str, fraction: float, detail: str = "", block: int = block, span: int = span
+        ) -> Any:
             return progress(stage, (block + fraction * span) / n, detail)
 
-        run_tiles(span, _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=told)
-        # The order of tiles, not that of threads.
+        run_tiles(span, _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=report)
+        # Add splats in the order of tiles.
         for splat_pixel, splat, cast, shadows in found:
             for c in range(3):
                 splatted[:, c] += np.bincount(splat_pixel, splat[:, c], n)

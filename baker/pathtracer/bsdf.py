@@ -7,7 +7,7 @@
     F = F0 + (1 - F0)(1 - v.h)^5
 
 Directions are in the frame of the shading normal (+z). The lobe D V is sampled by its visible normals, the
-diffuse one by the cosine. Below `SMOOTH` the specular lobe is a mirror: it is sampled, never evaluated.
+diffuse one by the cosine. Below `SMOOTH` the specular lobe is a mirror, which is sampled and never evaluated.
 
 Based on: Khronos Group, glTF 2.0 Specification, appendix B; Heitz, Sampling the GGX distribution of
 visible normals, 2018; Heitz, Understanding the masking-shadowing function, 2014; Schlick, 1994.
@@ -81,7 +81,10 @@ def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
 
 @inner
 def bsdf_cosines(row, lane, nv, nl, vl, out):
-    """Do the same from the cosines n.v, n.l and v.l, which are all that an isotropic surface asks for."""
+    """Write f n.l to out (3,) and return the density, as `bsdf_eval`, from the cosines n.v, n.l and v.l.
+
+    row : (5, n) float64, parameters
+    """
     out[0] = out[1] = out[2] = 0.0
     if nv <= 0.0 or nl <= 0.0:
         return 0.0
@@ -112,7 +115,7 @@ def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):
 
 @inner
 def cosines_pdf(row, lane, nv, nl, vl):
-    """Return the same density from the cosines n.v, n.l and v.l."""
+    """Return the density of `bsdf_pdf` from the cosines n.v, n.l and v.l; row : (5, n) float64."""
     if nv <= 0.0 or nl <= 0.0:
         return 0.0
     a = row[WIDTH, lane]
@@ -163,6 +166,7 @@ def cosine_sample(u, w):
 def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):
     """Sample a direction; write f n.l / density (RGB) to `weight` (3,).
 
+    row : (5, n) float64, parameters
     choice, u, w : uniform numbers
 
     Returns

@@ -1,4 +1,4 @@
-"""A pinhole camera: its rays, and how one is described on a command line."""
+"""A pinhole camera: rays through its pixels, and its description on a command line."""
 
 from __future__ import annotations
 
@@ -15,12 +15,22 @@ from baker.trace.jit import inner, kernel
 
 
 def parse_camera(text: str) -> Camera:
-    """Return the camera of "PX,PY,PZ,TX,TY,TZ,FOV": position, target, vertical field of view in degrees.
+    """Return the camera of a description.
+
+    Parameters
+    ----------
+    text : str
+        "PX,PY,PZ,TX,TY,TZ,FOV": position, target, vertical field of view in degrees.
+
+    Returns
+    -------
+    Camera
+        With +Y up.
 
     Raises
     ------
     SettingsError
-        If that is not what the text says, or it looks nowhere.
+        If the text is not of this form, or position and target are equal.
     """
     try:
         px, py, pz, tx, ty, tz, fov = (float(part) for part in text.split(","))
@@ -40,7 +50,7 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     Raises
     ------
     SettingsError
-        If target and position are one, or too far apart.
+        If target and position are equal, or too far apart.
     """
     length = math.dist(target, position)
     if not length > 0:
@@ -48,7 +58,7 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     if not math.isfinite(length):
         raise SettingsError("position and target are too far apart", object="camera")
     forward = np.subtract(target, position) / length
-    # Straight up or down +Y says nothing about what is up in the picture: -Z is.
+    # For a view along +Y or -Y, -Z is up in the picture.
     hint = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.99999 else np.array([0.0, 0.0, -1.0])
     right = np.cross(forward, hint)
     right /= np.linalg.norm(right)
@@ -60,16 +70,29 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
 def camera_rays(
     camera: Camera, width: int, height: int, pixel: NDArray[np.int64], samples: int, seed: int, number: int
 ) -> NDArray[np.float64]:
-    """Return unit directions (n, samples, 3) through pixels, spread evenly over each pixel's square.
+    """Return unit directions through pixels, evenly distributed over each pixel's square.
 
     Parameters
     ----------
+    camera : Camera
+        Its position is not used.
+    width : int
+        Pixels.
+    height : int
+        Pixels.
     pixel : (n,) int64
         row * width + column, row 0 on top.
     samples : int
         Directions of each pixel in this pass: a lattice, shifted at random for each pixel and pass.
+    seed : int
+        Of the shifts.
     number : int
         The pass.
+
+    Returns
+    -------
+    (n, samples, 3) float64
+        Unit, world.
     """
     lens = np.array([*camera.right, *camera.up, *camera.forward, math.tan(0.5 * camera.fov)])
     direction = np.zeros((len(pixel), samples, 3))
@@ -81,7 +104,8 @@ def camera_rays(
 def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore[no-untyped-def]
     """Write unit directions to `direction` (n, samples, 3).
 
-    lens : (10,) float64: right, up, forward, tangent of half the height; first, second : uint64 salts
+    lens : (10,) float64, right, up, forward, tangent of half the vertical field of view
+    pixel : (n,) int64; first, second : uint64, salts
     """
     high = lens[9]
     for i in range(len(pixel)):
@@ -103,7 +127,7 @@ def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore
 
 
 def _salt(seed: int, number: int) -> np.uint64:
-    """Return what makes the numbers of a seed and pass differ from all others."""
+    """Return a salt for the random numbers of a seed and pass."""
     word = (seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF
     # An array: arithmetic on single numbers warns of overflow.
     return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)

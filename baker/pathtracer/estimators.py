@@ -1,8 +1,8 @@
-"""The ways to sample the rendering equation, by name, and what each switches on in a path.
+"""Ways to sample the rendering equation, by name, and the options of a path that each sets.
 
 `uniform`, `cosine`, `stratified` and `bsdf` find lights by chance; `light` aims at them from every vertex;
-`mis` does both and weighs them; `bdpt` connects paths from the eye to paths from lights. Lights without area
-can only be aimed at, or started from, whatever the name.
+`mis` does both and weights them; `bdpt` connects paths from the eye with paths from lights. Lights without
+area are only aimed at or started from, with every estimator.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.
@@ -16,20 +16,21 @@ from baker.core.names import unknown_name
 
 
 class Estimator(NamedTuple):
-    """What a path does at a vertex.
+    """The options of a path.
 
     Attributes
     ----------
     hemisphere : int
         0: directions follow the BSDF; 1: uniform over the hemisphere; 2: cosine over it.
     aim : int
-        Aim at lights with area and the sky: 0 never, 1 and count nothing found by chance, 2 weighed (MIS).
+        Aim at lights with area and the sky: 0 never; 1 always, and ignore light found by chance; 2 weighted
+        (MIS).
     strata : int
-        1: the first two random pairs of a pass's samples are a scrambled (0,2)-sobol_points.
+        1: the first two random pairs of a pass's samples are a scrambled (0,2)-sequence.
     power : int
         MIS by the power heuristic (exponent 2) instead of the balance heuristic.
     both : int
-        1: a second path starts at a light, and both are connected in all ways (`bidirectional`).
+        1: a second path starts at a light, and the two are connected in all ways (`bidirectional`).
     """
 
     hemisphere: int
@@ -37,6 +38,31 @@ class Estimator(NamedTuple):
     strata: int = 0
     power: int = 0
     both: int = 0
+
+
+class PathSettings(NamedTuple):
+    """The settings of a pass, as kernels take them.
+
+    Attributes
+    ----------
+    hemisphere, aim, strata, power : int
+        See `Estimator`.
+    max_bounces : int
+        -1: no limit.
+    seed : int
+    number_of_pass : int
+    salt : int
+        `rng.seed_salt` of the seed.
+    """
+
+    hemisphere: int
+    aim: int
+    strata: int
+    power: int
+    max_bounces: int
+    seed: int
+    number_of_pass: int
+    salt: int
 
 
 ESTIMATORS = {
@@ -53,6 +79,16 @@ ESTIMATORS = {
 
 def estimator_named(name: str) -> Estimator:
     """Return an estimator.
+
+    Parameters
+    ----------
+    name : str
+        A key of `ESTIMATORS`.
+
+    Returns
+    -------
+    Estimator
+        Its options.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What camera rays meet first: where, which triangle, its albedo and normal."""
+"""First hits of camera rays: position, triangle, albedo and normal."""
 
 from __future__ import annotations
 
@@ -32,15 +32,23 @@ class FirstHits:
 
     Attributes
     ----------
-    triangle : (n,) int32, -1 where nothing is met
-    bary : (n, 2) float64, weights of corners 1 and 2
-    depth : (n,) float64, metres along the ray, inf where nothing is met
+    triangle : (n,) int32
+        -1 without a hit.
+    bary : (n, 2) float64
+        Barycentrics: weights of corners 1 and 2.
+    depth : (n,) float64
+        Metres along the ray, inf without a hit.
     albedo : (n, 3) float64
     position : (n, 3) float64
-    normal, face_normal : (n, 3) float64, towards the viewer, 0 where nothing is met
-    front : (n,) bool, the triangle's front is seen
-    lit : (n,) bool, the side seen reflects: a front, or of a two-sided surface
-    kept : (n, 3) float64, what light along the ray is multiplied by where it passes coloured surfaces
+        Metres, relative to the geometry's origin.
+    normal, face_normal : (n, 3) float64
+        Unit, on the viewer's side; 0 without a hit.
+    front : (n,) bool
+        The front of the triangle was hit.
+    lit : (n,) bool
+        The side that was hit reflects: a front, or either side of a two-sided surface.
+    kept : (n, 3) float64
+        Transmittance of the `BLEND` surfaces along the ray.
     """
 
     triangle: NDArray[np.int32]
@@ -62,8 +70,17 @@ def first_hits(
 
     Parameters
     ----------
+    reference : Reference
+        The scene.
     origin : (3,) or (n, 3) float64
-    direction : (n, 3) float64, unit
+        Metres, relative to the geometry's origin.
+    direction : (n, 3) float64
+        Unit, world.
+
+    Returns
+    -------
+    FirstHits
+        Of the n rays.
     """
     n = len(direction)
     triangle, bary = np.full(n, -1, np.int32), np.zeros((n, 2))
@@ -91,6 +108,12 @@ def first_hits(
 
 @kernel
 def _meet(origin, direction, buffers, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
+    """Trace n rays in packets and write their hits.
+
+    origin, direction : (n, 3) float64; buffers : `PacketBuffers`; surface : (T, 32), material : (M, 8)
+        float32
+    triangle (n,) int32; bary (n, 2), depth (n,), albedo, kept (n, 3) float64 : outputs, see `FirstHits`
+    """
     width, scene, intersect = buffers.width, buffers.scene, buffers.intersect
     valid, floats, words = buffers.valid, buffers.floats, buffers.words
     colour = _new_colour()

@@ -1,9 +1,9 @@
-"""Irradiance and openness at points of surfaces, pass by pass, with standard errors.
+"""Irradiance and ambient occlusion at points of surfaces, pass by pass, with standard errors.
 
-    E = pi mean(L of a white Lambertian point)    AO = share of cosine-weighted rays that meet nothing
+    E = pi mean(L of a white Lambertian point)    AO = share of cosine-weighted rays without a hit
 
-A pass is a fixed number of samples of every point. Passes are independent, so their spread is the
-error of their mean, however a pass spreads its own samples.
+A pass is a fixed number of samples of every point. Passes are independent, so the standard error of their
+mean follows from their variance, however the samples of a pass are distributed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
 from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.pathtracer.estimators import Estimator, estimator_named
+from baker.pathtracer.estimators import Estimator, PathSettings, estimator_named
 from baker.pathtracer.occlusion import alike_within, are_dense, near_together, open_rays
 from baker.pathtracer.path_blocks import new_path_memory
 from baker.pathtracer.paths import trace_paths
@@ -47,38 +47,50 @@ def irradiance_pass(
 
     Parameters
     ----------
+    reference : Reference
+        The scene.
     estimate : PointEstimate
-        Of (n, 3); changed in place. The number of its next pass is the pass traced.
-    position, normal, face_normal : (n, k, 3) float64, metres and unit, world
-        k places of each point, used in turn by its samples: a texel's own area, for instance. `normal` is the
-        shading normal, `face_normal` the side that the light arrives on.
+        Of (n, 3); changed in place. The pass traced is `estimate.rounds`.
+    position : (n, k, 3) float64
+        Metres, relative to the geometry's origin: k positions of each point, such as points in a texel's
+        area. The samples of a point take them in turn.
+    normal : (n, k, 3) float64
+        Shading normals, unit, world.
+    face_normal : (n, k, 3) float64
+        Geometric normals, unit, world, on the side at which light arrives.
+    estimator : str
+        A key of `ESTIMATORS`.
     stratify : bool
-        Spread a pass's first directions evenly, whatever the estimator.
+        Stratify a pass's first directions, even if the estimator does not.
     max_bounces : int, optional
         Reflections before light arrives; None is unlimited.
+    seed : int
+        Of all random numbers.
     chosen : (m,) int64, optional
         Only these points, all by default.
+    progress : Progress
+        Called with stage, fraction and detail.
     """
-    how = estimator_named(estimator)
+    options = estimator_named(estimator)
     number, samples = estimate.rounds, estimate.samples
     picked = np.arange(len(position)) if chosen is None else chosen
     sobol_points = sobol_reversed(samples, seed, 1 + number)
-    setting = path_settings(how, how.strata or stratify, max_bounces, seed, number)
+    settings = path_settings(options, options.strata or stratify, max_bounces, seed, number)
     counted = np.zeros((-(-len(picked) // _TILE), 2), np.int64)
 
     def work(begin: int, end: int) -> None:
         rows = picked[begin:end]
         out = np.zeros((end - begin, 3))
-        places = (position[rows], normal[rows], face_normal[rows])
-        if how.both:
-            # Here: other estimators need not load its kernels.
+        points = (position[rows], normal[rows], face_normal[rows])
+        if options.both:
+            # Imported here: other estimators do not load its kernels.
             from baker.pathtracer.bidirectional_pass import surface_tile
 
-            counted[begin // _TILE] = surface_tile(reference, places, begin, sobol_points, setting, out)
+            counted[begin // _TILE] = surface_tile(reference, points, begin, sobol_points, settings, out)
         else:
             cast = trace_paths(
-                *places, begin, True, reference.surfaces, reference.lights, reference.shading,
-                new_path_memory(reference.rays), sobol_points, setting, out,
+                *points, begin, True, reference.surfaces, reference.lights, reference.shading,
+                new_path_memory(reference.rays), sobol_points, settings, out,
             )  # fmt: skip
             counted[begin // _TILE] = cast
         add_pass(estimate, rows, out * (math.pi / samples))
@@ -102,12 +114,26 @@ def ambient_occlusion_pass(
     seed: int = 0,
     progress: Progress = silent,
 ) -> None:
-    """Add one pass of ambient occlusion (1 = open) to an estimate of (n, 1); see `irradiance_pass`.
+    """Add one pass of ambient occlusion (1: no hits) to an estimate.
 
     Parameters
     ----------
+    reference : Reference
+        The scene.
+    estimate : PointEstimate
+        Of (n, 1); changed in place.
+    position : (n, k, 3) float64
+        See `irradiance_pass`.
+    normal : (n, k, 3) float64
+        See `irradiance_pass`.
+    face_normal : (n, k, 3) float64
+        See `irradiance_pass`.
     distance : float
-        Metres, may be inf.
+        Largest distance of hits, metres; may be inf.
+    seed : int
+        Of all random numbers.
+    progress : Progress
+        Called with stage, fraction and detail.
     """
     number, samples = estimate.rounds, estimate.samples
     sobol_points = sobol_reversed(samples, seed, 1 + number)
@@ -115,9 +141,9 @@ def ambient_occlusion_pass(
     max_distance = np.float32(min(distance, 1.0e30))
     min_offset_scale = np.float32(reference.surfaces.min_offset_scale)
     alike = alike_within(max_distance, min_offset_scale)
-    sizes = (min_offset_scale, np.float32(reference.surfaces.most))
+    sizes = (min_offset_scale, np.float32(reference.surfaces.default_size))
     dense = are_dense(position[:, 0], float(alike))
-    setting = np.array([number, seed_salt(seed)], np.int64)
+    salt = seed_salt(seed)
     arguments = np.stack([arguments_of(coherent=coherent) for coherent in (False, True)])
 
     def work(begin: int, end: int) -> None:
@@ -128,11 +154,11 @@ def ambient_occlusion_pass(
         found = np.zeros((end - begin, 1))
         open_rays(
             position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.rays),
-            arguments, sobol_points, shared, max_distance, alike, sizes, setting, found,
+            arguments, sobol_points, shared, max_distance, alike, sizes, number, salt, found,
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 
-    # Large tiles hold more neighbours, but few of them keep threads waiting at the end.
+    # Large tiles hold more neighbours; small ones keep threads from waiting at the end.
     tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
     run_tiles(
         len(position), tile, work, threads=reference.threads, stage=Stage.AMBIENT_OCCLUSION, progress=progress
@@ -142,9 +168,29 @@ def ambient_occlusion_pass(
 
 
 def path_settings(
-    how: Estimator, strata: int | bool, max_bounces: int | None, seed: int, number: int
-) -> NDArray[np.int64]:
-    """Return what `trace_paths` calls `how`."""
+    options: Estimator, strata: int | bool, max_bounces: int | None, seed: int, number: int
+) -> PathSettings:
+    """Return the settings of a pass for kernels.
+
+    Parameters
+    ----------
+    options : Estimator
+        Its `strata` is replaced by the next parameter.
+    strata : int or bool
+        Whether the first two random pairs of a path are stratified.
+    max_bounces : int or None
+        None: no limit.
+    seed : int
+        Of all random numbers.
+    number : int
+        The pass.
+
+    Returns
+    -------
+    PathSettings
+        All numbers are int, so that kernels are compiled once.
+    """
     bounces = -1 if max_bounces is None else max_bounces
-    values = [how.hemisphere, how.aim, int(strata), how.power, bounces, seed, number, seed_salt(seed)]
-    return np.array(values, np.int64)
+    return PathSettings(
+        options.hemisphere, options.aim, int(strata), options.power, bounces, seed, number, seed_salt(seed)
+    )

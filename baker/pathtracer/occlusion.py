@@ -1,8 +1,8 @@
 """Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
 
-Eight points at a time, each with the same sample: their rays share a packet and their first bits. So rays of
-points that are close together go alike, and Embree follows such a packet through its tree as one. Loops over
-lanes touch one array each, or they would not become vector code (see `path_blocks`).
+Packets have the same sample of eight neighbouring points, with the same first random bits. Rays of points
+close together are then nearly parallel, and Embree traces such a packet as coherent. Loops over lanes access
+one array each, so that the compiler vectorizes them (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """
@@ -28,7 +28,7 @@ from baker.pathtracer.path_blocks import (
     W_DIRECTION,
 )
 from baker.pathtracer.rng import mix4
-from baker.pathtracer.vertex_simd import stand_lanes
+from baker.pathtracer.vertex_simd import start_vertices
 from baker.trace.jit import inner, kernel, larger, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, TFAR, call_embree_with
 
@@ -39,7 +39,7 @@ _L = BLOCK_WIDTH
 # A packet is coherent if its rays start within this share of their length, or of the scene's size, which is
 # `_FAR` * min_offset_scale.
 _ALIKE, _FAR = _f(0.125), _f(100.0)
-# Points that are looked at to tell if all are dense.
+# Number of points that `are_dense` examines.
 _LOOK = 128
 # Numbers of ten bits with two zeros between any two bits.
 _SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
@@ -54,25 +54,28 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Tell if most points (n, 3) are close to the next one: if so, sorting them is worth its time."""
+    """Return whether most points (n, 3) are closer than `alike` to the next one; only then sorting pays."""
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
     return bool(2 * np.count_nonzero(step < alike) > len(first))
 
 
 def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return an order (m,) of m > 0 points (m, 3) in which those close together follow each other."""
+    """Return the order (m,) of m > 0 points (m, 3) along a Morton curve."""
     low = position.min(axis=0)
     side = max(float((position.max(axis=0) - low).max()), 1.0e-30)
     cell = ((position - low) * ((len(_SPREAD) - 0.5) / side)).astype(np.int64)
     key = _SPREAD[cell[:, 0]] | _SPREAD[cell[:, 1]] << 1 | _SPREAD[cell[:, 2]] << 2
-    # Numbers are sorted in a fraction of the time that their order is found in.
+    # Sort keys that contain the index: several times faster than argsort.
     return np.sort(key << 32 | np.arange(len(position))) & 0xFFFFFFFF
 
 
 @inner
 def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
-    """Write the two scramble seeds of points `group` to `group` + 8."""
+    """Write the two scramble seeds of points `group` to `group` + 8.
+
+    words : block, uint32; name : (m,) int64, see `open_rays`
+    """
     for lane in range(min(BLOCK_WIDTH, len(name) - group)):
         words[KEY * _L + lane] = name[group + lane]
     for lane in range(BLOCK_WIDTH):
@@ -82,7 +85,10 @@ def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def
 
 @inner
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
-    """Write the lanes' uniform numbers, in [1, 2): the shared bits of (first, second), the rest scrambled."""
+    """Write the lanes' uniform numbers, in [1, 2): shared bits of (first, second), the other bits scrambled.
+
+    words : block, uint32; first, second, shared : uint32
+    """
     one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
     for lane in range(BLOCK_WIDTH):
         x = scramble_reversed(first, words[CHOICE * _L + lane])
@@ -96,8 +102,11 @@ def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
 
 
 @inner
-def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
-    """Copy place k of points `group` to `group` + 8 into the lanes."""
+def copy_points(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
+    """Copy position k of points `group` to `group` + 8 into the lanes.
+
+    s : block, float32; position, normal, face_normal : (m, k, 3) float64
+    """
     for lane in range(min(BLOCK_WIDTH, len(position) - group)):
         for a in range(3):
             s[(ORG_X + a) * _L + lane] = position[group + lane, k, a]
@@ -107,7 +116,7 @@ def place_lanes(s, position, normal, face_normal, group, k):  # type: ignore[no-
 
 @inner
 def extent(s, lanes):  # type: ignore[no-untyped-def]
-    """Return how far apart, along any axis, the first lanes' rays start."""
+    """Return the largest extent along an axis, metres, of the first lanes' origins; s : block, float32."""
     most = _ZERO
     for a in range(3):
         low = high = s[(ORG_X + a) * _L]
@@ -119,7 +128,10 @@ def extent(s, lanes):  # type: ignore[no-untyped-def]
 
 @inner
 def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
-    """Point the lanes' rays, cosine-weighted. What points below the facet is closed by the facet itself."""
+    """Write cosine-weighted directions; those below the triangle count as occluded.
+
+    s : block, float32
+    """
     for lane in range(BLOCK_WIDTH):
         a, b, c = cosine_direction(s[U_DIRECTION * _L + lane] - _ONE, s[W_DIRECTION * _L + lane] - _ONE)
         dx = a * s[TANGENT * _L + lane] + b * s[BITANGENT * _L + lane] + c * s[SHADED * _L + lane]
@@ -143,7 +155,7 @@ def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
 
 @inner
 def count_lanes(s):  # type: ignore[no-untyped-def]
-    """Count the lanes' rays that have met nothing in `VALUE`."""
+    """Add 1 to `VALUE` of each lane whose ray has no hit; s : block, float32."""
     for lane in range(BLOCK_WIDTH):
         s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
 
@@ -161,34 +173,35 @@ def open_rays(  # type: ignore[no-untyped-def]
     max_distance,
     alike,
     sizes,
-    how,
+    number,
+    salt,
     out,
 ):
-    """Count the rays of points that meet nothing within max_distance.
+    """Count the rays of m points without a hit within `max_distance`.
 
-    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k;
-        rays are fastest if neighbours follow each other
-    name : (m,) int64, what random numbers a point has; memory : `PathMemory`
-    arguments : (2, 5) int64, `arguments_of` of packets whose rays do not go alike, and do
-    sobol_points : (n, 2) uint32; shared : uint32, bits that all points share
+    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at position (p n + s) modulo
+        k; rays are fastest if neighbours follow each other
+    name : (m,) int64, numbers of the points for random numbers; memory : `PathMemory`
+    arguments : (2, 5) int64, `arguments_of` of incoherent and of coherent packets
+    sobol_points : (n, 2) uint32; shared : uint32, mask of the bits that all points share
     max_distance, alike : float32, metres, see `alike_within`
-    sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.most`
-    how : (2,) int64: the pass, `seed_salt`; out : (m, 1) float64 output
+    sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.default_size`
+    number : the pass; salt : `seed_salt`; out : (m, 1) float64, output
     """
     scene, occluded = memory.scene, memory.occluded
     on, s, words = memory.on, memory.s, memory.words
-    samples, places = len(sobol_points), position.shape[1]
+    samples, n_positions = len(sobol_points), position.shape[1]
     for group in range(0, len(position), BLOCK_WIDTH):
         lanes = min(BLOCK_WIDTH, len(position) - group)
-        seed_lanes(words, name, group, how[0], how[1])
+        seed_lanes(words, name, group, number, salt)
         for lane in range(BLOCK_WIDTH):
             on[lane] = -1 if lane < lanes else 0
             s[VALUE * BLOCK_WIDTH + lane] = _ZERO
         for sample in range(samples):
-            k = (how[0] * samples + sample) % places
-            if sample == 0 or places > 1:
-                place_lanes(s, position, normal, face_normal, group, k)
-                stand_lanes(s, 0, sizes[0], sizes[1])
+            k = (number * samples + sample) % n_positions
+            if sample == 0 or n_positions > 1:
+                copy_points(s, position, normal, face_normal, group, k)
+                start_vertices(s, 0, sizes[0], sizes[1])
             if sample == 0:
                 asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
             number_lanes(words, sobol_points[sample, 0], sobol_points[sample, 1], shared)

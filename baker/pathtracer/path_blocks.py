@@ -1,10 +1,9 @@
-"""Eight paths side by side, and the blocks in which the paths of a tile wait between two rays.
+"""Blocks of eight paths, in which the paths of a tile are stored between two rays.
 
-A block is a ray packet, with further rows of eight numbers behind the packet's own. It is traced where it
-lies and shaded where it lies. All of a block's rows stand at constant distances in one array: only so does
-the compiler know that rows do not overlap, and loops over lanes become vector code (loops as short as these
-only if all they touch is in one array). Paths that end leave gaps, which paths from the last blocks fill:
-packets stay full.
+A block is a ray packet, followed by further rows of eight numbers. Rays are traced and shaded in place. All
+rows of a block are at constant distances in one array: only then the compiler proves that rows do not overlap
+and vectorizes loops over lanes (loops of eight only if they access a single array). Gaps that ended paths
+leave are filled with paths of the last blocks, so that packets stay full.
 
 Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van
 Antwerpen, Improving SIMD efficiency for parallel Monte Carlo light transport on the GPU, 2011 (compaction).
@@ -39,24 +38,24 @@ from baker.trace.pointers import prefetch
 # Paths in a block, blocks of a tile.
 BLOCK_WIDTH, BLOCKS = 8, 32
 _L = BLOCK_WIDTH
-# Rows behind the packet's. What lasts from ray to ray: throughput, density of the direction (0: emission
-# counts in full), its cosine to the normal it left, bounces (-1 before a camera ray's hit), point in the
-# tile, 1 for a path; as uint32: point, sample, twice the vertices so far.
+# Rows behind those of the packet. State of a path: throughput; density of the direction, per steradian (0: no
+# MIS weight for emission); its cosine to the shading normal; bounces (-1 before the hit of a camera ray);
+# point in the tile; 1 for a path. As uint32: point, sample, twice the number of vertices.
 BETA, DENSITY, COSINE, BOUNCES, POINT, ALIVE = (ROWS + i for i in (0, 3, 4, 5, 6, 7))
 KEY, SAMPLE, COUNT = ROWS + 8, ROWS + 9, ROWS + 10
 # At a vertex: albedo, geometric normal on the side that was hit, shading normal, tangent, bitangent.
 ALBEDO, NORMAL, SHADED, TANGENT, BITANGENT = (ROWS + i for i in (11, 14, 17, 20, 23))
-# Uniform numbers, in [1, 2): two pairs (light, direction), one that decides whether the path goes on. As
-# uint32: what chooses a light, and a lobe.
+# Uniform numbers, in [1, 2): two pairs (light, direction), and one for Russian roulette. As uint32: those
+# that choose a light and a lobe.
 U_LIGHT, W_LIGHT, U_DIRECTION, W_DIRECTION, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
 CHOICE, LOBE = ROWS + 31, ROWS + 32
-# Ray to a light: direction, max_distance, light it brings, barycentrics of its end.
+# Ray to a light: direction, length, light if unblocked, barycentrics of its end.
 TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
 # Copies of the hit triangle's first columns and of the chosen light's row.
 TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
 BLOCK = N_ROWS * _L
-# Shadow rays wait in as many packets, by light; behind the rows of their rays: light, point.
+# Packets of pending shadow rays, by light; behind the rows of the rays: light, point.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 
@@ -64,7 +63,7 @@ _f = np.float32
 
 
 class PathMemory(NamedTuple):
-    """An Embree scene with a thread's memory for paths.
+    """An Embree scene and the memory of one thread for paths.
 
     scene, intersect, occluded : RTCScene, rtcIntersect8 and rtcOccluded8
     on (8,) int32 : lanes to trace
@@ -84,7 +83,7 @@ class PathMemory(NamedTuple):
 
 
 def new_path_memory(rays: RayScene) -> PathMemory:
-    """Return memory as Embree wants it; what no kernel changes is set here: time, tnear 0, the mask."""
+    """Return aligned memory; rows that kernels do not change are set: time and tnear 0, the mask."""
     on, s = aligned_floats(BLOCK_WIDTH).view(np.int32), aligned_floats(BLOCKS * BLOCK)
     bins = aligned_floats(BINS * BIN_ROWS * _L)
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT
@@ -96,20 +95,23 @@ def new_path_memory(rays: RayScene) -> PathMemory:
 
 
 @inner
-def unsigned(place):  # type: ignore[no-untyped-def]
-    """Return a place in an array, said to be below 2^32: negative ones would count from the end."""
-    return np.int64(np.uint32(place))
+def unsigned(index):  # type: ignore[no-untyped-def]
+    """Return an index below 2^32 in a form that the compiler proves to be at least 0: no wraparound."""
+    return np.int64(np.uint32(index))
 
 
 @inner
-def place_of(lane):  # type: ignore[no-untyped-def]
-    """Return where the first row of a lane is; lanes are numbered through all blocks."""
+def lane_start(lane):  # type: ignore[no-untyped-def]
+    """Return the index of a lane's first row; lanes are numbered through all blocks."""
     return unsigned(lane // BLOCK_WIDTH * BLOCK + lane % BLOCK_WIDTH)
 
 
 @inner
 def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
-    """Multiply the lanes' throughput by the colours of what their rays passed."""
+    """Multiply the lanes' throughput by the transmittance of their rays.
+
+    s : blocks, float32; on : (8,) int32, lanes to trace
+    """
     if blend is None:
         return
     trace_transmittance_packet(blend, occluded, BLOCK_WIDTH, on, s[base : base + BLOCK], True)
@@ -120,9 +122,11 @@ def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
 
 @inner
 def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surface):  # type: ignore[no-untyped-def]
-    """Trace the rays of the first blocks and ask for the rows (two cache lines each) of what they hit.
+    """Trace the rays of the first blocks and prefetch the rows, two cache lines each, of the hit triangles.
 
-    Shading begins when all is traced: by then the rows have come from memory.
+    Shading starts when all blocks are traced; the rows are in the cache then.
+
+    s, words : blocks; on : (8,) int32, working memory; surface : (T, 32) float32, see `Surfaces`
 
     Returns
     -------
@@ -150,17 +154,20 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
 
 @inner
 def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
-    """Move paths from the last blocks into the gaps of the first; return how many blocks are left."""
+    """Move paths from the last blocks into the gaps of the first; return the number of blocks left.
+
+    s : blocks, float32
+    """
     low, high = 0, blocks * _L - 1
     while True:
-        while low <= high and s[place_of(low) + ALIVE * _L] > _f(0.0):
+        while low <= high and s[lane_start(low) + ALIVE * _L] > _f(0.0):
             low += 1
-        while low <= high and s[place_of(high) + ALIVE * _L] == _f(0.0):
+        while low <= high and s[lane_start(high) + ALIVE * _L] == _f(0.0):
             high -= 1
         if low >= high:
             return (low + BLOCK_WIDTH - 1) // BLOCK_WIDTH
-        to = place_of(low)
-        start = place_of(high)
+        to = lane_start(low)
+        start = lane_start(high)
         for a in range(3):
             s[to + (ORG_X + a) * _L] = s[start + (ORG_X + a) * _L]
             s[to + (DIR_X + a) * _L] = s[start + (DIR_X + a) * _L]

@@ -1,14 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Many paths at once, eight side by side: those that end leave no gaps, new ones take their places.
+"""Path tracing in blocks of eight paths; paths that end are replaced, so that ray packets stay full.
 
-    L = L_e + int f L cos        estimated path by path; Russian roulette ends paths without bias
+    L = L_e + integral f L cos        one estimate for each path; Russian roulette ends paths without bias
 
-Lambertian vertices are shaded in float32 by vector code (`vertex_simd`), others one by one in float64
-(`vertex`); light is summed in float64. A path's random numbers belong to (seed, pass, point, sample), and
-what it brings goes to the point's sum in a fixed order inside a tile: the same bytes for any number of
-threads.
+Lambertian vertices are shaded in float32 by vector code (`vertex_simd`), others one at a time in float64
+(`vertex`); light is summed in float64. The random numbers of a path depend on (seed, pass, point, sample)
+only, and its light is added to the sum of its point in a fixed order inside a tile, so that results do not
+depend on the number of threads. `tests/path_tracer.py` has a plain path tracer that computes the same.
 
-Based on: Kajiya, The rendering equation, 1986; Veach, 1997, ch. 9 and 10.
+Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
+simulation, 1997, ch. 9 and 10.
 """
 
 from __future__ import annotations
@@ -86,14 +87,14 @@ from baker.pathtracer.vertex_simd import (
     arrive_lanes,
     look_up_falloff,
     scatter_lanes,
-    stand_lanes,
+    start_vertices,
 )
 from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_HIT, ORG_X, PRIM_ID, TFAR
 
 _f = np.float32
 _L = BLOCK_WIDTH
-# Few lights are counted through, more are searched.
+# Up to this number of lights, a light is chosen by comparing with all; beyond, by binary search.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
 # Working memory of a tile.
@@ -107,9 +108,12 @@ _new_light, _new_filled = scratch((BLOCK_WIDTH,), np.int64), scratch((BINS,), np
 
 @inner
 def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
-    """Write to `value` (3,) what the hit triangle sends along the path, weighed against aiming at it.
+    """Write to `value` (3,) the light of the emissive triangle that a path hit, with its MIS weight.
 
-    Its texture is not looked up yet.
+    The caller multiplies by the texture.
+
+    s : blocks; surface : (T, 32) float32; lights : `LightTable`; value : (3,) float64, output
+    mode, power : `Estimator.aim` and `.power`
     """
     value[0] = value[1] = value[2] = 0.0
     dx, dy, dz = (
@@ -138,7 +142,10 @@ def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
 
 @inner
 def see_sky(s, base, lane, sky, mode, power, value):
-    """Do the same for the sky, where a path leaves the scene."""
+    """Write to `value` (3,) the light of the sky for a path that leaves the scene, with its MIS weight.
+
+    s : blocks; sky : (4,) float64, see `LightTable`; value : (3,) float64, output
+    """
     value[0] = value[1] = value[2] = 0.0
     weight = 1.0
     density = np.float64(s[base + DENSITY * _L + lane])
@@ -152,21 +159,22 @@ def see_sky(s, base, lane, sky, mode, power, value):
 
 @inner
 def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):
-    """Begin paths: at white Lambertian points (light leaving them is E / pi), or as rays; see `trace_paths`.
+    """Start eight paths at white Lambertian points, whose radiance is E / pi, or as rays.
 
-    following : number of the first path; first : number of the first sample of all
+    s, words : blocks; where, toward, normal : (m, k, 3) float64, see `trace_paths`
+    following : number of the first path; first : number of the first sample of the pass
     """
     base = unsigned(base)
-    m, places = len(toward), toward.shape[1]
+    m, n_positions = len(toward), toward.shape[1]
     for lane in range(BLOCK_WIDTH):
         if following + lane >= m * samples:
             s[base + ALIVE * _L + lane] = _f(0.0)
             continue
-        # Neighbouring lanes hold neighbouring points with the same sample.
+        # Lanes hold neighbouring points with the same sample.
         sample = (following + lane) // m
-        i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % places)
+        i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % n_positions)
         here = i if len(where) == m else 0
-        there = k if where.shape[1] == places else 0
+        there = k if where.shape[1] == n_positions else 0
         s[base + ALIVE * _L + lane] = _f(1.0)
         s[base + DENSITY * _L + lane] = s[base + COSINE * _L + lane] = _f(0.0)
         s[base + BOUNCES * _L + lane] = _f(0.0) if at_surface else _f(-1.0)
@@ -182,7 +190,10 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
 
 @inner
 def fetch_lanes(s, words, base, surface, material):
-    """Copy what Lambertian vertices are made of: the triangles' rows and base colours."""
+    """Copy the hit triangles' rows and base colours into the lanes.
+
+    s, words : blocks; surface : (T, 32), material : (M, 8) float32, see `Surfaces`
+    """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
         if s[base + ALIVE * _L + lane] > _f(0.0):
@@ -196,14 +207,17 @@ def fetch_lanes(s, words, base, surface, material):
 
 @inner
 def choose_lights(s, words, base, lights, light):
-    """Choose a light for each lane: its number to `light` (8,) int64, its row of `every` to `s`."""
+    """Choose a light for each lane: write its number to `light` (8,) int64 and copy its row into the lane.
+
+    s, words : blocks; lights : `LightTable`
+    """
     base, row, cumulative = unsigned(base), lights.row, lights.cumulative
     for lane in range(BLOCK_WIDTH):
         choice, e = np.float64(words[base + CHOICE * _L + lane]) * _INV_2_32, 0
         if len(cumulative) > _FEW:
             e = pick_light(cumulative, choice)
         else:
-            # The same without a branch that nobody can foresee.
+            # The same without unpredictable branches.
             for k in range(len(cumulative) - 1):
                 e += 1 if cumulative[k] <= choice else 0
         light[lane] = e
@@ -215,7 +229,10 @@ def choose_lights(s, words, base, lights, light):
 
 @inner
 def turn_alone(path, row, lane, s, words, base, hemisphere, value):
-    """Choose the direction in which one lane's path goes on, or end it."""
+    """Sample the next direction of one lane's path, or end the path.
+
+    path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; value : (3,) float64, working memory
+    """
     choice = np.float64(words[base + LOBE * _L + lane]) * _INV_2_32
     u, w = (
         np.float64(s[base + U_DIRECTION * _L + lane]) - 1.0,
@@ -239,7 +256,11 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):
 
 @inner
 def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
-    """Aim at one light from one lane's vertex; return its number, -1 if it brings nothing."""
+    """Aim at one light from one lane's vertex; return its number, or -1 if it cannot light the vertex.
+
+    path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; lights : `LightTable`
+    value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
+    """
     choice = np.float64(words[base + CHOICE * _L + lane]) * _INV_2_32
     u, w = (
         np.float64(s[base + U_LIGHT * _L + lane]) - 1.0,
@@ -264,18 +285,18 @@ def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
 
 @kernel
 def trace_paths(
-    where, toward, normal, begin, at_surface, surfaces, lights, shading, memory, sobol_points, how, out
+    where, toward, normal, begin, at_surface, surfaces, lights, shading, memory, sobol_points, settings, out
 ):
-    """Add the light that paths bring to each of m points, and count path segments and shadow rays.
+    """Add the light of all paths to the sums of m points; return the numbers of rays.
 
-    where, toward, normal : (m, k, 3) float64; sample s of pass p starts at place (p n + s) modulo k of its
-        point: place, shading normal and geometric normal, or ray origin and direction if not `at_surface`;
-        one place (1, 1, 3) may be that of all
+    where, toward, normal : (m, k, 3) float64; position, shading normal and geometric normal, or ray origin
+        and direction (`normal` unused) if not `at_surface`; sample s of pass p uses number (p n + s) modulo
+        k; `where` may be (1, 1, 3)
     begin : number of the first point
+    surfaces : `Surfaces`; lights : `LightTable`; shading : `Shading`; memory : `PathMemory`
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
-    how : (8,) int64: `Estimator` (hemisphere, aim, strata, power), most bounces (-1: unlimited), seed, pass,
-        `seed_salt`
-    out : (m, 3) float64 sums; at a surface of light leaving a white one, E / pi
+    settings : `PathSettings`
+    out : (m, 3) float64, sums of radiance; at a surface of the radiance E / pi of a white one
 
     Returns
     -------
@@ -291,21 +312,22 @@ def trace_paths(
         surfaces.lambertian,
     )
     emitter, triangle, sky, n_lights = lights.emitter, lights.triangle, lights.sky, len(lights.cumulative)
-    # What has to be looked up: alpha or emission of lights, colours of surfaces.
+    # Look textures up only if there are any: of emitters, of surfaces.
     textured = len(shading.alpha.slot) > 0 or lights.textured != 0
     painted = surfaces.painted != 0
-    hemisphere, mode, strata, power = how[0], how[1], how[2], how[3]
-    most_bounces, number_of_pass, salt = how[4], how[6], how[7]
+    hemisphere, mode, strata, power = settings.hemisphere, settings.aim, settings.strata, settings.power
+    max_bounces, number_of_pass, salt = settings.max_bounces, settings.number_of_pass, settings.salt
     lit = lights.cumulative[n_lights - 1] > 0.0
     path, row = _new_path(), _new_row()
     value, ray, rgba, light, filled = _new_value(), _new_ray(), _new_rgba(), _new_light(), _new_filled()
-    samples, m, places = len(sobol_points), toward.shape[0], toward.shape[1]
+    samples, m, n_positions = len(sobol_points), toward.shape[0], toward.shape[1]
     total = m * samples
     following = rays = shadows = 0
-    # Blocks in use; the one to be shaded next in this round, which begins when all are traced.
+    # Number of blocks in use; the next block to shade. A round of shading starts when all blocks are traced.
     blocks = block = 0
     traced = False
     while True:
+        # Take the next traced block; without one, trace all blocks or start paths in a new block
         met = block < blocks
         if met:
             base = unsigned(block * BLOCK)
@@ -339,9 +361,10 @@ def trace_paths(
             following = min(following + BLOCK_WIDTH, total)
             if not at_surface:
                 continue
-        plain = hemisphere != 1 and (lambertian != 0 or not met)
+        vectorized = hemisphere != 1 and (lambertian != 0 or not met)
         any_vertex = not met
         if met:
+            # Add emission at hits and the sky; end paths at the limit of bounces
             for lane in range(BLOCK_WIDTH):
                 if s[base + ALIVE * _L + lane] == _f(0.0):
                     continue
@@ -362,17 +385,19 @@ def trace_paths(
                     for c in range(3):
                         out[i, c] += value[c]
                 s[base + BOUNCES * _L + lane] += _f(1.0)
-                if most_bounces >= 0 and s[base + BOUNCES * _L + lane] > most_bounces:
+                if max_bounces >= 0 and s[base + BOUNCES * _L + lane] > max_bounces:
                     s[base + ALIVE * _L + lane] = _f(0.0)
                 any_vertex = any_vertex or s[base + ALIVE * _L + lane] > _f(0.0)
         if not any_vertex:
             continue
+        # Draw random numbers
         random_lanes(words, base, number_of_pass, salt)
         if strata:
             spread_lanes(words, base, sobol_points, number_of_pass, salt)
-        if met and plain:
+        # Look up triangles, materials and textures
+        if met and vectorized:
             fetch_lanes(s, words, base, surface, material)
-        if met and (painted or not plain):
+        if met and (painted or not vectorized):
             for lane in range(BLOCK_WIDTH):
                 if s[base + ALIVE * _L + lane] == _f(0.0):
                     continue
@@ -381,7 +406,7 @@ def trace_paths(
                     np.float64(s[base + HIT_U * _L + lane]),
                     np.float64(s[base + HIT_V * _L + lane]),
                 )
-                if not plain:
+                if not vectorized:
                     for a in range(3):
                         path[GO + a, lane] = s[base + (DIR_X + a) * _L + lane]
                     if not arrive(
@@ -390,18 +415,19 @@ def trace_paths(
                         s[base + ALIVE * _L + lane] = _f(0.0)
                         continue
                 if surface[prim, TEXTURED] > _f(0.0):
-                    if plain:
+                    if vectorized:
                         for c in range(3):
                             row[c, lane] = s[base + (ALBEDO + c) * _L + lane]
                         row[WIDTH, lane] = -1.0
                     paint(row, lane, shading, prim, u, v, material, rgba)
                     for c in range(3):
                         s[base + (ALBEDO + c) * _L + lane] = row[c, lane]
-        if plain:
+        # Make vertices, and aim at one light from each
+        if vectorized:
             if met:
                 arrive_lanes(s, base, _f(min_offset_scale))
             else:
-                stand_lanes(s, base, _f(min_offset_scale), _f(surfaces.most))
+                start_vertices(s, base, _f(min_offset_scale), _f(surfaces.default_size))
             if lit:
                 choose_lights(s, words, base, lights, light)
                 if len(lights.falloff) > 0:
@@ -417,8 +443,8 @@ def trace_paths(
                         np.int64(s[base + POINT * _L + lane]),
                         np.int64(words[base + SAMPLE * _L + lane]),
                     )
-                    k = (number_of_pass * samples + sample) % places
-                    sizes = (min_offset_scale, surfaces.most)
+                    k = (number_of_pass * samples + sample) % n_positions
+                    sizes = (min_offset_scale, surfaces.default_size)
                     start_path(path, row, lane, where[i, k], toward[i, k], normal[i, k], True, sizes)
                 for c in range(3):
                     path[PATH_BETA + c, lane] = s[base + (BETA + c) * _L + lane]
@@ -426,6 +452,7 @@ def trace_paths(
                     light[lane] = aim_alone(
                         path, row, lane, s, words, base, lights, mode, power, value, ray,
                     )  # fmt: skip
+        # Multiply by emission textures and alpha, and cast shadow rays
         if lit:
             if textured:
                 for lane in range(BLOCK_WIDTH):
@@ -442,12 +469,14 @@ def trace_paths(
                         for c in range(3):
                             s[base + (VALUE + c) * _L + lane] = value[c]
             shadows += cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out)
-        if plain:
+        # Sample the next directions, with Russian roulette
+        if vectorized:
             scatter_lanes(s, base)
         else:
             for lane in range(BLOCK_WIDTH):
                 if s[base + ALIVE * _L + lane] > _f(0.0):
                     turn_alone(path, row, lane, s, words, base, hemisphere, value)
+    # Cast the shadow rays of incomplete packets
     for k in range(BINS):
         if filled[k] > 0:
             cast_packet(bins, filled, k, occluded, scene, blend, on, out)

@@ -12,12 +12,12 @@ SAMPLES_PER_PASS = 16
 
 @dataclass
 class PointEstimate:
-    """Means over passes, which can be continued, for some points longer than for others.
+    """Means over passes; points may have different numbers of passes, and passes may be added.
 
     Attributes
     ----------
     total, squares : (2, n, C) float64
-        Sums of the passes' means and of their squares, even and odd passes apart.
+        Sums of the passes' means and of their squares, of even and of odd passes.
     count : (2, n) int64
         Even and odd passes of each point.
     samples : int
@@ -25,7 +25,7 @@ class PointEstimate:
     rounds : int
         Number of the next pass.
     rays, segments : int
-        All rays cast, and the closest-hit rays of paths among them.
+        All rays cast, and the closest-hit rays of paths alone.
     """
 
     total: NDArray[np.float64]
@@ -57,13 +57,38 @@ class PointEstimate:
 
 
 def new_estimate(n: int, channels: int, samples: int = SAMPLES_PER_PASS) -> PointEstimate:
-    """Return an estimate of n points before its first pass."""
+    """Return an estimate before its first pass.
+
+    Parameters
+    ----------
+    n : int
+        Points.
+    channels : int
+        C, numbers for each point.
+    samples : int
+        Samples of a point in each pass.
+
+    Returns
+    -------
+    PointEstimate
+        All sums are 0.
+    """
     zero = np.zeros((2, n, channels))
     return PointEstimate(zero, zero.copy(), np.zeros((2, n), np.int64), samples)
 
 
 def add_pass(estimate: PointEstimate, rows: NDArray[np.int64] | slice, mean: NDArray[np.float64]) -> None:
-    """Add a pass's means (m, C) of points `rows` to an estimate; `rounds` counts up when all are in."""
+    """Add the means of a pass to an estimate; the caller increments `rounds` after all points.
+
+    Parameters
+    ----------
+    estimate : PointEstimate
+        Changed in place.
+    rows : (m,) int64 or slice
+        The points.
+    mean : (m, C) float64
+        Their means over this pass.
+    """
     half = estimate.rounds % 2
     estimate.total[half, rows] += mean
     estimate.squares[half, rows] += mean**2

@@ -36,10 +36,24 @@ def radiance_pass(
 
     Parameters
     ----------
+    reference : Reference
+        The scene.
     estimate : PointEstimate
         Of (height * width, 3), row 0 on top; changed in place.
+    camera : Camera
+        World space.
+    width : int
+        Pixels.
+    height : int
+        Pixels.
+    estimator : str
+        A key of `ESTIMATORS`.
     max_bounces : int, optional
         Reflections between light and camera beyond the first; None is unlimited.
+    seed : int
+        Of all random numbers.
+    progress : Progress
+        Called with stage, fraction and detail.
 
     Raises
     ------
@@ -48,15 +62,15 @@ def radiance_pass(
     Cancelled
         If `progress` asked to stop.
     """
-    how = estimator_named(estimator)
+    options = estimator_named(estimator)
     samples, number = estimate.samples, estimate.rounds
     sobol_points = sobol_reversed(samples, seed, 1 + number)
-    setting = path_settings(how, how.strata, max_bounces, seed, number)
-    if how.both:
+    settings = path_settings(options, options.strata, max_bounces, seed, number)
+    if options.both:
         # Here: other estimators need not load its kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
-        picture_pass(reference, estimate, camera, width, height, sobol_points, setting, seed, progress)
+        picture_pass(reference, estimate, camera, (width, height), sobol_points, settings, progress)
         return
     counted = np.zeros((-(-width * height // _TILE), 2), np.int64)
     eye = reference.local(camera.position)[None, None]
@@ -67,7 +81,7 @@ def radiance_pass(
         out = np.zeros((end - begin, 3))
         cast = trace_paths(
             eye, direction, direction, begin, False, reference.surfaces, reference.lights, reference.shading,
-            new_path_memory(reference.rays), sobol_points, setting, out,
+            new_path_memory(reference.rays), sobol_points, settings, out,
         )  # fmt: skip
         counted[begin // _TILE] = cast
         add_pass(estimate, slice(begin, end), out / samples)

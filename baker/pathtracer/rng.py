@@ -1,7 +1,7 @@
-"""Random numbers of a path, which depend on (seed, pass, point, sample) and on the place in the path only.
+"""Random numbers of a path, which depend on (seed, pass, point, sample) and on the vertex only.
 
-`draw`: SplitMix64 from a state that names the path. `random_lanes`: a hash of the name and the number of the
-vertex, for eight paths at once; it multiplies 32-bit numbers only, which processors do eight at a time.
+`draw`: SplitMix64 from a state made of these. `random_lanes`: a hash of them and of the number of the vertex,
+for eight paths at once; it multiplies 32-bit numbers only, which processors do eight at a time.
 
 Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014; Jarzynski and Olano,
 Hash functions for GPU rendering, 2020 (pcg4d).
@@ -63,7 +63,10 @@ def draw(state, lane):  # type: ignore[no-untyped-def]
 
 @inner
 def stratum(sobol_points, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
-    """Return numbers of a scrambled (0,2)-sequence, scrambled for each point, pass and pair."""
+    """Return a pair of a (0,2)-sequence that is scrambled independently for each point, pass and pair.
+
+    sobol_points : (n, 2) uint32
+    """
     bits = path_state(seed, number_of_pass, point, _u(1) << _u(40 + pair))
     first = np.uint32(bits & _u(0xFFFFFFFF))
     second = np.uint32(bits >> _u(32))
@@ -93,15 +96,16 @@ def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
 
 
 def seed_salt(seed: int) -> int:
-    """Return what makes all numbers of a seed differ from those of others."""
+    """Return a salt for the random numbers of a seed."""
     # An array: arithmetic on single numbers warns of overflow.
     return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
 
 
 @inner
 def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
-    """Write the lanes' random numbers for their vertices; `COUNT` counts up.
+    """Write the lanes' random numbers for their vertices, and increase `COUNT`.
 
+    words : blocks, uint32
     number : the pass; salt : `seed_salt`
     """
     base = unsigned(base)
@@ -123,9 +127,10 @@ def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
 
 @inner
 def spread_lanes(words, base, sobol_points, number, salt):  # type: ignore[no-untyped-def]
-    """Replace the pairs of lanes at their path's first vertex by numbers of scrambled (0,2)-nets.
+    """Replace the pairs of lanes at their path's first vertex by those of scrambled (0,2)-sequences.
 
-    sobol_points : (n, 2) uint32; the nets are scrambled anew for each point, pass and pair
+    words : blocks, uint32; sobol_points : (n, 2) uint32, scrambled independently for each point, pass and
+        pair
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):

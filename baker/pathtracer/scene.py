@@ -1,4 +1,4 @@
-"""A scene as the reference sees it: triangles, materials, lights, a ray tree; no atlas, no map."""
+"""A scene prepared for path tracing: triangles, materials, lights, a ray tree; no atlas and no lightmap."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from baker.trace.embree import RayScene
 from baker.trace.packets import aligned_floats
 
 # Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
-# what it is as a light (`LightTable.code`), 1 if a texture or a vertex colour changes what the material
-# says, radiance without texture, and whether it emits: 0 no, 1 yes, 2 with a texture.
+# code of its emitters (`LightTable.code`), 1 if it has a texture or vertex colours, radiance without texture,
+# and whether it emits: 0 no, 1 yes, 2 with a texture.
 CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES = (
     0,
     9,
@@ -38,12 +38,12 @@ CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES 
 )
 # Two cache lines.
 ROW_LENGTH = 32
-# Share of triangles that are smaller than half of what starts of paths are offset for.
+# Quantile of triangle sizes that is half of `Surfaces.default_size`.
 _SMALL = 0.1
 
 
 class Surfaces(NamedTuple):
-    """What a path needs at a hit.
+    """Triangles and materials as paths read them at hits.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Surfaces(NamedTuple):
         Base colour, metallic, roughness, 1 if a texture scales the last two.
     min_offset_scale : float
         Metres; coordinates below count as this when origins of rays are offset.
-    most : float
+    default_size : float
         Metres; the size of a triangle where it is not known.
     lambertian : int
         1 if all surfaces are Lambertian.
@@ -64,7 +64,7 @@ class Surfaces(NamedTuple):
     row: NDArray[np.float32]
     material: NDArray[np.float32]
     min_offset_scale: float
-    most: float
+    default_size: float
     lambertian: int
     painted: int
 
@@ -85,7 +85,7 @@ class Reference:
         Centre and radius, metres, of a sphere around everything.
     threads : int
     tells : (T,) uint8
-        What each triangle says about who sees it first, see `kernels.probe`; nothing if not asked for.
+        Class of each triangle, see `kernels.probe`; 0 if built without `find_solids`.
     """
 
     geometry: Geometry
@@ -122,20 +122,27 @@ def build_reference(
     sky: tuple[float, float, float] = (0.0, 0.0, 0.0),
     lambertian: bool = False,
     threads: int | None = None,
-    buried: bool = False,
+    find_solids: bool = False,
 ) -> Reference:
     """Prepare a scene for path tracing.
 
     Parameters
     ----------
     scene : Scene
+        Instances, materials and lights.
     sky : (3,) tuple
         Radiance of the constant sky, cd/m2, linear Rec.709.
     lambertian : bool
-        Every surface reflects as Lambert with its base colour, as bakes see it.
+        Every surface is Lambertian with its base colour, as in bakes.
     threads : int, optional
-    buried : bool
-        Work out what is solid, so that `pathtracer.inside_geometry` can be asked.
+        All cores by default.
+    find_solids : bool
+        Classify triangles of solids, for `pathtracer.inside_geometry`.
+
+    Returns
+    -------
+    Reference
+        To be closed after use.
 
     Raises
     ------
@@ -149,14 +156,14 @@ def build_reference(
     lights = build_light_table(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lights, lambertian)
     tells = np.zeros(len(geometry.triangle), np.uint8)
-    if buried:
-        # Only for the question what is buried: paths see backs as materials have them.
+    if find_solids:
+        # For `inside_geometry` only: paths take sides of surfaces from the materials.
         tells = hide_backs(scene, geometry, shading)[1]
     return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, tells)
 
 
 def _no_atlas(scene: Scene) -> Atlas:
-    """Return an atlas in which nothing lies anywhere, so that meshes keep their own vertices."""
+    """Return an atlas without uv: meshes keep their own vertices."""
     layouts = []
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
@@ -180,7 +187,8 @@ def _sphere(geometry: Geometry) -> NDArray[np.float64]:
     if not len(geometry.position):
         return np.array([0.0, 0.0, 0.0, 1.0])
     low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
-    # A little more than half the diagonal: nothing that parallel light starts at touches the scene.
+    # A little more than half the diagonal, so that discs from which parallel light starts do not touch the
+    # scene.
     radius = max(0.501 * float(np.linalg.norm(high - low)), 1e-9)
     return np.array([*(0.5 * (low + high)), radius])
 
@@ -195,7 +203,8 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
     row[:, TWO_SIDED] = geometry.double_sided
     row[:, EMITTER] = lights.code
     row[:, EMISSION : EMISSION + 3] = shading.emission[material]
-    # Not asked of the lights: light that aiming forgets is found by rays that hit it.
+    # From the materials, not from the light table: an emitter missing there is still found by rays that hit
+    # it.
     emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
     row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
     painted = shading.base_texture >= 0
@@ -206,12 +215,12 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
     kinds[:, :3] = shading.base
     kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
     kinds[:, 5] = shading.reflection_texture >= 0
-    min_offset_scale, most = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
-    return Surfaces(row, kinds, min_offset_scale, most, int(lambertian), int(row[:, TEXTURED].any()))
+    min_offset_scale, default_size = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
+    return Surfaces(row, kinds, min_offset_scale, default_size, int(lambertian), int(row[:, TEXTURED].any()))
 
 
 def _small_size(geometry: Geometry) -> float:
-    """Return twice the size, metres, of small triangles: a sky around a room does not count."""
+    """Return twice the size, metres, of small triangles: a quantile, to ignore large ones such as a sky."""
     if not len(geometry.triangle):
         return 1.0
     corner = geometry.position[geometry.triangle]

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays that wait until they fill a packet: rays to the same light together, of whichever paths."""
+"""Shadow rays, collected until they fill a packet: rays to the same light together, from any paths."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ _L = BLOCK_WIDTH
 
 @inner
 def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
-    """Trace packet k, add the light of rays that nothing blocks to their points, and empty it.
+    """Trace packet k, add the light of unblocked rays to their points, and empty the packet.
+
+    bins : packets, float32; filled : (BINS,) int64, rays in each; on : (8,) int32, working memory
 
     blend : of the path memory; out : (m, 3) float64
     """
@@ -47,14 +49,15 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
 @inner
 def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
-    """Put the lanes' rays to lights into packets, those to one light together; trace what is full.
+    """Put the lanes' rays to lights into packets, those to one light together; trace full packets.
 
+    s : blocks, float32; bins : packets, float32; on : (8,) int32, working memory; out : (m, 3) float64
     light : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
 
     Returns
     -------
     int
-        Rays, those included that have to wait.
+        Number of rays, pending ones included.
     """
     base = unsigned(base)
     n = 0
@@ -68,13 +71,13 @@ def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blen
             continue
         n += 1
         k = unsigned(light[lane] if n_lights <= BINS else light[lane] * BINS // n_lights)
-        place = unsigned(k * BIN_ROWS * _L + filled[k])
+        start = unsigned(k * BIN_ROWS * _L + filled[k])
         for a in range(3):
-            bins[place + (ORG_X + a) * _L] = s[here + (ORG_X + a) * _L]
-            bins[place + (DIR_X + a) * _L] = s[here + (TO_LIGHT + a) * _L]
-            bins[place + (BIN_VALUE + a) * _L] = s[here + (VALUE + a) * _L]
-        bins[place + TFAR * _L] = s[here + MAX_DISTANCE * _L]
-        bins[place + BIN_POINT * _L] = s[here + POINT * _L]
+            bins[start + (ORG_X + a) * _L] = s[here + (ORG_X + a) * _L]
+            bins[start + (DIR_X + a) * _L] = s[here + (TO_LIGHT + a) * _L]
+            bins[start + (BIN_VALUE + a) * _L] = s[here + (VALUE + a) * _L]
+        bins[start + TFAR * _L] = s[here + MAX_DISTANCE * _L]
+        bins[start + BIN_POINT * _L] = s[here + POINT * _L]
         filled[k] += 1
         if filled[k] == BLOCK_WIDTH:
             cast_packet(bins, filled, k, occluded, scene, blend, on, out)

@@ -1,8 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One vertex of a path: how a hit becomes one, the light aimed at from it, the direction that leaves it.
+"""One vertex of a path: made from a hit, aiming at a light, sampling the next direction.
 
-A path's numbers stand in column `lane` of `path` (see the row names), its surface in column `lane` of `row`
-(`bsdf`). Directions in `path` are world space; only `TO`, the direction back, is in the frame of the normal.
+The numbers of a path are in column `lane` of `path` (see the row names), those of its surface in column
+`lane` of `row` (see `bsdf`). Directions in `path` are in world space, except `TO`, the direction back along
+the path, which is in the frame of the normal.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ from baker.pathtracer.light_table import (
 from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
 from baker.trace.jit import inner
 
-# Rows of a path: place, direction it goes on, throughput, light collected, density of the last direction (0:
-# emission counts in full), geometric normal, frame (tangent, bitangent, normal), direction back, bounces, the
-# interpolated normal on the geometric one's side.
+# Rows of a path: position, next direction, throughput, collected light, density of the last direction (0: no
+# MIS weight for emission), geometric normal, frame (tangent, bitangent, shading normal), direction back along
+# the path, bounces, interpolated normal on the side of the geometric one.
 POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
     0,
     3,
@@ -56,16 +57,16 @@ POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
 N_ROWS = 32
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
-# Origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever is
-# less; but at least by sixteen float32 steps of either (as `kernels.surface` has it).
+# Ray origins are offset from the surface by this share of the largest coordinate or of the triangle's size,
+# whichever is less, but at least by sixteen float32 steps of either (as in `kernels.surface`).
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# Roulette begins after this many bounces and lets at most this share live on.
+# Bounces before Russian roulette starts, and the largest chance to survive.
 SURE, MOST = 3, 0.98
 
 
 @inner
 def set_frame(path, lane, nx, ny, nz):
-    """Write the frame around a unit shading normal."""
+    """Write the frame around a unit shading normal to path (N_ROWS, n) float64."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     path[FRAME, lane], path[FRAME + 1, lane], path[FRAME + 2, lane] = tx, ty, tz
     path[FRAME + 3, lane], path[FRAME + 4, lane], path[FRAME + 5, lane] = bx, by, bz
@@ -74,7 +75,7 @@ def set_frame(path, lane, nx, ny, nz):
 
 @inner
 def local(path, lane, dx, dy, dz):
-    """Return a world direction in the frame of the vertex."""
+    """Return a world direction in the frame of the vertex in path (N_ROWS, n) float64."""
     return (
         dx * path[FRAME, lane] + dy * path[FRAME + 1, lane] + dz * path[FRAME + 2, lane],
         dx * path[FRAME + 3, lane] + dy * path[FRAME + 4, lane] + dz * path[FRAME + 5, lane],
@@ -83,11 +84,11 @@ def local(path, lane, dx, dy, dz):
 
 
 @inner
-def place_off(path, lane, x, y, z, min_offset_scale, size):
+def offset_origin(path, lane, x, y, z, min_offset_scale, size):
     """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
 
     path : (N_ROWS, n) float64; min_offset_scale : metres, see `Surfaces`
-    size : metres, of the triangle, or `Surfaces.most`
+    size : metres, of the triangle, or `Surfaces.default_size`
     """
     far = max(abs(x), abs(y), abs(z))
     off = max(ROUNDING * max(far, size), OFFSET * min(max(far, min_offset_scale), size))
@@ -107,10 +108,11 @@ def size_of(corner, t):
 
 @inner
 def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
-    """Begin a path: at a white Lambertian point (light leaving it is E / pi), or as a ray.
+    """Start a path at a white Lambertian point, whose radiance is E / pi, or as a ray.
 
-    where, toward, normal : (3,) point, shading normal, geometric normal; or ray origin, direction, unused
-    sizes : `Surfaces.min_offset_scale` and `.most`
+    path : (N_ROWS, n) float64; row : (5, n) float64
+    where, toward, normal : (3,) position, shading normal, geometric normal; or ray origin, direction, unused
+    sizes : `Surfaces.min_offset_scale` and `.default_size`
     """
     for c in range(3):
         path[BETA + c, lane] = 1.0
@@ -127,14 +129,18 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
         path[NORMAL + a, lane] = normal[a]
         row[a, lane] = 1.0
     row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
-    place_off(path, lane, where[0], where[1], where[2], sizes[0], sizes[1])
+    offset_origin(path, lane, where[0], where[1], where[2], sizes[0], sizes[1])
     set_frame(path, lane, toward[0], toward[1], toward[2])
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = 0.0, 0.0, 1.0
 
 
 @inner
 def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian):
-    """Make the vertex of a hit; return False where the surface is black: its back, if it is one-sided."""
+    """Make a vertex of a hit; return False at the back of a one-sided surface, which is black.
+
+    path : (N_ROWS, n) float64; row : (5, n) float64; surface : (T, 32), material : (M, 8) float32, see
+        `Surfaces`
+    """
     b0 = 1.0 - u - v
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
     fx, fy, fz = surface[prim, FACE], surface[prim, FACE + 1], surface[prim, FACE + 2]
@@ -147,7 +153,7 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
     x = b0 * surface[prim, CORNER] + u * surface[prim, CORNER + 3] + v * surface[prim, CORNER + 6]
     y = b0 * surface[prim, CORNER + 1] + u * surface[prim, CORNER + 4] + v * surface[prim, CORNER + 7]
     z = b0 * surface[prim, CORNER + 2] + u * surface[prim, CORNER + 5] + v * surface[prim, CORNER + 8]
-    place_off(path, lane, x, y, z, min_offset_scale, size_of(surface, prim))
+    offset_origin(path, lane, x, y, z, min_offset_scale, size_of(surface, prim))
     nx = b0 * surface[prim, SHADING] + u * surface[prim, SHADING + 3] + v * surface[prim, SHADING + 6]
     ny = b0 * surface[prim, SHADING + 1] + u * surface[prim, SHADING + 4] + v * surface[prim, SHADING + 7]
     nz = b0 * surface[prim, SHADING + 2] + u * surface[prim, SHADING + 5] + v * surface[prim, SHADING + 8]
@@ -158,11 +164,11 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
     path[SHADED, lane], path[SHADED + 1, lane], path[SHADED + 2, lane] = nx, ny, nz
     glossy = lambertian == 0
     if glossy and nx * dx + ny * dy + nz * dz >= -GRAZE:
-        # The interpolated normal looks away: a glossy lobe would have no side to reflect from.
+        # The interpolated normal faces away from the viewer: use the geometric one for glossy lobes.
         nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
     set_frame(path, lane, nx, ny, nz)
     tx, ty, tz = local(path, lane, -dx, -dy, -dz)
-    # Lambert reflects alike in all directions: what the interpolated normal hides still shines.
+    # A Lambertian surface has the same radiance in all directions, also below the interpolated horizon.
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
     m = np.int64(surface[prim, MATERIAL])
     row[0, lane], row[1, lane], row[2, lane] = material[m, 0], material[m, 1], material[m, 2]
@@ -173,7 +179,10 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
 
 @inner
 def paint(row, lane, shading, prim, u, v, material, rgba):
-    """Apply textures and vertex colours at barycentrics (u, v) of a triangle; rgba : (4,) working memory."""
+    """Apply textures and vertex colours at barycentrics (u, v) of a triangle.
+
+    row : (5, n) float64; material : (M, 8) float32, see `Surfaces`; rgba : (4,) float64, working memory
+    """
     m = shading.material[prim]
     base_colour(shading, prim, m, u, v, rgba)
     for c in range(3):
@@ -187,7 +196,7 @@ def paint(row, lane, shading, prim, u, v, material, rgba):
 
 @inner
 def base_colour(shading, prim, m, u, v, out):
-    """Write what texture and vertex colours multiply a base colour by to `out` (4,)."""
+    """Write the product of base colour texture and vertex colour to `out` (4,)."""
     out[0] = out[1] = out[2] = 1.0
     if shading.base_texture[m] >= 0:
         s, t = uv_at(shading.base_uv, shading.triangle, prim, u, v)
@@ -212,9 +221,10 @@ def heuristic(own, other, power):
 def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
     """Aim at one light; return its number, or -1 if it cannot light the vertex.
 
+    path : (N_ROWS, n) float64; row : (5, n) float64; lights : `LightTable`
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) output, what the path collects if nothing is in the ray; ray : (6,) output, the ray, its
-    max_distance and, for a triangle, the barycentrics of its end (its texture is not looked up yet)
+    value : (3,) float64, output, light if unblocked, without the emitter's texture
+    ray : (6,) float64, output: unit direction, length, barycentrics of the point on an emitter
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -273,9 +283,10 @@ def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
 
 @inner
 def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
-    """Multiply `value` (3,) by the emission texture of triangle prim; rgba : (4,) working memory.
+    """Multiply `value` (3,) by the emission texture of triangle prim.
 
-    aimed : also by its alpha: rays that hit it know that already
+    rgba : (4,) float64, working memory
+    aimed : whether to multiply by alpha, too; rays that hit the triangle have accounted for it
     """
     m = shading.material[prim]
     there = opacity_at(shading, prim, u, v) if aimed else 1.0
@@ -290,14 +301,15 @@ def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
 
 @inner
 def scatter(path, row, lane, hemisphere, choice, u, w, weight):
-    """Choose the direction in which the path goes on; return False where it ends.
+    """Sample the next direction of a path; return False where it ends.
 
-    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers; weight : (3,) working memory
+    path : (N_ROWS, n) float64; row : (5, n) float64; weight : (3,) float64, working memory
+    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers
     """
     vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
     mirror = 0.0
     if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
-        # A mirror's direction cannot be found by chance.
+        # The direction of a mirror must be sampled with the BSDF.
         mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < SMOOTH else 0.0
     if hemisphere == 0 or choice < mirror:
         lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One vertex of eight paths at once on Lambertian surfaces, in loops that become vector code.
+"""One vertex of eight paths at once on Lambertian surfaces, in loops that the compiler vectorizes.
 
-Says for eight lanes in float32 what `vertex` says for one in float64: how a hit becomes a vertex, the light
-aimed at from it, the direction that leaves it. Nothing branches; what is not there is selected away.
+The same computations as in `vertex`, for eight lanes in float32: vertices from hits, aiming at lights,
+sampling the next direction. There are no branches; terms that do not apply are selected away.
 
-    light aimed at: beta albedo / pi cos L w / density       w = density / (density + cos / pi)   (balance)
-    direction: density cos / pi, beta becomes beta albedo
+    aiming: beta albedo / pi cos L w / density       w = density / (density + cos / pi)   (balance heuristic)
+    next direction: density cos / pi, beta becomes beta albedo
 """
 
 from __future__ import annotations
@@ -80,9 +80,10 @@ _L = BLOCK_WIDTH
 
 
 @inner
-def stand(s, base, lane, x, y, z, min_offset_scale, size):
-    """Write a ray origin just above (x, y, z) and the frame, for normals that are written already.
+def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
+    """Write a ray origin just above (x, y, z), and the frame of the normals that are in the lane.
 
+    s : blocks, float32
     min_offset_scale, size : float32, metres, see `vertex.place_off`
     """
     far = max(max(abs(x), abs(y)), abs(z))
@@ -102,7 +103,7 @@ def stand(s, base, lane, x, y, z, min_offset_scale, size):
 
 
 @inner
-def stand_lanes(s, base, min_offset_scale, most):
+def start_vertices(s, base, min_offset_scale, most):
     """Make vertices of the lanes' surface points.
 
     s : blocks, float32; min_offset_scale, most : float32, metres, see `Surfaces`
@@ -110,19 +111,19 @@ def stand_lanes(s, base, min_offset_scale, most):
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
         x, y, z = s[base + ORG_X * _L + lane], s[base + ORG_Y * _L + lane], s[base + ORG_Z * _L + lane]
-        stand(s, base, lane, x, y, z, min_offset_scale, most)
+        offset_and_frame(s, base, lane, x, y, z, min_offset_scale, most)
 
 
 @inner
 def edge_lane(s, base, lane, a):
-    """Return the larger one along axis a of the two edges from corner 0 of a lane's triangle."""
+    """Return the larger extent along axis a of the two edges from corner 0 of a lane's triangle."""
     at = base + _T + (CORNER + a) * _L + lane
     return max(abs(s[at + 3 * _L] - s[at]), abs(s[at + 6 * _L] - s[at]))
 
 
 @inner
 def weighted(s, base, column, lane, b, u, v):
-    """Return what a lane's triangle has at barycentrics (b, u, v), by three corners from a column on."""
+    """Interpolate a column of three corners of a lane's triangle at barycentrics (b, u, v)."""
     at = base + _T + column * _L + lane
     return (
         b * s[at] + u * s[at + 3 * _L] + v * s[at + 6 * _L],
@@ -133,8 +134,9 @@ def weighted(s, base, column, lane, b, u, v):
 
 @inner
 def arrive_lanes(s, base, min_offset_scale):
-    """Make the lanes' hits, whose triangles' rows have been copied, vertices; black backs end the path.
+    """Make vertices of the lanes' hits, whose triangles have been copied; black backs end the path.
 
+    s : blocks, float32
     min_offset_scale : float32, metres, see `Surfaces`
     """
     base = unsigned(base)
@@ -166,7 +168,7 @@ def arrive_lanes(s, base, min_offset_scale):
         s[base + (SHADED + 1) * _L + lane] = scale * (ny if bent else fy)
         s[base + (SHADED + 2) * _L + lane] = scale * (nz if bent else fz)
         size = max(max(edge_lane(s, base, lane, 0), edge_lane(s, base, lane, 1)), edge_lane(s, base, lane, 2))
-        stand(s, base, lane, x, y, z, min_offset_scale, size)
+        offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size)
 
 
 @inner
@@ -203,11 +205,12 @@ def aim_lanes(s, base, mode, power):
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
+        # Vector to the light
         u, w = s[base + U_LIGHT * _L + lane] - _ONE, s[base + W_LIGHT * _L + lane] - _ONE
         kind = s[base + _M + ROW_KIND * _L + lane]
         sky = kind == _SKY
         b1, b2 = triangle_barycentric(u, w)
-        # Lights without area have no edges; what is infinitely far does not depend on the place.
+        # Vector to a point on the light: edges are 0 for lights without area, `near` is 0 for parallel light.
         near = _ONE if kind < _PARALLEL else _ZERO
         dx = (
             s[base + _M + ROW_ORIGIN * _L + lane]
@@ -227,6 +230,7 @@ def aim_lanes(s, base, mode, power):
             + b2 * s[base + _M + (ROW_EDGE + 5) * _L + lane]
             - near * s[base + ORG_Z * _L + lane]
         )
+        # Cosine-weighted direction for the sky
         a, b, c = cosine_direction(u, w)
         tx, ty, tz = (
             s[base + TANGENT * _L + lane],
@@ -250,6 +254,7 @@ def aim_lanes(s, base, mode, power):
         length = math.sqrt(square)
         shrink = _ONE / length
         dx, dy, dz = dx * shrink, dy * shrink, dz * shrink
+        # Cosine and fall-off at the light
         at_light = -(
             dx * s[base + _M + ROW_NORMAL * _L + lane]
             + dy * s[base + _M + (ROW_NORMAL + 1) * _L + lane]
@@ -260,7 +265,7 @@ def aim_lanes(s, base, mode, power):
             base + _M + ROW_CONE_SCALE * _L + lane
         ]
         inside = min(max(inside, _ZERO), _ONE)
-        # One over the density per steradian; irradiance per intensity and chance of lights without area.
+        # Gain: 1 / density per steradian, or irradiance per intensity and chance for lights without area.
         here = dx * nx + dy * ny + dz * nz
         gain = s[base + _M + ROW_GAIN * _L + lane]
         area = kind == _EMITTER
@@ -274,6 +279,7 @@ def aim_lanes(s, base, mode, power):
             + dy * s[base + (NORMAL + 1) * _L + lane]
             + dz * s[base + (NORMAL + 2) * _L + lane]
         )
+        # MIS weight
         ratio = here * _INV_PI * gain
         ratio = ratio * ratio if power != 0 else ratio
         spread = area or sky
@@ -298,7 +304,7 @@ def aim_lanes(s, base, mode, power):
 
 @inner
 def scatter_lanes(s, base):
-    """Choose the directions in which the lanes' paths go on; others end."""
+    """Sample the next directions of the lanes' paths, with Russian roulette; s : blocks, float32."""
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
         u, w = s[base + U_DIRECTION * _L + lane] - _ONE, s[base + W_DIRECTION * _L + lane] - _ONE

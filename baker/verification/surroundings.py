@@ -210,7 +210,7 @@ def lifted(
     """Return places (n, k, 3) as (n k, 3), off their surface by what rounding needs."""
     position, face = position.reshape(-1, 3), face.reshape(-1, 3)
     far, sizes = np.abs(position).max(axis=1, keepdims=True), reference.surfaces
-    step = OFFSET * np.minimum(np.maximum(far, sizes.min_offset_scale), sizes.most)
-    step = np.maximum(step, ROUNDING * np.maximum(far, sizes.most))
+    step = OFFSET * np.minimum(np.maximum(far, sizes.min_offset_scale), sizes.default_size)
+    step = np.maximum(step, ROUNDING * np.maximum(far, sizes.default_size))
     lifted: NDArray[np.float64] = position + step * face
     return lifted

@@ -170,7 +170,7 @@ def verify(
     geometry = world_geometry(bake.scene, bake.atlas)
     pages = read_pages(bake, geometry, names)
     with build_reference(
-        bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads, buried=True
+        bake.scene, sky=bake.sky, lambertian=True, threads=settings.threads, find_solids=True
     ) as reference:
         traced = _trace(reference, bake, geometry, pages, names, settings, progress)
         points = traced.points

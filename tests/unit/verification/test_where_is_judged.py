@@ -21,7 +21,11 @@ SIZE = 64
 def surface(quads, size=SIZE):
     scene = quad_scene(quads)
     geometry = world_geometry(scene, quad_atlas(scene, size, inset=0.3))
-    return geometry, instance_map(geometry, 1, size), build_reference(scene, lambertian=True, buried=True)
+    return (
+        geometry,
+        instance_map(geometry, 1, size),
+        build_reference(scene, lambertian=True, find_solids=True),
+    )
 
 
 def judged(geometry, owner, step=1):
