@@ -57,7 +57,7 @@ MOON = LIGHT_KINDS.register("moon")(
 )
 '''
 BEACON = '''
-"""A beacon: I(w) = I max(cos, 0)^n (1 + cos(2 phi)) / 2, with a parameter n of its own."""
+"""A beacon: I(w) = I max(cos, 0)^n (1 + cos(phi - 0.7)) / 2, with a parameter n of its own."""
 
 import math
 
@@ -75,19 +75,23 @@ def frame(light):
     return axis, tangent, np.cross(axis, tangent)
 
 
+def turn(azimuth):
+    return 0.5 + 0.5 * np.cos(azimuth - 0.7)
+
+
 def beam(light, origin, normal, ray, weight):
     axis, tangent, bitangent = frame(light)
     ray[..., :3], ray[..., 3] = np.array(light.position) - origin, 0.9999
     length = np.linalg.norm(ray[..., :3], axis=-1)
     away = -ray[..., :3] / length[..., None]
     azimuth = np.arctan2(away @ bitangent, away @ tangent)
-    share = np.maximum(away @ axis, 0) ** light.parameters["sharpness"] * np.cos(azimuth) ** 2
+    share = np.maximum(away @ axis, 0) ** light.parameters["sharpness"] * turn(azimuth)
     weight[:] = np.maximum(-(away * normal).sum(axis=-1), 0) / length**2 * share
 
 
 def emission(light):
     cosine = np.linspace(0, 1, COSINES)[:, None] ** light.parameters["sharpness"]
-    table = cosine * np.cos(2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS) ** 2
+    table = cosine * turn(2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS)
     tangent = tuple(frame(light)[1])
     return EmissionProfile(light.position, light.direction, min_cosine=0.0, table=table, tangent=tangent)
 
@@ -182,11 +186,11 @@ def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
     (finding,) = (f for f in report.findings if f.code == "light-intensity")
     assert "the beacon light has 100 cd" in finding.message
 
-    # The same light, baked as another one, is found out.
-    text = BEACON.replace("* np.cos(azimuth) ** 2", "* 0.5")
+    # The same light, baked with azimuths the wrong way round, fails.
+    text = BEACON.replace("* turn(azimuth)", "* turn(-azimuth)")
     assert text != BEACON
-    monstrous = replace(LIGHT_KINDS.get("beacon"), fill=_fill_of(text))
-    LIGHT_KINDS._plugins["beacon"] = monstrous
+    mirrored = replace(LIGHT_KINDS.get("beacon"), fill=_fill_of(text))
+    LIGHT_KINDS._plugins["beacon"] = mirrored
     bake(lit_by(light), settings=SETTINGS, out=out, force=True)
     assert not verify(out, VerifySettings(texels=200, spp=64)).passed
 
@@ -204,7 +208,7 @@ def test_all_estimators_agree_on_a_tabulated_light(add_kind, estimator):
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
     view = RenderSettings(camera="0,1.5,3,0,0.2,0,40", width=8, height=6, spp=256)
     expected, found = (
-        render(lit_by(light), replace(view, estimator=name)).colour.mean(axis=(0, 1))
+        render(lit_by(light), view.model_copy(update={"estimator": name})).colour.mean(axis=(0, 1))
         for name in ("mis", estimator)
     )
     np.testing.assert_allclose(found, expected, rtol=0.02)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from baker.core.light_kind import LIGHT_KINDS, kind_of, kinds_by_gltf_type
 from baker.core.scene import PunctualLight
@@ -38,11 +39,15 @@ def directional_truth(point, normal):
     return np.maximum(-(normal @ DIRECTION), 0)
 
 
-# A new kind adds its own line.
+# A new kind adds its own line, and its parameters.
 TRUTH = {"point": point_truth, "spot": spot_truth, "directional": directional_truth}
 
 
+PARAMETERS = {}
+
+
 def light_of(kind, **more):
+    more["parameters"] = PARAMETERS.get(kind, {})
     return PunctualLight(kind, kind, 0, (1, 1, 1), tuple(POSITION), tuple(DIRECTION), INNER, OUTER, **more)
 
 
@@ -92,7 +97,7 @@ def test_a_record_agrees_with_what_its_light_does(name):
         assert described.get(changed, value) == value
     assert kind.has_position == ("position" in kind.describe(light))
     assert kind.has_direction == ("direction" in kind.describe(light))
-    assert kind.describe(light).keys() <= set(changes)
+    assert kind.describe(light).keys() <= {*changes, *light.parameters}
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
@@ -103,6 +108,18 @@ def test_what_is_written_is_read(name, range_):
     fields = kind.read(JsonObject(kind.write(light), "lights[0]", "a.gltf"), np.eye(3))
     default = {"range": math.inf, "inner_cone": 0.0, "outer_cone": math.pi / 4}
     assert kind.describe(replace(light, **default | dict(fields))) == kind.describe(light)
+
+
+def interpolated(profile, away, cosine):
+    """Return f of a tabulated profile in directions (..., 3)."""
+    rows, columns = profile.table.shape
+    low = profile.min_cosine
+    row = np.clip((cosine - low) / (1 - low), 0, 1) * (rows - 1)
+    side = np.cross(profile.axis, profile.tangent)
+    azimuth = np.arctan2(away @ side, away @ np.array(profile.tangent))
+    column = azimuth / (2 * np.pi) % 1 * columns
+    closed = np.concatenate([profile.table, profile.table[:, :1]], axis=1)
+    return map_coordinates(closed, [row, column], order=1) * (cosine >= low)
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
@@ -122,9 +139,10 @@ def test_the_profile_for_the_path_tracer_is_the_same_light(name, range_):
         share = np.ones_like(cosine)
         if profile.cone_scale is not None:
             share = np.clip((cosine - profile.min_cosine) * profile.cone_scale, 0, 1) ** 2
+        if profile.table is not None:
+            share = interpolated(profile, away / length[..., None], cosine)
         window = np.maximum(1 - (length**2 * profile.inverse_range) ** 2, 0)
         found = np.maximum(-(away * normal).sum(axis=-1), 0) / length**3 * share * window
-    assert profile.table is None
     np.testing.assert_allclose(found, expected, rtol=3e-5, atol=1e-6)
     assert (expected > 0).sum() > 20
 
