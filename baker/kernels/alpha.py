@@ -1,4 +1,4 @@
-"""How much of a surface is there, by the alpha of MASK and BLEND triangles.
+"""Opacity of MASK and BLEND triangles.
 
 alpha = factor * texture(base uv) * vertex alpha; MASK: 1 where it reaches the cutoff, else 0.
 """
@@ -13,17 +13,29 @@ from numpy.typing import NDArray
 from baker.kernels.textures import sample_alpha
 from baker.trace.jit import inner, larger, smaller
 
-# Columns of a row: image uv of corner 0, its two edges (2 each), factor times vertex alpha at corner 0 and
-# what corners 1 and 2 add to it, cutoff (-1: BLEND), texture (-1: none), connected surface (a whole number).
-UV, ALPHA, CUTOFF, TEXTURE, SURFACE = 0, 6, 9, 10, 11
+# Columns of a row. "Edge" columns hold the value at corner 1 or 2 minus that at corner 0:
+#
+#     UV, UV_EDGE_1, UV_EDGE_2            image uv (2 each)
+#     ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2   factor times vertex alpha
+#     CUTOFF                              of MASK; -1 for BLEND
+#     TEXTURE                             number in the `TexturePack`, -1 for none
+#     SURFACE                             connected surface of a BLEND triangle, a whole number
+UV, UV_EDGE_1, UV_EDGE_2, ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2, CUTOFF, TEXTURE, SURFACE = (
+    0, 2, 4, 6, 7, 8, 9, 10, 11
+)  # fmt: skip
+# The rest is unused: a row is 64 bytes.
 ROW_LENGTH = 16
 
 
 class AlphaTable(NamedTuple):
-    """The K triangles that let light through somewhere, one cache line each.
+    """The K triangles that let light through somewhere.
 
-    slot (T,) int32, row of each triangle of the scene or -1, (0,) if there are none at all;
-    row (K, 16) float32, see the column names.
+    Attributes
+    ----------
+    slot : (T,) int32
+        Row of each triangle of the scene, -1 for those that block everywhere; (0,) if all do.
+    row : (K, 16) float32
+        See the column names.
     """
 
     slot: NDArray[np.int32]
@@ -31,27 +43,40 @@ class AlphaTable(NamedTuple):
 
 
 def no_alpha() -> AlphaTable:
-    """Return the table of a scene in which everything blocks."""
+    """Return the table of a scene in which everything blocks.
+
+    Returns
+    -------
+    AlphaTable
+        Without rows.
+    """
     return AlphaTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
 @inner
 def opacity(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-def]
-    """Return how much of the surface of row k is there at barycentrics, 0 to 1; arrays: `TexturePack`."""
-    alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA + 1] + b2 * row[k, ALPHA + 2]
+    """Return the opacity of row k at barycentrics (b1, b2), 0 to 1.
+
+    row : (K, 16) float32, see `AlphaTable`
+    pixels (n, 4) float32, level (K, 16, 3) int64, wrap (K, 3) int64 : of a `TexturePack`
+    """
+    alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA_EDGE_1] + b2 * row[k, ALPHA_EDGE_2]
     if row[k, TEXTURE] >= np.float32(0.0):
-        u = np.float64(row[k, UV]) + b1 * row[k, UV + 2] + b2 * row[k, UV + 4]
-        v = np.float64(row[k, UV + 1]) + b1 * row[k, UV + 3] + b2 * row[k, UV + 5]
+        u = np.float64(row[k, UV]) + b1 * row[k, UV_EDGE_1] + b2 * row[k, UV_EDGE_2]
+        v = np.float64(row[k, UV + 1]) + b1 * row[k, UV_EDGE_1 + 1] + b2 * row[k, UV_EDGE_2 + 1]
         alpha *= sample_alpha(pixels, level, wrap, np.int64(row[k, TEXTURE]), u, v)
     if row[k, CUTOFF] >= np.float32(0.0):
-        # Weights of a lookup may add up to a hair less than 1: the comparison is one of float32.
+        # Compare as float32: the weights of a lookup may sum to slightly less than 1.
         return 1.0 if np.float32(alpha) >= row[k, CUTOFF] else 0.0
     return smaller(larger(alpha, 0.0), 1.0)
 
 
 @inner
 def opacity_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the same for triangle t of the scene, 1 if it blocks everywhere."""
+    """Return the opacity of triangle t of the scene at barycentrics (b1, b2), 1 if it blocks everywhere.
+
+    shading : Shading
+    """
     if len(shading.alpha.slot) == 0 or shading.alpha.slot[t] < 0:
         return 1.0
     pack = shading.pack

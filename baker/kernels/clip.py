@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Triangles cut by the square of a texel: area, and points uniform in what is left.
+"""Triangles clipped to the square of a texel: area of the polygon, and points uniform in it.
 
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
@@ -12,23 +12,26 @@ import numpy as np
 
 from baker.trace.jit import inner, larger, scratch, smaller
 
-# A triangle cut by four half-planes has at most seven corners; two spare rows for the cutting.
+# A triangle clipped by four half-planes has at most seven corners; clipping needs two more rows.
 MAX_CORNERS = 9
-# Memory of kernels for a triangle and for what is left of it, (3, 2) and (MAX_CORNERS, 2) float64.
+# Working memory of kernels: a triangle (3, 2) and a clipped polygon (MAX_CORNERS, 2), float64.
 new_triangle = scratch((3, 2), np.float64)
 new_polygon = scratch((MAX_CORNERS, 2), np.float64)
 
 
 @inner
 def clip_to_square(corner, x0, y0, out, spare):
-    """Cut a triangle (3, 2) by the unit square at (x0, y0); return the corner count of `out`.
+    """Clip a triangle to the unit square at (x0, y0); return the number of corners in `out`.
 
-    `out` and `spare` are (MAX_CORNERS, 2) float64 working memory.
+    corner : (3, 2) float64, texels
+    out : (MAX_CORNERS, 2) float64 output, corners relative to (x0, y0)
+    spare : (MAX_CORNERS, 2) float64, working memory
     """
     n = 3
     for i in range(3):
         out[i, 0] = corner[i, 0] - x0
         out[i, 1] = corner[i, 1] - y0
+    # Clip by x >= 0, x <= 1, y >= 0, y <= 1 in turn.
     for side in range(4):
         axis = side >> 1
         m = 0
@@ -56,7 +59,10 @@ def clip_to_square(corner, x0, y0, out, spare):
 
 @inner
 def polygon_area(corner, n):
-    """Return the area of the convex polygon of the first n corners (never negative)."""
+    """Return the unsigned area of a convex polygon.
+
+    corner : (MAX_CORNERS, 2) float64, of which the first n count
+    """
     twice = 0.0
     for i in range(1, n - 1):
         twice += abs(
@@ -68,7 +74,10 @@ def polygon_area(corner, n):
 
 @inner
 def polygon_point(corner, n, u, v):
-    """Return the point (x, y) that a uniform (u, v) of the unit square maps to, uniform in the polygon."""
+    """Map (u, v) of the unit square to a point (x, y), uniform in a convex polygon.
+
+    corner : (MAX_CORNERS, 2) float64, of which the first n count
+    """
     if n < 3:
         x = 0.0
         y = 0.0
@@ -93,7 +102,10 @@ def polygon_point(corner, n, u, v):
 
 @inner
 def square_touches(corner, x0, y0):
-    """Tell how a triangle (3, 2) meets the unit square at (x0, y0): 0 apart, 1 partly, 2 square inside."""
+    """Return how a triangle meets the unit square at (x0, y0): 0 apart, 1 in part, 2 square inside it.
+
+    corner : (3, 2) float64, texels
+    """
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]
     )
@@ -109,7 +121,7 @@ def square_touches(corner, x0, y0):
         base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
         if base + larger(nx, 0.0) + larger(ny, 0.0) < 0.0:
             return 0
-        # A triangle without area has no inner side: it touches what its line passes through.
+        # A triangle without area is a line: it touches the squares that it crosses.
         if twice == 0.0 and base + smaller(nx, 0.0) + smaller(ny, 0.0) > 0.0:
             return 0
         if base + smaller(nx, 0.0) + smaller(ny, 0.0) < 0.0:

@@ -1,7 +1,8 @@
-"""Emissive triangles: which one to sample from where, and with what density.
+"""Sampling of emissive triangles.
 
-Triangles are grouped into clusters of neighbours. For a tile of texels each cluster gets a chance
-that bounds its contribution (power, distance, facing); inside a cluster the chance follows power.
+Triangles are grouped into clusters of neighbours. A cluster is chosen in proportion to an estimate of its
+contribution to a tile of texels (power, distance, facing), then a triangle of it in proportion to its power,
+then a point uniform in its area.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 Conty Estevez and Kulla, Importance sampling of many lights with adaptive tree splitting, 2018.
@@ -21,23 +22,23 @@ from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Columns of an emitter's row: three corners, face normal, area, 1 if two-sided, chance inside its cluster,
-# running sum of these chances, cluster, radiance without texture, 1 if the texture has to be looked up, and
-# which part of a triangle it is: barycentrics b1, b2 of corner 0 and size (negative: turned; 1: all of it).
-CORNER, NORMAL, AREA, TWO_SIDED, SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = (
-    0,
-    9,
-    12,
-    13,
-    14,
-    15,
-    16,
-    17,
-    20,
-    21,
-)
+# Columns of an emitter's row:
+#
+#     CORNER, CORNER_1, CORNER_2   positions of the corners, metres (3 each)
+#     NORMAL                       unit face normal (3)
+#     AREA                         m2
+#     TWO_SIDED                    1 if the back emits, too, else 0
+#     SHARE                        probability of the emitter inside its cluster
+#     CUMULATIVE                   running sum of these probabilities, this one included
+#     CLUSTER                      a whole number
+#     RADIANCE                     RGB, cd/m2, without the texture (3)
+#     TEXTURED                     1 if the texture has to be looked up, 0 if not, or NO_CLOSED_FORM
+#     INSIDE                       part of its triangle: barycentrics b1, b2 of corner 0, then edge length as
+#                                  a share of the triangle's, negative for turned parts; whole: (0, 0, 1)
+CORNER, CORNER_1, CORNER_2, NORMAL, AREA, TWO_SIDED = 0, 3, 6, 9, 12, 13
+SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = 14, 15, 16, 17, 20, 21
 ROW_LENGTH = 24
-# Instead of 0 in TEXTURED: the radiance is the row's, but the emitter is always sampled.
+# Value of TEXTURED: the radiance is the row's, but the emitter is always sampled.
 NO_CLOSED_FORM = -1.0
 _three = scratch((3,), np.float64)
 
@@ -45,10 +46,28 @@ _three = scratch((3,), np.float64)
 class Emitters(NamedTuple):
     """M emissive triangles, or parts of textured ones, in C clusters.
 
-    row (M, 24) float32, see the column names; triangle (M,) int32, numbers in the scene, cluster
-    after cluster; first (C + 1,) int32; centre (C, 3), radius (C,), power (C,), axis (C, 3) float32;
-    spread (C,) float32, radians, pi for clusters with two-sided triangles; node (K, 4) int32, see
-    `emitter_at`; root (T,) int32, what each triangle of the scene is, in the same code.
+    Attributes
+    ----------
+    row : (M, 24) float32
+        Cluster after cluster, see the column names.
+    triangle : (M,) int32
+        Triangle of the scene that the emitter is, or is a part of.
+    first : (C + 1,) int32
+        Emitters of cluster c are first[c] to first[c + 1].
+    centre : (C, 3) float32
+        Of a sphere around the cluster, metres.
+    radius : (C,) float32
+        Of that sphere, metres.
+    power : (C,) float32
+        Sum of the emitters' powers.
+    axis : (C, 3) float32
+        Unit axis of a cone that holds the cluster's normals.
+    spread : (C,) float32
+        Half angle of that cone, radians; pi for clusters with two-sided triangles.
+    node : (K, 4) int32
+        Subdivisions of textured triangles, see `emitter_at`.
+    root : (T,) int32
+        Code of each triangle of the scene, see `emitter_at`.
     """
 
     row: NDArray[np.float32]
@@ -64,10 +83,19 @@ class Emitters(NamedTuple):
 
 
 class TileEmitters(NamedTuple):
-    """Emitters as a tile of texels samples them: `Emitters` with the chances of its clusters.
+    """Emitters with the probabilities of their clusters for one tile of texels.
 
-    row, triangle, first, node: see `Emitters`; chance, cumulative (C,) float32; apart (C,) uint8, 1 for
-    clusters that have samples of their own: rays that find them count also where all other light is complete.
+    Attributes
+    ----------
+    row, triangle, first, node : ndarray
+        See `Emitters`.
+    chance : (C,) float32
+        Probability of each cluster.
+    cumulative : (C,) float32
+        Running sum of `chance`.
+    apart : (C,) uint8
+        1 for clusters that are sampled apart from the others: rays that hit them count even at texels whose
+        light from all other emitters is complete.
     """
 
     row: NDArray[np.float32]
@@ -80,7 +108,20 @@ class TileEmitters(NamedTuple):
 
 
 def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitters:
-    """Return the emitters with the chances that points (m, w, 3) float32, metres, give their clusters."""
+    """Return the emitters with the probabilities of their clusters for a tile.
+
+    Parameters
+    ----------
+    emitters : Emitters
+        All emitters of the scene.
+    origin : (m, w, 3) float32, metres, world
+        Points of the tile's texels.
+
+    Returns
+    -------
+    TileEmitters
+        With `apart` 0.
+    """
     chance = np.zeros(len(emitters.power), np.float32)
     cumulative = np.zeros_like(chance)
     if len(chance) and len(origin):
@@ -92,9 +133,21 @@ def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitte
 
 
 def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
-    """Return what kernels have to know of materials: None if no emitter is textured and nothing has holes.
+    """Return the materials if emitters need them: any is textured, or any triangle lets light through.
 
-    Numba compiles them for None without what looks up textures.
+    Numba compiles kernels for None without texture lookups.
+
+    Parameters
+    ----------
+    emitters : Emitters
+        All emitters of the scene.
+    shading : Shading
+        Materials of the scene.
+
+    Returns
+    -------
+    Shading or None
+        `shading`, None if no emitter needs it.
     """
     varied = len(shading.alpha.slot) > 0 or (emitters.row[:, TEXTURED] > 0).any()
     return shading if varied else None
@@ -102,7 +155,10 @@ def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
 
 @inner
 def bounding_sphere(origin):  # type: ignore[no-untyped-def]
-    """Return x, y, z, radius of a sphere around points (m, w, 3): their box's centre and half diagonal."""
+    """Return centre x, y, z and radius of a sphere around points: their box's centre and half diagonal.
+
+    origin : (m, w, 3) float32, metres
+    """
     low, high = _three(), _three()
     for a in range(3):
         low[a], high[a] = 1.0e30, -1.0e30
@@ -117,27 +173,38 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 @kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
-    """Return the largest radius / distance of a cluster seen from points (m, w, 3); inf where one is met."""
+    """Return the largest radius / distance of a cluster as seen from points; inf if their spheres touch.
+
+    emitters : Emitters; origin : (m, w, 3) float32, metres
+    """
     x, y, z, radius = bounding_sphere(origin)
     widest = 0.0
     for c in range(len(emitters.power)):
         dx = x - emitters.centre[c, 0]
         dy = y - emitters.centre[c, 1]
         dz = z - emitters.centre[c, 2]
-        clear = math.sqrt(dx * dx + dy * dy + dz * dz) - radius
-        if clear <= emitters.radius[c]:
+        distance = math.sqrt(dx * dx + dy * dy + dz * dz) - radius
+        if distance <= emitters.radius[c]:
             return np.inf
-        widest = larger(widest, emitters.radius[c] / clear)
+        widest = larger(widest, emitters.radius[c] / distance)
     return widest
 
 
 @kernel
 def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
-    """Fill `chance` and `cumulative` (C,) float32 for points (m, w, 3), taken as their bounding sphere.
+    """Write the probabilities of clusters for points, which are replaced by their bounding sphere.
 
-    A cluster's chance is zero only if no point of the sphere can see the front of its triangles.
+        weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
+
+    `angle` is the smallest angle between a normal of the cluster and a direction to the sphere. A cluster's
+    probability is 0 only if no point of the sphere can see the front of its triangles. The lit ones share 5 %
+    of the probability evenly.
+
+    emitters : Emitters; origin : (m, w, 3) float32, metres
+    chance, cumulative : (C,) float32 output, see `TileEmitters`
     """
     x, y, z, radius = bounding_sphere(origin)
+    # Estimate the contribution of each cluster.
     total = 0.0
     n = len(chance)
     for c in range(n):
@@ -145,24 +212,25 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
         dy = y - emitters.centre[c, 1]
         dz = z - emitters.centre[c, 2]
         distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-        reach = radius + emitters.radius[c]
-        weight = emitters.power[c] / larger(distance * distance, reach * reach + 1.0e-12)
-        if distance > reach and emitters.spread[c] < 3.0:
+        touching = radius + emitters.radius[c]
+        weight = emitters.power[c] / larger(distance * distance, touching * touching + 1.0e-12)
+        if distance > touching and emitters.spread[c] < 3.0:
             facing = (
                 dx * emitters.axis[c, 0] + dy * emitters.axis[c, 1] + dz * emitters.axis[c, 2]
             ) / distance
             angle = (
                 math.acos(smaller(larger(facing, -1.0), 1.0))
                 - emitters.spread[c]
-                - math.asin(reach / distance)
+                - math.asin(touching / distance)
             )
             if angle >= 0.5 * math.pi:
                 weight = 0.0
             elif angle > 0.0:
-                # Never let a chance fall far below the others': the bound is rough.
+                # The bound is rough: no probability falls far below the others.
                 weight *= larger(math.cos(angle), 0.05)
         chance[c] = weight
         total += weight
+    # Normalise, mix with equal shares, and sum up.
     lit = 0
     for c in range(n):
         lit += chance[c] > 0.0
@@ -176,10 +244,12 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
 
 @inner
 def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untyped-def]
-    """Return an emitter's number, its density per m2, and what is left of the uniform number u.
+    """Choose an emitter by a uniform number u.
 
-    `row` and `first` are those of `Emitters`; `chance` and `cumulative` those of `cluster_chances`.
+    row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
+    Returns its number, the probability density of a point on it per m2, and u rescaled to [0, 1) for reuse.
     """
+    # Choose a cluster.
     n = len(cumulative)
     total = cumulative[n - 1]
     u *= total
@@ -193,6 +263,7 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
             low = middle + 1
     picked = chance[low]
     u = smaller(larger((u - (cumulative[low] - picked)) / picked, np.float32(0.0)), np.float32(0.9999999))
+    # Choose an emitter of the cluster.
     m = first[low]
     high = first[low + 1] - 1
     while m < high:
@@ -208,21 +279,27 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
 
 @inner
 def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
-    """Choose a triangle and a point (3,) on it; return emitter number, density per m2, b1, b2."""
+    """Choose an emitter and write a point on it.
+
+    row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
+    u, v : uniform numbers; point : (3,) output, metres
+    Returns emitter number, density per m2, and the barycentrics b1 and b2 on the emitter.
+    """
     m, density, u = choose_emitter(row, first, chance, cumulative, u)
     b1, b2 = triangle_barycentric(u, v)
     b0 = np.float32(1.0) - b1 - b2
     for a in range(3):
-        point[a] = b0 * row[m, a] + b1 * row[m, 3 + a] + b2 * row[m, 6 + a]
+        point[a] = b0 * row[m, CORNER + a] + b1 * row[m, CORNER_1 + a] + b2 * row[m, CORNER_2 + a]
     return m, density, b1, b2
 
 
 @inner
 def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the emitter at barycentrics of a triangle that is cut into parts, -1 where it is black.
+    """Return the emitter at barycentrics (b1, b2) of a triangle that may be subdivided, -1 where it is black.
 
-    code : what the triangle is: a row of `Emitters`, -1 for none, -2 - k for the four parts in node[k]: those
-        at the three corners, then the turned one in the middle, whose parts are of the same kinds
+    node : (K, 4) int32, see `Emitters`
+    code : of the triangle: m >= 0, it is emitter m; -1, it emits nothing; -2 - k, it is cut into four parts
+        whose codes are node[k]: at corners 0, 1, 2, then the turned one in the middle
     """
     while code < -1:
         k = -2 - code
@@ -241,13 +318,19 @@ def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def on_triangle(row, m, b1, b2):  # type: ignore[no-untyped-def]
-    """Return barycentrics of the scene's triangle from those of emitter m, which may be a part of it."""
+    """Return barycentrics on the scene's triangle from barycentrics (b1, b2) on emitter m, a part of it.
+
+    row : (M, 24) float32, see `Emitters`
+    """
     return row[m, INSIDE] + row[m, INSIDE + 2] * b1, row[m, INSIDE + 1] + row[m, INSIDE + 2] * b2
 
 
 @inner
 def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
-    """Return the density per m2 with which `sample_emitter` picks a point of emitter m."""
+    """Return the probability density per m2 with which `sample_emitter` chooses a point of emitter m.
+
+    row : (M, 24) float32, see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
+    """
     total = cumulative[len(cumulative) - 1]
     if total <= np.float32(0.0):
         return np.float32(0.0)
@@ -256,7 +339,10 @@ def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
 
 @inner
 def emitted_radiance(shading, t, b1, b2, out):  # type: ignore[no-untyped-def]
-    """Write the radiance (cd/m2) that triangle t emits at barycentrics to `out` (4,)."""
+    """Write the radiance that triangle t emits at barycentrics (b1, b2).
+
+    shading : Shading; out : (4,) float64 output, RGB, cd/m2, and one item of working memory
+    """
     m = shading.material[t]
     out[0] = out[1] = out[2] = 1.0
     if shading.emission_texture[m] >= 0:

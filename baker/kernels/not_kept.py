@@ -1,4 +1,4 @@
-"""Says when compiled kernels cannot be kept for the next run."""
+"""The warning for installs where compiled kernels cannot be kept for the next run."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from baker.kernels.surface import place_points
 
 
 def cache_warnings() -> list[SceneWarning]:
-    """Return a warning if compiled kernels cannot be kept for the next run."""
-    # One kernel answers for all: the folders are of one install.
+    """Return the warning `kernels-not-kept` if Numba has no folder to keep compiled kernels in.
+
+    Returns
+    -------
+    list of SceneWarning
+        Empty if kernels are kept.
+    """
+    # All kernels lie in the same install: one of them answers for all.
     if place_points._cache.cache_path is not None:
         return []
     message = (
-        "no folder can be written to keep compiled kernels in, so each run compiles them anew, for up to a"
+        "no folder can be written to keep compiled kernels in, so each run compiles them again, for up to a"
         " minute; make one writable: ~/.cache, or any, named by NUMBA_CACHE_DIR"
     )
     return [SceneWarning("kernels-not-kept", message)]

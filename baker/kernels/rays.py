@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Hemisphere rays of sixteen texels at a time, in loops that the compiler turns into vector code.
+"""Hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
 
-What depends on the texel's point only (origin and tangent frame) is kept by lane in rows of `frame`;
-per sample there remain the scrambles, the map to the hemisphere and a rotation. All rows lie at constant
-offsets, or the compiler could not know that they do not overlap.
+Values that depend on the texel's point only (origin and tangent frame) are kept by lane in rows of `frame`.
+Each sample then needs the scrambles, the map to the hemisphere and a rotation. All rows lie at constant
+offsets of one array, or the compiler could not prove that they do not overlap.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from baker.kernels.sampling import cosine_direction, hash_combine, tangent_frame
 from baker.trace.jit import inner, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, ORG_X, PACKET_WIDTH, TFAR
 
+# TFAR of rays without an end, metres.
 FAR = np.float32(1.0e30)
 # Rows of a frame: tangent, bitangent, normal (three each).
+_TANGENT, _BITANGENT, _NORMAL = 0, 3, 6
 FRAME_ROWS = 9
 # Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
 new_seeds = scratch((2 * PACKET_WIDTH,), np.uint32)
@@ -24,7 +26,10 @@ new_frame = scratch((FRAME_ROWS * PACKET_WIDTH,), np.float32)
 
 @inner
 def lane_seeds(first, lanes, salt, seeds):
-    """Write the two scramble seeds of items first to first + lanes to `seeds` (2 * 16,) uint32."""
+    """Write the scramble seeds of items `first` to `first + lanes`, for both dimensions of a sample.
+
+    salt : int, another one for each kind of rays; seeds : (2 * 16,) uint32 output
+    """
     for lane in range(lanes):
         seeds[lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt))
         seeds[PACKET_WIDTH + lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt + 1))
@@ -32,49 +37,57 @@ def lane_seeds(first, lanes, salt, seeds):
 
 @inner
 def load_frames(rays, frame, origin, normal, group, lanes, k):
-    """Write origins of point k of texels group to group + lanes to `rays`, tangent frames to `frame`.
+    """Write origins of point k of texels `group` to `group + lanes` to `rays`, tangent frames to `frame`.
 
-    origin, normal : (n, w, 3) float32; rays : (21 * 16,) float32; frame : (9 * 16,) float32
+    origin, normal : (n, w, 3) float32, metres, world, and unit
+    rays : (21 * 16,) float32 output, a packet; frame : (9 * 16,) float32 output
     """
     for lane in range(lanes):
         for a in range(3):
             rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[group + lane, k, a]
-            frame[(6 + a) * PACKET_WIDTH + lane] = normal[group + lane, k, a]
+            frame[(_NORMAL + a) * PACKET_WIDTH + lane] = normal[group + lane, k, a]
     for lane in range(PACKET_WIDTH):
         tx, ty, tz, bx, by, bz = tangent_frame(
-            frame[6 * PACKET_WIDTH + lane], frame[7 * PACKET_WIDTH + lane], frame[8 * PACKET_WIDTH + lane]
+            frame[_NORMAL * PACKET_WIDTH + lane],
+            frame[(_NORMAL + 1) * PACKET_WIDTH + lane],
+            frame[(_NORMAL + 2) * PACKET_WIDTH + lane],
         )
-        frame[lane], frame[PACKET_WIDTH + lane], frame[2 * PACKET_WIDTH + lane] = tx, ty, tz
-        frame[3 * PACKET_WIDTH + lane], frame[4 * PACKET_WIDTH + lane], frame[5 * PACKET_WIDTH + lane] = (
-            bx,
-            by,
-            bz,
-        )
+        frame[_TANGENT * PACKET_WIDTH + lane] = tx
+        frame[(_TANGENT + 1) * PACKET_WIDTH + lane] = ty
+        frame[(_TANGENT + 2) * PACKET_WIDTH + lane] = tz
+        frame[_BITANGENT * PACKET_WIDTH + lane] = bx
+        frame[(_BITANGENT + 1) * PACKET_WIDTH + lane] = by
+        frame[(_BITANGENT + 2) * PACKET_WIDTH + lane] = bz
 
 
 @inner
 def aim_lanes(rays, words, frame, seeds, first, second, shared, far):
     """Write the cosine-weighted directions of one sample into all lanes.
 
+    rays, words : (21 * 16,) float32 and uint32, the packet, one memory; directions, TFAR and GEOM_ID are set
+    frame : (9 * 16,) float32, from `load_frames`; seeds : (2 * 16,) uint32, from `lane_seeds`
     first, second : uint32, the sample's bit-reversed Sobol numbers; shared : uint32, see `sampling`
-    far : float32, reach in metres
+    far : float32, TFAR, metres
     """
     for lane in range(PACKET_WIDTH):
+        # Direction about +z, then into the frame: d = a tangent + b bitangent + c normal.
         u = texel_scramble(first, seeds[lane], shared)
         v = texel_scramble(second, seeds[PACKET_WIDTH + lane], shared)
         a, b, c = cosine_direction(u, v)
         rays[DIR_X * PACKET_WIDTH + lane] = (
-            a * frame[lane] + b * frame[3 * PACKET_WIDTH + lane] + c * frame[6 * PACKET_WIDTH + lane]
+            a * frame[_TANGENT * PACKET_WIDTH + lane]
+            + b * frame[_BITANGENT * PACKET_WIDTH + lane]
+            + c * frame[_NORMAL * PACKET_WIDTH + lane]
         )
         rays[DIR_Y * PACKET_WIDTH + lane] = (
-            a * frame[PACKET_WIDTH + lane]
-            + b * frame[4 * PACKET_WIDTH + lane]
-            + c * frame[7 * PACKET_WIDTH + lane]
+            a * frame[(_TANGENT + 1) * PACKET_WIDTH + lane]
+            + b * frame[(_BITANGENT + 1) * PACKET_WIDTH + lane]
+            + c * frame[(_NORMAL + 1) * PACKET_WIDTH + lane]
         )
         rays[DIR_Z * PACKET_WIDTH + lane] = (
-            a * frame[2 * PACKET_WIDTH + lane]
-            + b * frame[5 * PACKET_WIDTH + lane]
-            + c * frame[8 * PACKET_WIDTH + lane]
+            a * frame[(_TANGENT + 2) * PACKET_WIDTH + lane]
+            + b * frame[(_BITANGENT + 2) * PACKET_WIDTH + lane]
+            + c * frame[(_NORMAL + 2) * PACKET_WIDTH + lane]
         )
     for lane in range(PACKET_WIDTH):
         rays[TFAR * PACKET_WIDTH + lane] = far

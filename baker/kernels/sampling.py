@@ -1,9 +1,9 @@
 """Low-discrepancy numbers and the maps from the unit square to directions and triangles.
 
-Points are the first two Sobol dimensions (a (0,2)-sequence) under nested uniform (Owen) scrambling.
-The scramble of the first `shared` bits is the same for all texels, the rest differs from texel to
-texel: neighbouring texels' rays with the same sample number then point the same way (packets stay
-together), while each texel on its own still has a fully scrambled net.
+Points are the first two Sobol dimensions (a (0,2)-sequence) under nested uniform (Owen) scrambling. The first
+bits (`shared`) are scrambled alike for all texels, the others differently for each. So rays of neighbouring
+texels with the same sample number have similar directions, and packets stay coherent; each texel alone still
+has a fully scrambled net.
 
 Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
 sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,
@@ -63,11 +63,11 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
 
 @inner
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
-    """Return a number in [0, 1): the shared bits kept, the rest scrambled with the texel's seed.
+    """Return a float32 in [0, 1): shared bits kept, the others scrambled with the texel's seed.
 
-    `shared_reversed` is the bit-reversed, globally scrambled Sobol number; `mask` has the shared
-    bits (lowest in reversed order) set. Cut to 24 bits, not rounded: rounding up moves a number into the
-    next cell of its net now and then.
+    shared_reversed : uint32, globally scrambled Sobol number, bit-reversed
+    mask : uint32, the shared bits, lowest in reversed order
+    Truncated to 24 bits: rounding up would move some numbers into the next cell of their net.
     """
     y = scramble_reversed(shared_reversed, seed)
     y = _u((y & _u(~mask)) | (shared_reversed & mask))
@@ -75,9 +75,21 @@ def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
 
 
 def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]:
-    """Return (n, 2) uint32: a globally scrambled (0,2)-sequence, bit-reversed.
+    """Return a globally scrambled (0,2)-sequence, bit-reversed.
 
-    Different `dimension_pair` numbers give independently scrambled sequences, in the same order.
+    Parameters
+    ----------
+    n : int
+        Number of points.
+    seed : int
+        Seed of the scramble.
+    dimension_pair : int
+        Different numbers give independently scrambled sequences, in the same order.
+
+    Returns
+    -------
+    (n, 2) uint32
+        Numbers for `texel_scramble`.
     """
     number = np.arange(n, dtype=np.uint32)
     seeds = np.array([[_u(3 * dimension_pair)], [_u(3 * dimension_pair + 1)]])
@@ -90,22 +102,34 @@ def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]
 
 
 def shared_bits_mask(n_samples: int) -> np.uint32:
-    """Return the mask of bits shared by all texels: one point in each shared cell, at most 16 x 16 cells."""
+    """Return the mask of bits that all texels share: one point in each shared cell, at most 16 x 16 cells.
+
+    Parameters
+    ----------
+    n_samples : int
+        Samples of a texel.
+
+    Returns
+    -------
+    uint32
+        `mask` of `texel_scramble`.
+    """
     return np.uint32((1 << min(int(math.log2(max(n_samples, 1))) // 2, 4)) - 1)
 
 
 @inner
 def cosine_direction(u, v):  # type: ignore[no-untyped-def]
-    """Map the unit square to the cosine-weighted hemisphere about +z; pdf = cos / pi.
+    """Map (u, v) of the unit square to a direction of the hemisphere about +z; pdf = cos / pi.
 
-    Concentric discs, lifted; sine and cosine of at most pi/4 by polynomials (error under 3e-7).
+    Concentric map to the disc, projected up. Sine and cosine of angles up to pi/4 are polynomials (error
+    under 3e-7).
     """
     a = np.float32(2.0) * u - np.float32(1.0)
     b = np.float32(2.0) * v - np.float32(1.0)
     wide = abs(a) > abs(b)
     r = a if wide else b
     other = b if wide else a
-    # No branch, so that loops over lanes can be vectorised; r = 0 only where `other` is 0, too.
+    # Without a branch, so that loops over lanes are vectorised; r = 0 only where `other` is 0, too.
     t = np.float32(0.78539816) * other / (r if r != np.float32(0.0) else np.float32(1.0))
     t2 = t * t
     c = np.float32(1.0) + t2 * (
@@ -123,7 +147,7 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
 
 @inner
 def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
-    """Return two unit vectors (six floats) that make a right-handed frame with the unit normal."""
+    """Return tangent and bitangent (six floats) that make a right-handed frame with a unit normal."""
     sign = np.float32(1.0) if nz >= np.float32(0.0) else np.float32(-1.0)
     a = np.float32(-1.0) / (sign + nz)
     b = nx * ny * a
@@ -135,7 +159,7 @@ def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
 
 @inner
 def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
-    """Map the unit square to uniform barycentrics (b1, b2) of a triangle, keeping strata compact.
+    """Map (u, v) of the unit square to barycentrics (b1, b2), uniform in a triangle, with compact strata.
 
     Based on: Heitz, A low-distortion map between triangle and square, 2019.
     """

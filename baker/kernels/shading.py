@@ -1,4 +1,4 @@
-"""Materials of all triangles, as kernels take them."""
+"""Materials of all triangles, as kernels read them."""
 
 from __future__ import annotations
 
@@ -12,19 +12,32 @@ from baker.kernels.textures import TexturePack
 
 
 class Shading(NamedTuple):
-    """What kernels need to know of materials.
+    """Materials, textures and vertex colours of M materials, V lightmap vertices and T triangles.
 
     Attributes
     ----------
     pack : TexturePack
+        All textures.
     base, emission : (M, 3) float32
-    base_texture, emission_texture : (M,) int32, -1 for none
-    base_uv, emission_uv : (V, 2) float32, by lightmap vertex (of the material its triangles have)
-    colour : (V, 3) float32, linear vertex colour
-    triangle : (T, 3) int32, lightmap vertices; material : (T,) int32
+        Factors of base colour, and of emission in cd/m2; linear Rec.709.
+    base_texture, emission_texture : (M,) int32
+        Number of the texture in `pack`, -1 for none.
+    base_uv, emission_uv : (V, 2) float32
+        Image uv of each lightmap vertex, for the material of its triangles; (1, 2) if nothing is textured.
+    colour : (V, 3) float32
+        Linear vertex colour; (1, 3) if no mesh has any.
+    triangle : (T, 3) int32
+        Lightmap vertices.
+    material : (T,) int32
     alpha : AlphaTable
-    metallic, roughness : (M,) float32; reflection_texture (M,) int32 and reflection_uv (V, 2) float32 of the
-        texture that scales them (blue, green), only if asked for
+        Triangles that let light through.
+    metallic, roughness : (M,) float32
+        Factors.
+    reflection_texture : (M,) int32
+        Number of the texture that scales metallic (blue) and roughness (green), -1 for none. Only for
+        reflections: bakes leave the four arrays at their defaults or unused.
+    reflection_uv : (V, 2) float32
+        Its image uv.
     """
 
     pack: TexturePack

@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The surface as kernels see it, and the points in a texel that rays start from.
+"""The points of texels that rays start from, and the surface they lie on.
 
-Each texel has 16 points, uniform in the area that its triangles take of its square, stratified by a
-scrambled (0,2)-net. Points on low-poly curved surfaces are lifted to the surface that the shading
-normals suggest, so that no ray is lost behind a facet.
+Each texel has 16 points, uniform in the area of its square that triangles cover, stratified by a scrambled
+(0,2)-net. Points on low-poly curved surfaces are moved to the smooth surface that the shading normals imply
+(Hanika 2021), or a facet would shadow its neighbours at the terminator.
 
 Based on: Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021; Waechter and Binder, A
 fast and robust method for avoiding self-intersection, Ray Tracing Gems, 2019.
@@ -22,27 +22,54 @@ from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
-# Ray origins leave the surface by this share of the largest coordinate or of their triangle's size, whichever
-# is less; but by at least sixteen float32 steps of either: origins and hits lose one, modellers some.
+# Offset of ray origins along the face normal: OFFSET times the largest coordinate or the triangle's size,
+# whichever is less, but at least ROUNDING times the larger of both. That is sixteen float32 steps: rounding
+# of an origin and of a hit takes one each, vertices of faces meant to be coplanar differ by some.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# They also move so many of these steps towards the middle of their triangle (at most half the way).
+# Points near the border also move towards the centroid of their triangle: INWARD offsets, at most half way.
 INWARD = 2.0
-# Only points with a barycentric below this lie near the border.
+# A point is near the border if a barycentric is below this.
 BORDER = 0.01
-# Vertices whose normal leans further from the face (cosine) lift nothing: that is no smooth surface.
+# No shadow-terminator offset (Hanika 2021) from vertices whose normal deviates from the face normal by more
+# than this (cosine): a hard edge, not a smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
+# Rows of what `load_flat` writes: corner 0, edges 1 and 2, signed face normal, and the triangle's size (1).
+_CORNER, _EDGE_1, _EDGE_2, _NORMAL, _SIZE = 0, 1, 2, 3, 4
 _flat_row = scratch((5, 3), np.float64)
 
 
 class Surface(NamedTuple):
-    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` that make points.
+    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` that place points.
 
-    position, normal (V, 3) float32; uv (V, 2) float32; triangle (T, 3) int32; face_normal (T, 3)
-    float32; size int; pixel (n,) int64; front (n,) int32, the front entry of each; back (n,) bool;
-    first (n_front + 1,) int64; entry (m,) int32; entry_area (m,) float32; sobol_points (16, 2) uint32;
-    min_offset_scale float32, metres: no offset is computed from a smaller coordinate (but from smaller
-    triangles).
+    Attributes
+    ----------
+    position, normal : (V, 3) float32
+        Of lightmap vertices; metres, and unit shading normals.
+    uv : (V, 2) float32
+        Lightmap uv.
+    triangle : (T, 3) int32
+        Lightmap vertices.
+    face_normal : (T, 3) float32
+        Unit.
+    size : int
+        Width and height of a page, texels.
+    pixel : (n,) int64
+        Flat pixel of each texel entry.
+    front : (n,) int32
+        Front entry of each entry, itself for fronts.
+    back : (n,) bool
+        Whether the entry is the back of a double-sided surface.
+    first : (n_front + 1,) int64
+        Triangles of front entry i are first[i] to first[i + 1] of the next two.
+    entry : (m,) int32
+        Triangle.
+    entry_area : (m,) float32
+        Area of that triangle in the texel's square, texels.
+    sobol_points : (16, 2) uint32
+        Bit-reversed, of the points of a texel.
+    min_offset_scale : float32
+        Metres. Offsets are computed as if no largest coordinate were smaller.
     """
 
     position: NDArray[np.float32]
@@ -63,7 +90,10 @@ class Surface(NamedTuple):
 
 @inner
 def inverse_uv(uv, triangle, size, t):
-    """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f of triangle t for texel-space (x, y)."""
+    """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f, barycentrics of triangle t at texels (x, y).
+
+    uv : (V, 2) float32; triangle : (T, 3) int32; size : int, of a page
+    """
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     ax, ay = float(uv[i0, 0]) * size, float(uv[i0, 1]) * size
     bx, by = float(uv[i1, 0]) * size - ax, float(uv[i1, 1]) * size - ay
@@ -79,58 +109,75 @@ def inverse_uv(uv, triangle, size, t):
 
 @inner
 def offset_step(x, y, z, size, min_offset_scale):
-    """Return how far a ray origin at (x, y, z) leaves a triangle of this size, metres.
+    """Return the offset of a ray origin at (x, y, z) from its triangle, metres; see `OFFSET`.
 
-    size : largest edge component of the triangle; min_offset_scale : see `Surface`
+    size : largest edge component of the triangle, metres; min_offset_scale : see `Surface`
     """
     far = larger(larger(abs(x), abs(y)), abs(z))
     return larger(ROUNDING * larger(far, size), OFFSET * smaller(larger(far, min_offset_scale), size))
 
 
 @inner
-def place(p, m, face, triangle, min_offset_scale, t, b1, b2, flip, origin, normal, n, k):
-    """Write the ray origin and shading normal at barycentrics of triangle t to origin[n, k] and normal[n, k].
+def place_point(
+    position, shading, face, triangle, min_offset_scale, t, b1, b2, flip, origin, normal, n, k
+):  # fmt: skip
+    """Write the ray origin and the shading normal at barycentrics (b1, b2) of triangle t.
 
-    p, m : (V, 3) positions and shading normals; face : (T, 3) face normals; min_offset_scale : see `Surface`
+    position, shading : (V, 3) float32, metres, and unit shading normals; face : (T, 3) float32, face normals
+    triangle : (T, 3) int32; min_offset_scale : see `Surface`
+    flip : whether the point lies on the back
+    origin, normal : (N, K, 3) float32 output, items [n, k] are set; metres, and unit
     """
+    # Interpolate position and shading normal.
     b1 = smaller(larger(b1, 0.0), 1.0)
     b2 = smaller(larger(b2, 0.0), 1.0 - b1)
     b0 = 1.0 - b1 - b2
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
-    px = b0 * p[i0, 0] + b1 * p[i1, 0] + b2 * p[i2, 0]
-    py = b0 * p[i0, 1] + b1 * p[i1, 1] + b2 * p[i2, 1]
-    pz = b0 * p[i0, 2] + b1 * p[i1, 2] + b2 * p[i2, 2]
-    nx = b0 * m[i0, 0] + b1 * m[i1, 0] + b2 * m[i2, 0]
-    ny = b0 * m[i0, 1] + b1 * m[i1, 1] + b2 * m[i2, 1]
-    nz = b0 * m[i0, 2] + b1 * m[i1, 2] + b2 * m[i2, 2]
+    px = b0 * position[i0, 0] + b1 * position[i1, 0] + b2 * position[i2, 0]
+    py = b0 * position[i0, 1] + b1 * position[i1, 1] + b2 * position[i2, 1]
+    pz = b0 * position[i0, 2] + b1 * position[i1, 2] + b2 * position[i2, 2]
+    nx = b0 * shading[i0, 0] + b1 * shading[i1, 0] + b2 * shading[i2, 0]
+    ny = b0 * shading[i0, 1] + b1 * shading[i1, 1] + b2 * shading[i2, 1]
+    nz = b0 * shading[i0, 2] + b1 * shading[i1, 2] + b2 * shading[i2, 2]
     fx, fy, fz = float(face[t, 0]), float(face[t, 1]), float(face[t, 2])
     sign = -1.0 if flip else 1.0
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     facing = nx * fx + ny * fy + nz * fz
+    # Use the face normal where the shading normal is no direction or points to the other side; else move the
+    # point by the mean of its distances below the tangent planes of the vertices (Hanika 2021).
     lx = ly = lz = 0.0
     if length < 1.0e-6 or facing <= 0.0:
         nx, ny, nz, length = fx, fy, fz, 1.0
     elif not flip and facing < 0.99999 * length:
-        # Project onto the tangent planes of the three vertices that the point lies below.
         for i in range(3):
             vertex = i0 if i == 0 else (i1 if i == 1 else i2)
             weight = b0 if i == 0 else (b1 if i == 1 else b2)
-            vx, vy, vz = float(m[vertex, 0]), float(m[vertex, 1]), float(m[vertex, 2])
-            below = (px - p[vertex, 0]) * vx + (py - p[vertex, 1]) * vy + (pz - p[vertex, 2]) * vz
+            vx, vy, vz = float(shading[vertex, 0]), float(shading[vertex, 1]), float(shading[vertex, 2])
+            below = (
+                (px - position[vertex, 0]) * vx
+                + (py - position[vertex, 1]) * vy
+                + (pz - position[vertex, 2]) * vz
+            )
             if below < 0.0 and vx * fx + vy * fy + vz * fz > STEEPEST:
                 lx -= weight * below * vx
                 ly -= weight * below * vy
                 lz -= weight * below * vz
+    # Offset along the face normal.
     size = 0.0
     for a in range(3):
-        size = larger(size, larger(abs(float(p[i1, a]) - p[i0, a]), abs(float(p[i2, a]) - p[i0, a])))
+        size = larger(
+            size,
+            larger(
+                abs(float(position[i1, a]) - position[i0, a]), abs(float(position[i2, a]) - position[i0, a])
+            ),
+        )
     step = offset_step(px, py, pz, size, min_offset_scale)
     away = sign * step
     if smaller(smaller(b0, b1), b2) < BORDER:
-        # Also along the face: rounding must not put a point of its border behind the wall that meets it.
-        mx = (p[i0, 0] + p[i1, 0] + p[i2, 0]) / 3.0 - px
-        my = (p[i0, 1] + p[i1, 1] + p[i2, 1]) / 3.0 - py
-        mz = (p[i0, 2] + p[i1, 2] + p[i2, 2]) / 3.0 - pz
+        # Offset along the face, too: rounding may put a point of its border behind a wall that meets it.
+        mx = (position[i0, 0] + position[i1, 0] + position[i2, 0]) / 3.0 - px
+        my = (position[i0, 1] + position[i1, 1] + position[i2, 1]) / 3.0 - py
+        mz = (position[i0, 2] + position[i1, 2] + position[i2, 2]) / 3.0 - pz
         inward = smaller(INWARD * step / larger(math.sqrt(mx * mx + my * my + mz * mz), 1.0e-30), 0.5)
         lx += inward * mx
         ly += inward * my
@@ -145,54 +192,62 @@ def place(p, m, face, triangle, min_offset_scale, t, b1, b2, flip, origin, norma
 
 
 @inner
-def load_flat(p, m, face, triangle, t, sign, row):
-    """Tell if all of triangle t is shaded with its face normal.
+def load_flat(position, shading, face, triangle, t, sign, row):
+    """Return whether all of triangle t is shaded with its face normal; write the row of `place_flat_point`.
 
-    row : (5, 3) float64, becomes what `place_flat` needs: corner 0, the edges from it, the normal times sign,
-        the triangle's size
+    position, shading : (V, 3) float32, metres, and unit shading normals; face : (T, 3) float32, face normals
+    triangle : (T, 3) int32; sign : 1 for the front, -1 for the back
+    row : (5, 3) float64 output, see the row names
     """
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     along0 = along1 = along2 = 0.0
     for a in range(3):
-        along0 += m[i0, a] * face[t, a]
-        along1 += m[i1, a] * face[t, a]
-        along2 += m[i2, a] * face[t, a]
-        row[0, a] = p[i0, a]
-        row[1, a] = float(p[i1, a]) - p[i0, a]
-        row[2, a] = float(p[i2, a]) - p[i0, a]
-        row[3, a] = sign * face[t, a]
-        row[4, 0] = larger(0.0 if a == 0 else row[4, 0], larger(abs(row[1, a]), abs(row[2, a])))
+        along0 += shading[i0, a] * face[t, a]
+        along1 += shading[i1, a] * face[t, a]
+        along2 += shading[i2, a] * face[t, a]
+        row[_CORNER, a] = position[i0, a]
+        row[_EDGE_1, a] = float(position[i1, a]) - position[i0, a]
+        row[_EDGE_2, a] = float(position[i2, a]) - position[i0, a]
+        row[_NORMAL, a] = sign * face[t, a]
+        row[_SIZE, 0] = larger(
+            0.0 if a == 0 else row[_SIZE, 0], larger(abs(row[_EDGE_1, a]), abs(row[_EDGE_2, a]))
+        )
     return smaller(smaller(along0, along1), along2) > 0.999999
 
 
 @inner
-def place_flat(row, min_offset_scale, b1, b2, origin, normal, n, k):
-    """Do the work of `place` for a point inside a flat triangle, away from its border."""
-    px = row[0, 0] + b1 * row[1, 0] + b2 * row[2, 0]
-    py = row[0, 1] + b1 * row[1, 1] + b2 * row[2, 1]
-    pz = row[0, 2] + b1 * row[1, 2] + b2 * row[2, 2]
-    step = offset_step(px, py, pz, row[4, 0], min_offset_scale)
-    origin[n, k, 0] = px + step * row[3, 0]
-    origin[n, k, 1] = py + step * row[3, 1]
-    origin[n, k, 2] = pz + step * row[3, 2]
-    normal[n, k, 0] = row[3, 0]
-    normal[n, k, 1] = row[3, 1]
-    normal[n, k, 2] = row[3, 2]
+def place_flat_point(row, min_offset_scale, b1, b2, origin, normal, n, k):
+    """Do the same as `place_point` for a point inside a flat triangle, away from its border.
+
+    row : (5, 3) float64, from `load_flat`; min_offset_scale : see `Surface`
+    origin, normal : (N, K, 3) float32 output, items [n, k] are set; metres, and unit
+    """
+    px = row[_CORNER, 0] + b1 * row[_EDGE_1, 0] + b2 * row[_EDGE_2, 0]
+    py = row[_CORNER, 1] + b1 * row[_EDGE_1, 1] + b2 * row[_EDGE_2, 1]
+    pz = row[_CORNER, 2] + b1 * row[_EDGE_1, 2] + b2 * row[_EDGE_2, 2]
+    step = offset_step(px, py, pz, row[_SIZE, 0], min_offset_scale)
+    for a in range(3):
+        normal[n, k, a] = row[_NORMAL, a]
+    origin[n, k, 0] = px + step * row[_NORMAL, 0]
+    origin[n, k, 1] = py + step * row[_NORMAL, 1]
+    origin[n, k, 2] = pz + step * row[_NORMAL, 2]
 
 
 @kernel
-def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, bary):
-    """Write points of texel entries: origin and normal (m, w, 3) float32, world.
+def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_triangle, bary):
+    """Write points of texel entries.
 
-    mask : (n,) uint16, bit k is set where point k of a texel is not buried; a buried point is replaced
-    by one that is not, if the texel has any
-    chosen : (m,) int64, entries; wanted : (m or 1, w) uint8, which of their 16 points
-    hit_triangle (m, w) int32 and bary (m, w, 2) float32 say where on which triangle each lies; with no rows
-    they are left alone
+    surface : Surface
+    valid_points : (n,) uint16, bit k is set where point k of a texel is not inside geometry; another point of
+        the texel, if it has a valid one, replaces an invalid point
+    chosen : (m,) int64, entries; wanted : (m, w) uint8, which of their 16 points, (1, w) for the same of all
+    origin, normal : (m, w, 3) float32 output, metres, world, and unit
+    hit_triangle : (m, w) int32 output, triangle that each point lies on; (0, w): not wanted
+    bary : (m, w, 2) float32 output, barycentrics b1 and b2 on it
     """
     corner, cut, spare, flat_row = new_triangle(), new_polygon(), new_polygon(), _flat_row()
     located = len(hit_triangle) > 0
-    # Out of the tuple once: every access to a tuple's array costs an atomic reference count.
+    # Take the arrays out of the tuple once: each access costs an atomic reference count.
     position, shading, face = surface.position, surface.normal, surface.face_normal
     uv, triangle, sobol_points = surface.uv, surface.triangle, surface.sobol_points
     pixels, fronts, back = surface.pixel, surface.front, surface.back
@@ -206,6 +261,7 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
     sign = 1.0
     whole = flat = False
     for n in range(len(chosen)):
+        # Prepare an entry: its pixel, seeds, covered area, and the triangle if it is the only one.
         i = chosen[n]
         if n == 0 or i != chosen[n - 1]:
             pixel = pixels[i]
@@ -225,12 +281,14 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
             sign = -1.0 if back[i] else 1.0
             flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
         for w in range(wanted.shape[1]):
-            k = valid_point(mask[i], wanted[0 if same else n, w])
+            # Choose the point of the unit square.
+            k = valid_point(valid_points[i], wanted[0 if same else n, w])
             u = texel_scramble(sobol_points[k, 0], seed_x, full)
             v = texel_scramble(sobol_points[k, 1], seed_y, full)
             x = float(u)
             y = float(v)
             if not whole:
+                # Choose a triangle by area, and a point of its part inside the texel.
                 e = first
                 done = 0.0
                 while e < last - 1 and u * total >= done + entry_area[e]:
@@ -249,14 +307,15 @@ def place_points(surface, mask, chosen, wanted, origin, normal, hit_triangle, ba
                     x, y = cut[0, 0], cut[0, 1]
                 else:
                     x, y = polygon_point(cut, m, smaller(larger((u * total - done) / inside, 0.0), 1.0), v)
+            # Place it on the triangle.
             x += x0
             y += y0
             b1 = a * x + b * y + c
             b2 = d * x + g * y + h
             if flat and smaller(smaller(b1, b2), 1.0 - b1 - b2) >= BORDER:
-                place_flat(flat_row, min_offset_scale, b1, b2, origin, normal, n, w)
+                place_flat_point(flat_row, min_offset_scale, b1, b2, origin, normal, n, w)
             else:
-                place(
+                place_point(
                     position,
                     shading,
                     face,

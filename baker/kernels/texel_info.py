@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""What each texel is made of: centre, normal, area and albedo from the triangles inside it."""
+"""Centre, normal, area and albedo of texels, from the triangles inside their squares."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from baker.kernels.alpha import opacity_at
 from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygon_area
-from baker.kernels.surface import N_POINTS, inverse_uv, place, place_points
+from baker.kernels.surface import N_POINTS, inverse_uv, place_point, place_points
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, kernel, larger, scratch
 
-# Memory of the kernels below.
+# Working memory of the kernels.
 _vector, _vectors = scratch((1, 1, 3), np.float32), scratch((1, N_POINTS, 3), np.float32)
 _triangles, _barycentrics = scratch((1, N_POINTS), np.int32), scratch((1, N_POINTS, 2), np.float32)
 _rgba, _every, _chosen = scratch((4,), np.float64), scratch((1, N_POINTS), np.uint8), scratch((1,), np.int64)
@@ -22,17 +22,20 @@ _shares = scratch((N_POINTS,), np.float64)
 
 @kernel
 def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):
-    """Fill the geometry of front entries begin to end.
+    """Write area, centroid, position and normal of front entries `begin` to `end`.
 
-    triangle_scale : (T,) float32, m2 of surface per texel of uv
-    area : (n,) float32, m2; centroid : (n, 2) float32, of the covered part, texels from the centre
-    position, normal : (n, 3) float32, world, at that centroid
+    surface : Surface; triangle_scale : (T,) float32, m2 of surface per texel of area
+    area : (n,) float32 output, m2
+    centroid : (n, 2) float32 output, of the covered part of the square, texels from its centre
+    position, normal : (n, 3) float32 output, metres, world, and unit: the point at the centroid, on the
+        triangle with the largest part
     """
-    corner, cut, spare, spot, facing = new_triangle(), new_polygon(), new_polygon(), _vector(), _vector()
+    corner, cut, spare, point, facing = new_triangle(), new_polygon(), new_polygon(), _vector(), _vector()
     for i in range(begin, end):
         rest = surface.pixel[i] % (surface.size * surface.size)
         x0 = rest % surface.size
         y0 = rest // surface.size
+        # Sum area and first moment of the triangles' parts; find the largest part.
         total = metres = cx = cy = 0.0
         main = surface.entry[surface.first[i]]
         most = -1.0
@@ -55,9 +58,10 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
         centroid[i, 0] = cx / total - 0.5
         centroid[i, 1] = cy / total - 0.5
         area[i] = metres
+        # Place the centroid on the triangle with the largest part.
         a, b, c, d, g, h = inverse_uv(surface.uv, surface.triangle, surface.size, main)
         x, y = x0 + cx / total, y0 + cy / total
-        place(
+        place_point(
             surface.position,
             surface.normal,
             surface.face_normal,
@@ -67,19 +71,22 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
             a * x + b * y + c,
             d * x + g * y + h,
             False,
-            spot,
+            point,
             facing,
             0,
             0,
         )
         for axis in range(3):
-            position[i, axis] = spot[0, 0, axis]
+            position[i, axis] = point[0, 0, axis]
             normal[i, axis] = facing[0, 0, axis]
 
 
 @inner
 def _centroid(polygon, n):
-    """Return the area centroid of a convex polygon; the mean of its corners if it has no area."""
+    """Return the area centroid of a convex polygon, the mean of its corners if it has no area.
+
+    polygon : (MAX_CORNERS, 2) float64, of which the first n count
+    """
     total = polygon_area(polygon, n)
     x = y = 0.0
     if n == 0:
@@ -101,7 +108,10 @@ def _centroid(polygon, n):
 
 @inner
 def uv_at(uv, triangle, t, b1, b2):
-    """Interpolate a per-vertex (V, 2) uv at barycentrics of triangle t."""
+    """Interpolate uv at barycentrics (b1, b2) of triangle t.
+
+    uv : (V, 2) float32, by vertex; triangle : (T, 3) int32
+    """
     b0 = 1.0 - b1 - b2
     i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     return b0 * uv[i, 0] + b1 * uv[j, 0] + b2 * uv[k, 0], b0 * uv[i, 1] + b1 * uv[j, 1] + b2 * uv[k, 1]
@@ -109,7 +119,10 @@ def uv_at(uv, triangle, t, b1, b2):
 
 @inner
 def texel_footprint(surface, image_uv, t):
-    """Return the width in image uv of the part of a texel that one of its points stands for."""
+    """Return the width in image uv of a sixteenth of a texel's area, the share of each of its points.
+
+    surface : Surface; image_uv : (V, 2) float32, by vertex; t : triangle
+    """
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
     lightmap = abs(
         (surface.uv[j, 0] - surface.uv[i, 0]) * (surface.uv[k, 1] - surface.uv[i, 1])
@@ -123,11 +136,13 @@ def texel_footprint(surface, image_uv, t):
 
 
 @kernel
-def texel_albedo(surface, shading, free, begin, end, albedo, area):
-    """Write the mean linear base colour of front entries begin to end to `albedo` (n, 3) float32.
+def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
+    """Write the mean base colour of front entries `begin` to `end`, weighted by opacity.
 
-    Of surfaces that let light through, only what is there counts: `area` (n,) float32 is cut to its share.
-    free : (n,) uint16, all bits set
+    surface : Surface; shading : Shading
+    valid_points : (n,) uint16, all bits set
+    albedo : (n, 3) float32 output, linear Rec.709
+    area : (n,) float32, m2, multiplied by the mean opacity
     """
     origin, normal, hit, bary = _vectors(), _vectors(), _triangles(), _barycentrics()
     rgba, every, chosen, share = _rgba(), _every(), _chosen(), _shares()
@@ -137,19 +152,21 @@ def texel_albedo(surface, shading, free, begin, end, albedo, area):
     coloured = len(shading.colour) > 1
     any_alpha = len(shading.alpha.slot) > 0
     for i in range(begin, end):
+        # One material without texture, vertex colours and alpha: its factor is the albedo.
         first = shading.material[surface.entry[surface.first[i]]]
-        plain = not coloured
+        untextured = not coloured
         for e in range(surface.first[i], surface.first[i + 1]):
             m = shading.material[surface.entry[e]]
-            plain = plain and m == first and shading.base_texture[m] < 0
+            untextured = untextured and m == first and shading.base_texture[m] < 0
             if any_alpha:
-                plain = plain and shading.alpha.slot[surface.entry[e]] < 0
-        if plain:
+                untextured = untextured and shading.alpha.slot[surface.entry[e]] < 0
+        if untextured:
             for c in range(3):
                 albedo[i, c] = shading.base[first, c]
             continue
+        # Else average over the points of the texel.
         chosen[0] = i
-        place_points(surface, free, chosen, every, origin, normal, hit, bary)
+        place_points(surface, valid_points, chosen, every, origin, normal, hit, bary)
         for c in range(3):
             albedo[i, c] = 0.0
         if any_alpha:
@@ -158,7 +175,7 @@ def texel_albedo(surface, shading, free, begin, end, albedo, area):
                 share[k] = opacity_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
                 total += share[k]
             area[i] *= total / N_POINTS
-            # A texel of nothing but holes has the colour of its texture, for what it is worth.
+            # A texel without any opacity gets the unweighted mean.
             for k in range(N_POINTS):
                 share[k] = share[k] * N_POINTS / total if total > 0.0 else 1.0
         for k in range(N_POINTS):

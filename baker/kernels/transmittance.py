@@ -1,14 +1,19 @@
-"""What BLEND surfaces let through along rays.
+# mypy: disable-error-code="no-untyped-def"
+"""Transmittance of BLEND surfaces along rays.
 
-    T = (1 - a) lerp(1, c, a)
+    T = (1 - a) lerp(1, c, a)        a: alpha, c: colour of the surface
 
-is what a surface of alpha a and colour c lets through. Shadow rays are multiplied by T at each surface on
-their way (`alpha_filter`). For rays to the first hit, whether a ray passes is decided at the hit, with
-probability 1 - a; one that passed is multiplied by lerp(1, c, a) here. Embree asks about hits in no
-particular order, also about some behind the end of a ray: so the surfaces that colour light are a tree of
-their own, through which a second ray follows the first one as far as that got.
+Shadow rays: the filter function multiplies T at each surface on the way (`alpha_filter`).
 
-c = factor * texture(base uv) * vertex colour, each of its parts between 0 and 1.
+Rays to the first hit: at each hit the filter function lets the ray pass with probability 1 - a, and the light
+of one that passed is multiplied by lerp(1, c, a). Embree reports hits in no particular order, some of them
+behind the end of the ray. So the colours are multiplied along a second ray, which ends where the first one
+did, in a second tree that holds the BLEND triangles only.
+
+    c = factor * texture(base uv) * vertex colour, each clamped to [0, 1]
+
+Kernels call these functions with `blend`, a `BlendBuffers`, or None in scenes without BLEND surfaces: Numba
+then compiles them to nothing.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.alpha import ALPHA, TEXTURE, UV
+from baker.kernels.alpha import ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2, TEXTURE, UV, UV_EDGE_1, UV_EDGE_2
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, larger, smaller
 from baker.trace.packets import (
@@ -39,17 +44,23 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of a row: as of `alpha`, then factor times vertex colour at corner 0 and what corners 1 and 2 add
-# to it (3 each).
-COLOUR = 12
+# Columns of a row: those of `alpha`, then factor times vertex colour: at corner 0, and at corners 1 and 2
+# minus that (3 each).
+COLOUR, COLOUR_EDGE_1, COLOUR_EDGE_2 = 12, 15, 18
 ROW_LENGTH = 21
 
 
 class TransmittanceTable(NamedTuple):
-    """The K triangles that let a share of light through.
+    """The K BLEND triangles that let light through.
 
-    slot (T,) int32, row of each triangle of the scene or -1; row (K, 21) float32, see the column names;
-    coloured, whether any is not white.
+    Attributes
+    ----------
+    slot : (T,) int32
+        Row of each triangle of the scene, -1 for the others.
+    row : (K, 21) float32
+        See the column names.
+    coloured : bool
+        Whether any of them is not white.
     """
 
     slot: NDArray[np.int32]
@@ -58,16 +69,23 @@ class TransmittanceTable(NamedTuple):
 
 
 def no_transmittance() -> TransmittanceTable:
-    """Return the table of a scene in which nothing is BLEND."""
+    """Return the table of a scene without BLEND triangles.
+
+    Returns
+    -------
+    TransmittanceTable
+        Without rows.
+    """
     return TransmittanceTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
 @inner
-def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Trace sixteen shadow rays; `transmittance` then tells the transmittance of those that are not blocked.
+def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, spare_on, spare):
+    """Trace sixteen shadow rays; `transmittance` then returns T of those that are not blocked.
 
-    blend, scene, width, query, spare_on, spare : of a buffers; function : its `occluded`
-    on, rays, words : (16,) int32 and (21 * 16,) float32 and uint32, see `trace_lanes`
+    blend, scene, width, query : of `PacketBuffers`; function : its `occluded`
+    on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
+    spare_on, spare : packet memory of the native width, of `PacketBuffers`
     """
     if blend is None:
         trace_lanes(function, scene, width, query, on, rays, spare_on, spare)
@@ -81,10 +99,11 @@ def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, sp
 
 
 @inner
-def trace_shadow_packet(blend, function, scene, width, on, packet):  # type: ignore[no-untyped-def]
-    """Do the same for one packet, where it lies.
+def trace_shadow_packet(blend, function, scene, width, on, packet):
+    """Do the same for one packet, in place.
 
-    width : at most 16; packet : (12 * width or more,) float32
+    blend, scene, width : of `PacketBuffers`, width at most 16; function : its `occluded`
+    on : (width,) int32; packet : (12 * width or more,) float32
     """
     if blend is None:
         call_embree(function, on, scene, packet)
@@ -99,8 +118,8 @@ def trace_shadow_packet(blend, function, scene, width, on, packet):  # type: ign
 
 
 @inner
-def reset_transmittance(blend):  # type: ignore[no-untyped-def]
-    """Set what sixteen rays are multiplied by to 1, and forget the edges that they met."""
+def reset_transmittance(blend):
+    """Set the transmittance of sixteen rays to 1, and forget the edges they met."""
     colour, edges = blend.transmittance, blend.edges
     for j in range(3 * PACKET_WIDTH):
         colour[j] = _f(1.0)
@@ -109,33 +128,34 @@ def reset_transmittance(blend):  # type: ignore[no-untyped-def]
 
 
 @inner
-def filter_colour_at(row, k, pack, b1, b2, rgba, out):  # type: ignore[no-untyped-def]
-    """Write lerp(1, c, a) of row k at barycentrics to `out` (3,), and return a.
+def filter_colour_at(row, k, pack, b1, b2, rgba, out):
+    """Write lerp(1, c, a) of row k at barycentrics (b1, b2), and return a.
 
-    pack : TexturePack; rgba : (4,) float64, memory
+    row : (K, 21) float32, see `TransmittanceTable`; pack : TexturePack
+    rgba : (4,) float64, working memory; out : (3,) float32 output
     """
     rgba[0] = rgba[1] = rgba[2] = rgba[3] = 1.0
     if row[k, TEXTURE] >= _f(0.0):
-        u = np.float64(row[k, UV]) + b1 * row[k, UV + 2] + b2 * row[k, UV + 4]
-        v = np.float64(row[k, UV + 1]) + b1 * row[k, UV + 3] + b2 * row[k, UV + 5]
+        u = np.float64(row[k, UV]) + b1 * row[k, UV_EDGE_1] + b2 * row[k, UV_EDGE_2]
+        v = np.float64(row[k, UV + 1]) + b1 * row[k, UV_EDGE_1 + 1] + b2 * row[k, UV_EDGE_2 + 1]
         sample_texture(pack, np.int64(row[k, TEXTURE]), u, v, 0.0, rgba)
-    alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA + 1] + b2 * row[k, ALPHA + 2]
+    alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA_EDGE_1] + b2 * row[k, ALPHA_EDGE_2]
     alpha = smaller(larger(alpha * rgba[3], 0.0), 1.0)
     for c in range(3):
         colour = np.float64(row[k, COLOUR + c])
-        colour += b1 * row[k, COLOUR + 3 + c] + b2 * row[k, COLOUR + 6 + c]
+        colour += b1 * row[k, COLOUR_EDGE_1 + c] + b2 * row[k, COLOUR_EDGE_2 + c]
         out[c] = 1.0 - alpha * (1.0 - smaller(larger(colour * rgba[c], 0.0), 1.0))
     return alpha
 
 
 @inner
-def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Find the colours that sixteen rays passed, see `transmittance`; for blend None: nothing to do.
+def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare):
+    """Find the colours that sixteen rays have passed; `transmittance` then returns them.
 
-    blend, width : of a buffers; function : its `occluded`
+    blend, width : of `PacketBuffers`; function : its `occluded`
     on, rays : (16,) int32 and (21 * 16,) float32, the lanes as they were traced
     hits : `rays` as uint32 if they were traced to their first hit, None if to any
-    spare_on, spare : packet memory of the native width
+    spare_on, spare : packet memory of the native width, of `PacketBuffers`
     """
     if blend is None:
         return
@@ -146,14 +166,18 @@ def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare)
     for lane in range(PACKET_WIDTH):
         stop[lane] = NO_HIT
         if hits is not None and hits[GEOM_ID * PACKET_WIDTH + lane] != NO_HIT:
-            # Where the ray ends no light passed.
+            # The light starts at this hit: it did not pass the surface.
             stop[lane] = hits[PRIM_ID * PACKET_WIDTH + lane]
     _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, 0)
 
 
 @inner
-def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number):  # type: ignore[no-untyped-def]
-    """Do what `_trace_blend` does for sixteen rays; number : 0 or PASSES, see `packets`."""
+def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number):
+    """Call `_trace_blend` for sixteen rays, in packets of the native width.
+
+    on : (16,) int32; rays : (21 * 16,) float32; number : 0 or PASSES, see `packets`
+    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    """
     for first in range(0, PACKET_WIDTH, width):
         some = False
         for lane in range(width):
@@ -169,10 +193,11 @@ def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number
 
 
 @inner
-def trace_transmittance_packet(blend, function, width, on, packet, hits):  # type: ignore[no-untyped-def]
-    """Do the same for one packet, where it lies.
+def trace_transmittance_packet(blend, function, width, on, packet, hits):
+    """Do the same for one packet, in place.
 
-    width : at most 16; packet : (12 * width or more,) float32
+    blend, width : of `PacketBuffers`, width at most 16; function : its `occluded`
+    on : (width,) int32; packet : (12 * width or more,) float32
     hits : whether it was traced to first hits
     """
     if blend is None:
@@ -189,8 +214,12 @@ def trace_transmittance_packet(blend, function, width, on, packet, hits):  # typ
 
 
 @inner
-def _trace_blend(blend, function, width, on, packet, first):  # type: ignore[no-untyped-def]
-    """Trace a packet in the tree of BLEND triangles: the filter multiplies colours of rays `first` and on."""
+def _trace_blend(blend, function, width, on, packet, first):
+    """Trace a packet against the BLEND triangles.
+
+    The filter function multiplies the transmittance of rays `first` and on, and rejects every hit.
+    on : (width,) int32; packet : (12 * width or more,) float32
+    """
     words = packet.view(np.uint32)
     for lane in range(width):
         words[ID * width + lane] = np.uint32(first + lane + 1)
@@ -200,18 +229,21 @@ def _trace_blend(blend, function, width, on, packet, first):  # type: ignore[no-
 
 
 @inner
-def gather_turns(blend):  # type: ignore[no-untyped-def]
-    """Return in how many turns each gather ray brings its light, see `trace_gather`."""
+def gather_turns(blend):
+    """Return how often each gather ray is traced, see `trace_gather`."""
     return 1 if blend is None else 2
 
 
 @inner
-def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
+def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):
     """Trace sixteen gather rays to their first hit.
 
-    Where there are BLEND surfaces, in turn 0 rays stop at them by chance, with probability alpha: that finds
-    the light that these surfaces send. In turn 1 rays pass them all (but where alpha is 1), and find what is
-    behind with certainty.
+    With BLEND surfaces each ray is traced twice. In turn 0 it stops at them with probability alpha, which
+    finds the light that these surfaces send. In turn 1 it passes all of them (where alpha < 1) and always
+    finds the light behind, which is multiplied by T.
+    blend, scene, width, query : of `PacketBuffers`; intersect : its `intersect`
+    on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
+    spare_on, spare : packet memory of the native width, of `PacketBuffers`
     """
     if blend is None:
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
@@ -222,8 +254,11 @@ def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, s
 
 
 @inner
-def set_blend_rule(blend, words, number):  # type: ignore[no-untyped-def]
-    """Say of sixteen rays what BLEND surfaces are to them: 0, `packets.UNAWARE` or `packets.SOLID`."""
+def set_blend_rule(blend, words, number):
+    """Set how sixteen rays meet BLEND surfaces: 0, `packets.UNAWARE` or `packets.SOLID`.
+
+    words : (21 * 16,) uint32, the packet
+    """
     if blend is None:
         return
     for lane in range(PACKET_WIDTH):
@@ -231,8 +266,11 @@ def set_blend_rule(blend, words, number):  # type: ignore[no-untyped-def]
 
 
 @inner
-def any_stopped(blend, words):  # type: ignore[no-untyped-def]
-    """Tell whether any of sixteen rays stopped at a BLEND surface; True without such surfaces."""
+def any_stopped(blend, words):
+    """Return whether any of sixteen rays ended at a BLEND surface; True without such surfaces.
+
+    words : (21 * 16,) uint32, the packet
+    """
     if blend is None:
         return True
     found = False
@@ -242,11 +280,14 @@ def any_stopped(blend, words):  # type: ignore[no-untyped-def]
 
 
 @inner
-def trace_gather_transmittance(blend, turn, function, width, on, rays, words, spare_on, spare):  # type: ignore[no-untyped-def]
-    """Find what the light that gather rays bring in a turn is multiplied by, see `transmittance`.
+def trace_gather_transmittance(blend, turn, function, width, on, rays, words, spare_on, spare):
+    """Find the factors of the light that gather rays find in a turn, see `transmittance`.
 
-    In turn 0 rays that stopped at a BLEND surface bring its light in the colours of those passed before it.
-    In turn 1 the others bring theirs, multiplied by the transmittance of all BLEND surfaces on the way.
+    Turn 0: the colours passed before it for a ray that stopped at a BLEND surface, 0 for the others.
+    Turn 1: the transmittance of all BLEND surfaces on the way for the others, 0 for those.
+    blend, width : of `PacketBuffers`; function : its `occluded`
+    on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
+    spare_on, spare : packet memory of the native width, of `PacketBuffers`
     """
     if blend is None:
         return
@@ -263,16 +304,16 @@ def trace_gather_transmittance(blend, turn, function, width, on, rays, words, sp
 
 
 @inner
-def transmittance(blend, c, lane):  # type: ignore[no-untyped-def]
-    """Return the share of channel c that the light along a lane's ray kept, after it was traced."""
+def transmittance(blend, c, lane):
+    """Return the transmittance of channel c along a lane's ray, after it was traced."""
     if blend is None:
         return _f(1.0)
     return blend.transmittance[c * PACKET_WIDTH + lane]
 
 
 @inner
-def count_coloured(blend):  # type: ignore[no-untyped-def]
-    """Count the colours that lost some of their light; no ray met anything BLEND if that is 0."""
+def count_coloured(blend):
+    """Return how many transmittances of sixteen rays are below 1: 0 if none met a BLEND surface."""
     if blend is None:
         return 0
     colour = blend.transmittance

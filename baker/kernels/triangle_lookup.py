@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""From what a ray hit to the texel that lies there.
+"""The triangle table of a bake: one cache line a triangle, and the lookup from a hit to a lightmap texel.
 
 Every surface blocks light from both sides; the back of a one-sided surface is black.
 """
@@ -13,16 +13,35 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, larger, smaller
 
+# Columns of `TriangleLookup.row`:
+#
+#     UV                     lightmap uv of corner 0 (2)
+#     UV_EDGE_1, UV_EDGE_2   uv of corners 1 and 2 minus that of corner 0 (2 each)
+#     PAGE                   page of the atlas, a whole number
+#     DOUBLE_SIDED           1 if the back has texels of its own, else 0
+#     FACE_NORMAL            unit normal of the front, world (3)
+#     FACE_AREA              m2
+#     EMITTER                code of the triangle's emitters, see `emitters.emitter_at`; -1 for none
+#     MATERIAL               a whole number
+UV, UV_EDGE_1, UV_EDGE_2, PAGE, DOUBLE_SIDED = 0, 2, 4, 6, 7
+FACE_NORMAL, FACE_AREA, EMITTER, MATERIAL = 8, 11, 12, 13
+# Two columns are unused: a row is 64 bytes.
+ROW_LENGTH = 16
 # Answer of `hit_pixel` for the black back of a one-sided surface.
 BACK_FACE = -1
 
 
 class TriangleLookup(NamedTuple):
-    """What is looked up at a hit.
+    """Data of a triangle that a hit needs.
 
-    row (T, 16) float32, one cache line a triangle: lightmap uv of corner 0, its two edges (2 each), page,
-    1 if double-sided, face normal (3), area, emitter (see `emitters.emitter_at`) or -1, material, two spare;
-    size int, of a page in texels; n_pixels int, of all pages: backs are numbered behind them.
+    Attributes
+    ----------
+    row : (T, 16) float32
+        One row a triangle, see the column names.
+    size : int
+        Width and height of a page, texels.
+    n_pixels : int
+        Pixels of all pages. The back of pixel p is number p + n_pixels.
     """
 
     row: NDArray[np.float32]
@@ -30,23 +49,32 @@ class TriangleLookup(NamedTuple):
     n_pixels: int
 
 
-# The functions below take the table's arrays one by one: handing a tuple of arrays to a function costs
-# Numba an atomic reference count per array and call, which tripled the time of a hit.
+# The functions below take the arrays of `TriangleLookup` one by one: passing a tuple of arrays to a function
+# costs Numba an atomic reference count for each array and call, which tripled the time of a hit.
 @inner
 def front_facing(row, prim, dx, dy, dz):
-    """Tell whether a ray of direction d meets the front of the triangle."""
-    return row[prim, 8] * dx + row[prim, 9] * dy + row[prim, 10] * dz < np.float32(0.0)
+    """Return whether a ray of direction (dx, dy, dz) hits the front of triangle `prim`.
+
+    row : (T, 16) float32, see `TriangleLookup`
+    """
+    return row[prim, FACE_NORMAL] * dx + row[prim, FACE_NORMAL + 1] * dy + row[
+        prim, FACE_NORMAL + 2
+    ] * dz < np.float32(0.0)
 
 
 @inner
 def hit_pixel(row, size, n_pixels, prim, u, v, front):
-    """Return the flat pixel at barycentrics (u, v) of a triangle (+ n_pixels on its back), or BACK_FACE."""
-    if not front and row[prim, 7] == np.float32(0.0):
+    """Return the flat pixel at barycentrics (u, v) of triangle `prim`, or BACK_FACE.
+
+    row : (T, 16) float32; size, n_pixels : int, see `TriangleLookup`
+    front : whether the front was hit; n_pixels is added for the back of a double-sided triangle
+    """
+    if not front and row[prim, DOUBLE_SIDED] == np.float32(0.0):
         return np.int64(BACK_FACE)
-    x = (row[prim, 0] + u * row[prim, 2] + v * row[prim, 4]) * np.float32(size)
-    y = (row[prim, 1] + u * row[prim, 3] + v * row[prim, 5]) * np.float32(size)
+    x = (row[prim, UV] + u * row[prim, UV_EDGE_1] + v * row[prim, UV_EDGE_2]) * np.float32(size)
+    y = (row[prim, UV + 1] + u * row[prim, UV_EDGE_1 + 1] + v * row[prim, UV_EDGE_2 + 1]) * np.float32(size)
     last = np.int32(size - 1)
     column = np.int64(smaller(larger(np.int32(x), np.int32(0)), last))
     line = np.int64(smaller(larger(np.int32(y), np.int32(0)), last))
-    pixel = (np.int64(row[prim, 6]) * size + line) * size + column
+    pixel = (np.int64(row[prim, PAGE]) * size + line) * size + column
     return pixel if front else pixel + n_pixels

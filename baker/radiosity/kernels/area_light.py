@@ -3,8 +3,9 @@
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
-The balance heuristic leaves the rest to hemisphere rays that hit the same emitters. Where nothing is found
-to stand in between, the closed form takes the place of both (`polygon_light`).
+These are the light samples of the balance heuristic; hemisphere rays that hit the same emitters are the other
+ones (`emitter_hit`). Where no shadow ray is blocked, the closed form replaces both (`polygon_light`).
+
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
 """
 
@@ -16,6 +17,9 @@ import numpy as np
 
 from baker.kernels.alpha import opacity_at
 from baker.kernels.emitters import (
+    CORNER,
+    CORNER_1,
+    CORNER_2,
     NORMAL,
     RADIANCE,
     TEXTURED,
@@ -36,16 +40,20 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, ORG_Y, ORG_Z, PACKET
 
 _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
-# Shadow rays end this share of their length before the light.
+# Shadow rays end at this share of their length, just before the light.
 _SHORT = np.float32(0.9999)
-# The closed form is used for up to one emitter for so many samples.
-_SAMPLES_AN_EMITTER = 8
-# Memory of `light_samples`.
-_rgba, _numbers, _lamps = (
-    scratch((4,), np.float64),
-    scratch((PACKET_WIDTH,), np.int64),
-    scratch((17 * PACKET_WIDTH,), _f),
-)
+# The closed form is used for at most one emitter for each of these samples of a texel.
+_SAMPLES_PER_EMITTER = 8
+# Early out: sixteen texels count as unoccluded if none of their first rays is blocked, and these are at least
+# so many a texel.
+_MIN_TESTS = 8
+# Rows of `sampled`, the emitters that lanes chose: corner 0, edges 1 and 2, normal (3 each), density per m2,
+# 1 if two-sided, radiance (3).
+_CORNER, _EDGE_1, _EDGE_2, _NORMAL, _DENSITY, _TWO_SIDED, _RADIANCE = 0, 3, 6, 9, 12, 13, 14
+_SAMPLED_ROWS = 17
+# Working memory of `light_samples`.
+_rgba, _numbers = scratch((4,), np.float64), scratch((PACKET_WIDTH,), np.int64)
+_sampled = scratch((_SAMPLED_ROWS * PACKET_WIDTH,), _f)
 _pairs, _vectors = scratch((2 * PACKET_WIDTH,), _f), scratch((3 * PACKET_WIDTH,), _f)
 _parts = scratch((N_POINTS, 6 * PACKET_WIDTH), _f)
 
@@ -58,7 +66,11 @@ def mis_weighted(cosine, density, n_light, n_hemisphere):
 
 @inner
 def load_points(rays, facing, origin, normal, group, lanes, k):
-    """Write origins of point k of texels group to group + lanes to `rays`, normals to `facing` (3 * 16,)."""
+    """Write origins of point k of texels `group` to `group + lanes` to `rays`, normals to `facing`.
+
+    rays : (21 * 16,) float32 output, a packet; facing : (3 * 16,) float32 output
+    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    """
     for lane in range(lanes):
         for a in range(3):
             rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[group + lane, k, a]
@@ -66,13 +78,14 @@ def load_points(rays, facing, origin, normal, group, lanes, k):
 
 
 @inner
-def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, lamp):
-    """Choose an emitter for every lane and copy what is needed of it.
+def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, sampled):
+    """Choose an emitter for every lane and copy its data.
 
-    row, starts, chance, cumulative : see `emitters.TileEmitters`
+    row (M, 24), starts (C + 1,), chance, cumulative (C,) : see `emitters.TileEmitters`
     first, second : uint32, the sample's bit-reversed Sobol numbers
-    uv : (2 * 16,) float32, place on the emitter; chosen : (16,) int64
-    lamp : (17 * 16,) float32: corner 0, edges, normal, density per m2, 1 if two-sided, radiance
+    seeds : (2 * 16,) uint32, see `lane_seeds`; shared : uint32, see `sampling`
+    uv : (2 * 16,) float32 output, uniform numbers for the point on the emitter
+    chosen : (16,) int64 output, emitters; sampled : (17 * 16,) float32 output, see the row names
     """
     for lane in range(PACKET_WIDTH):
         uv[lane] = texel_scramble(first, seeds[lane], shared)
@@ -82,70 +95,81 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
         m, density, u = choose_emitter(row, starts, chance, cumulative, uv[lane])
         uv[lane] = u
         chosen[lane] = m
-        lamp[12 * PACKET_WIDTH + lane] = density
+        sampled[_DENSITY * PACKET_WIDTH + lane] = density
         same = same and m == chosen[0]
     if same:
-        # The rule: neighbouring texels share the first bits of their numbers.
+        # The usual case, since neighbouring texels share the first bits of their numbers: vector code.
         m = chosen[0]
         for a in range(3):
             for lane in range(PACKET_WIDTH):
-                lamp[a * PACKET_WIDTH + lane] = row[m, a]
-                lamp[(3 + a) * PACKET_WIDTH + lane] = row[m, 3 + a] - row[m, a]
-                lamp[(6 + a) * PACKET_WIDTH + lane] = row[m, 6 + a] - row[m, a]
-                lamp[(9 + a) * PACKET_WIDTH + lane] = row[m, NORMAL + a]
-                lamp[(14 + a) * PACKET_WIDTH + lane] = row[m, RADIANCE + a]
+                sampled[(_CORNER + a) * PACKET_WIDTH + lane] = row[m, CORNER + a]
+                sampled[(_EDGE_1 + a) * PACKET_WIDTH + lane] = row[m, CORNER_1 + a] - row[m, CORNER + a]
+                sampled[(_EDGE_2 + a) * PACKET_WIDTH + lane] = row[m, CORNER_2 + a] - row[m, CORNER + a]
+                sampled[(_NORMAL + a) * PACKET_WIDTH + lane] = row[m, NORMAL + a]
+                sampled[(_RADIANCE + a) * PACKET_WIDTH + lane] = row[m, RADIANCE + a]
         for lane in range(PACKET_WIDTH):
-            lamp[13 * PACKET_WIDTH + lane] = row[m, TWO_SIDED]
+            sampled[_TWO_SIDED * PACKET_WIDTH + lane] = row[m, TWO_SIDED]
         return
     for lane in range(PACKET_WIDTH):
         m = chosen[lane]
         for a in range(3):
-            lamp[a * PACKET_WIDTH + lane] = row[m, a]
-            lamp[(3 + a) * PACKET_WIDTH + lane] = row[m, 3 + a] - row[m, a]
-            lamp[(6 + a) * PACKET_WIDTH + lane] = row[m, 6 + a] - row[m, a]
-            lamp[(9 + a) * PACKET_WIDTH + lane] = row[m, NORMAL + a]
-            lamp[(14 + a) * PACKET_WIDTH + lane] = row[m, RADIANCE + a]
-        lamp[13 * PACKET_WIDTH + lane] = row[m, TWO_SIDED]
+            sampled[(_CORNER + a) * PACKET_WIDTH + lane] = row[m, CORNER + a]
+            sampled[(_EDGE_1 + a) * PACKET_WIDTH + lane] = row[m, CORNER_1 + a] - row[m, CORNER + a]
+            sampled[(_EDGE_2 + a) * PACKET_WIDTH + lane] = row[m, CORNER_2 + a] - row[m, CORNER + a]
+            sampled[(_NORMAL + a) * PACKET_WIDTH + lane] = row[m, NORMAL + a]
+            sampled[(_RADIANCE + a) * PACKET_WIDTH + lane] = row[m, RADIANCE + a]
+        sampled[_TWO_SIDED * PACKET_WIDTH + lane] = row[m, TWO_SIDED]
 
 
 @inner
-def aim_at_emitters(rays, facing, uv, lamp, n_light, first_n, second_n, weight):
-    """Write the shadow ray of every lane and its two weights; lanes that see no light get weight 0.
+def aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weight):
+    """Write the shadow ray of every lane and its MIS weights for both estimates.
 
-    uv : (2 * 16,) float32, becomes the barycentrics b1 and b2 on the emitter
-    n_light, first_n, second_n : float32, rays that share the work: shadow rays, hemisphere rays of both
-    estimates; weight : (2 * 16,) float32
+    rays : (21 * 16,) float32, a packet with origins; directions and TFAR are set
+    facing : (3 * 16,) float32, unit normals of the points
+    uv : (2 * 16,) float32, uniform numbers; replaced by the barycentrics b1 and b2 on the emitter
+    sampled : (17 * 16,) float32, see the row names
+    n_light, first_n, second_n : float32, numbers of light samples, and of hemisphere samples that each
+        estimate is weighted against
+    weight : (2 * 16,) float32 output, 0 for lanes whose point cannot see the emitter's front
     """
     for lane in range(PACKET_WIDTH):
+        # Sample a point on the emitter.
         b1, b2 = triangle_barycentric(uv[lane], uv[PACKET_WIDTH + lane])
-        dx = lamp[lane] + b1 * lamp[3 * PACKET_WIDTH + lane] + b2 * lamp[6 * PACKET_WIDTH + lane]
+        dx = (
+            sampled[_CORNER * PACKET_WIDTH + lane]
+            + b1 * sampled[_EDGE_1 * PACKET_WIDTH + lane]
+            + b2 * sampled[_EDGE_2 * PACKET_WIDTH + lane]
+        )
         dy = (
-            lamp[PACKET_WIDTH + lane]
-            + b1 * lamp[4 * PACKET_WIDTH + lane]
-            + b2 * lamp[7 * PACKET_WIDTH + lane]
+            sampled[(_CORNER + 1) * PACKET_WIDTH + lane]
+            + b1 * sampled[(_EDGE_1 + 1) * PACKET_WIDTH + lane]
+            + b2 * sampled[(_EDGE_2 + 1) * PACKET_WIDTH + lane]
         )
         dz = (
-            lamp[2 * PACKET_WIDTH + lane]
-            + b1 * lamp[5 * PACKET_WIDTH + lane]
-            + b2 * lamp[8 * PACKET_WIDTH + lane]
+            sampled[(_CORNER + 2) * PACKET_WIDTH + lane]
+            + b1 * sampled[(_EDGE_1 + 2) * PACKET_WIDTH + lane]
+            + b2 * sampled[(_EDGE_2 + 2) * PACKET_WIDTH + lane]
         )
         dx -= rays[ORG_X * PACKET_WIDTH + lane]
         dy -= rays[ORG_Y * PACKET_WIDTH + lane]
         dz -= rays[ORG_Z * PACKET_WIDTH + lane]
+        # Cosines at the texel and at the emitter.
         square = larger(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
         length = math.sqrt(square)
         cosine = (
             dx * facing[lane] + dy * facing[PACKET_WIDTH + lane] + dz * facing[2 * PACKET_WIDTH + lane]
         ) / length
         light = (
-            dx * lamp[9 * PACKET_WIDTH + lane]
-            + dy * lamp[10 * PACKET_WIDTH + lane]
-            + dz * lamp[11 * PACKET_WIDTH + lane]
+            dx * sampled[_NORMAL * PACKET_WIDTH + lane]
+            + dy * sampled[(_NORMAL + 1) * PACKET_WIDTH + lane]
+            + dz * sampled[(_NORMAL + 2) * PACKET_WIDTH + lane]
         )
         light = -light / length
-        light = abs(light) if lamp[13 * PACKET_WIDTH + lane] > _f(0.0) else light
+        light = abs(light) if sampled[_TWO_SIDED * PACKET_WIDTH + lane] > _f(0.0) else light
         seen = cosine > _f(0.0) and light > _f(1.0e-6)
-        steradian = lamp[12 * PACKET_WIDTH + lane] * square / larger(light, _f(1.0e-6))
+        # Density per steradian, and the balance heuristic.
+        steradian = sampled[_DENSITY * PACKET_WIDTH + lane] * square / larger(light, _f(1.0e-6))
         cosine = cosine if seen else _f(0.0)
         share = n_light * steradian
         weight[lane] = cosine / (share + first_n * cosine * _INV_PI)
@@ -160,46 +184,47 @@ def aim_at_emitters(rays, facing, uv, lamp, n_light, first_n, second_n, weight):
 
 @kernel
 def light_samples(
-    origin, normal, lamps, shading, buffers, begin, sobol_points, shared, hemisphere, exact, out, second
+    origin, normal, emitters, shading, buffers, begin, sobol_points, shared, hemisphere, analytic, out, second
 ):
-    """Add the light-sampled share of irradiance of texels, and return the number of shadow rays cast.
+    """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
-    Sixteen neighbouring texels first look: one ray from each of their points. If none of these up to 256
-    rays is blocked, no further one of theirs is cast: where a share p of the light is hidden, the error that
-    this can bring is p (1 - p)^256 of it on average, at most 0.15 %. A few even emitters then are not
-    sampled either: they shine by their closed form, and hemisphere rays have nothing to add.
+    Early out: sixteen neighbouring texels first trace one ray from each of their points. If none of these up
+    to 256 rays is blocked, their other rays are not traced, but count as unblocked. Where a share p of the
+    light is hidden, the expected error is p (1 - p)^256 of it, at most 0.15 %. If there are few emitters and
+    none is textured, the closed form replaces the samples of such texels, and hemisphere rays add nothing.
 
-    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    shading : from `emitters.needed_shading`
-    sobol_points : (n, 2) uint32, one row a shadow ray; shared : uint32 mask of bits that texels share
-    hemisphere : (2,) hemisphere rays to weigh against, one number for each column block of `out`
-    exact : (m,) uint8, set to 1 for texels whose light is complete in both estimates
-    out : (m, 6) float32, lx: two differently weighted estimates of RGB
-    second : (m,) float32, sum over 16 batches of the square of the first estimate's share
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
+    buffers : PacketBuffers; begin : number of the first texel, for its random numbers
+    sobol_points : (n, 2) uint32, one row a shadow ray; shared : uint32, see `sampling`
+    hemisphere : (2,) float64, hemisphere samples that each estimate is weighted against
+    analytic : (m,) uint8, set to 1 for texels whose light is complete in both estimates
+    out : (m, 6) float32, lx, added to: two estimates of RGB, which differ in their MIS weights
+    second : (m,) float32 output, sum over 16 batches of the square of the first estimate's share
     """
     n_samples = len(sobol_points)
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     spare_on, spare = buffers.valid, buffers.floats
-    row, triangle, starts = lamps.row, lamps.triangle, lamps.first
-    chance, cumulative = lamps.chance, lamps.cumulative
+    row, triangle, starts = emitters.row, emitters.triangle, emitters.first
+    chance, cumulative = emitters.chance, emitters.cumulative
     any_alpha = False
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
-    # One emitter in closed form at all points costs as much as some samples.
-    plain = len(row) * _SAMPLES_AN_EMITTER <= n_samples
-    for m in range(len(row) if plain else 0):
-        plain = plain and row[m, TEXTURED] == _f(0.0)
+    # Allow the closed form if emitters are few (one at all points costs as much as some samples), untextured
+    # and opaque. Alpha of other triangles is found by the early-out tests.
+    untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
+    for m in range(len(row) if untextured else 0):
+        untextured = untextured and row[m, TEXTURED] == _f(0.0)
         if shading is not None:
-            # Alpha of anything but the emitter is in the way, and found by the looks.
-            plain = plain and (not any_alpha or shading.alpha.slot[triangle[m]] < 0)
+            untextured = untextured and (not any_alpha or shading.alpha.slot[triangle[m]] < 0)
     found = _vectors()
     radiance = _rgba()
-    # Sums of one point's samples are short: float32; those of all points are not.
+    # Sums over the few samples of one point are float32, those over all points float64.
     part = _parts()
     uv, weight = _pairs(), _pairs()
-    chosen, lamp = _numbers(), _lamps()
+    chosen, sampled = _numbers(), _sampled()
     facing = _vectors()
     seeds = new_seeds()
     n_light, first_n, second_n = _f(n_samples), _f(hemisphere[0]), _f(hemisphere[1])
@@ -211,71 +236,67 @@ def light_samples(
         for k in range(N_POINTS):
             for j in range(6 * PACKET_WIDTH):
                 part[k, j] = _f(0.0)
-        looked = blocked = 0
-        if plain:
+        tested = blocked = 0
+        # Compute the closed form; without any light of it the texels are complete.
+        if untextured:
             unoccluded_irradiance(origin, normal, group, lanes, row, found)
             lit = False
             for j in range(3 * PACKET_WIDTH):
                 lit = lit or found[j] != _f(0.0)
             if not lit:
                 for lane in range(lanes):
-                    exact[group + lane] = 1
+                    analytic[group + lane] = 1
                 continue
+        # Round 0 traces one early-out test for each point, round 1 the other samples.
         for turn in range(rounds):
-            clear = turn == 1 and blocked == 0 and looked >= 8 * lanes
-            if clear and plain:
+            clear = turn == 1 and blocked == 0 and tested >= _MIN_TESTS * lanes
+            if clear and untextured:
                 break
             for k in range(N_POINTS):
                 start, end = -(-k * n_samples // N_POINTS), -(-(k + 1) * n_samples // N_POINTS)
                 if start == end:
                     continue
-                # Which of a point's samples looks first goes round, so that the looks are spread, too.
-                look = start + k % (end - start)
+                # Rotate which sample serves as the early-out test, so that these tests are stratified.
+                early_out = start + k % (end - start)
                 load_points(rays, facing, origin, normal, group, lanes, k)
                 for s in range(start, end):
-                    if rounds == 2 and (s == look) != (turn == 0):
+                    if rounds == 2 and (s == early_out) != (turn == 0):
                         continue
+                    # Sample the emitters.
                     choose_lanes(
-                        row,
-                        starts,
-                        chance,
-                        cumulative,
-                        sobol_points[s, 0],
-                        sobol_points[s, 1],
-                        seeds,
-                        shared,
-                        uv,
-                        chosen,
-                        lamp,
-                    )
-                    aim_at_emitters(rays, facing, uv, lamp, n_light, first_n, second_n, weight)
+                        row, starts, chance, cumulative, sobol_points[s, 0], sobol_points[s, 1], seeds,
+                        shared, uv, chosen, sampled,
+                    )  # fmt: skip
+                    aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weight)
                     asked = 0
                     for lane in range(PACKET_WIDTH):
                         on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
                         asked -= on[lane]
                     if shading is not None:
-                        # What is not there does not shine; rays that find an emitter know that already.
+                        # Weight by alpha: cut-out parts emit nothing. Gather rays already pass through them.
                         for lane in range(lanes if any_alpha else 0):
                             m = chosen[lane]
                             b1, b2 = on_triangle(row, m, uv[lane], uv[PACKET_WIDTH + lane])
-                            there = _f(opacity_at(shading, triangle[m], b1, b2))
-                            weight[lane] *= there
-                            weight[PACKET_WIDTH + lane] *= there
+                            alpha = _f(opacity_at(shading, triangle[m], b1, b2))
+                            weight[lane] *= alpha
+                            weight[PACKET_WIDTH + lane] *= alpha
                     if asked == 0:
                         continue
+                    # Trace the shadow rays; switch off the lanes whose ray is blocked.
                     if not clear:
                         trace_shadow_lanes(
                             buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare
                         )
                         cast += asked
-                        looked += asked
+                        tested += asked
                         for lane in range(PACKET_WIDTH):
                             hidden = on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                        # Where a pane is in the way, each ray has its own transmittance; where none is,
-                        # all are 1 and stay so for the rays that are not cast.
+                        # A BLEND surface on the way counts as a blocker: each ray has its own transmittance.
+                        # Without any, all are 1, and remain so for the rays that are not traced.
                         blocked += count_coloured(buffers.blend)
+                    # Look up the radiance of textured emitters.
                     if shading is not None:
                         for lane in range(lanes):
                             m = chosen[lane]
@@ -283,21 +304,23 @@ def light_samples(
                                 b1, b2 = on_triangle(row, m, uv[lane], uv[PACKET_WIDTH + lane])
                                 emitted_radiance(shading, triangle[m], b1, b2, radiance)
                                 for c in range(3):
-                                    lamp[(14 + c) * PACKET_WIDTH + lane] = radiance[c]
+                                    sampled[(_RADIANCE + c) * PACKET_WIDTH + lane] = radiance[c]
+                    # Add radiance times transmittance times weight to both estimates.
                     for c in range(3):
                         for lane in range(PACKET_WIDTH):
-                            light = lamp[(14 + c) * PACKET_WIDTH + lane] if on[lane] else _f(0.0)
+                            light = sampled[(_RADIANCE + c) * PACKET_WIDTH + lane] if on[lane] else _f(0.0)
                             light *= transmittance(buffers.blend, c, lane)
                             part[k, c * PACKET_WIDTH + lane] += light * weight[lane]
                             part[k, (3 + c) * PACKET_WIDTH + lane] += light * weight[PACKET_WIDTH + lane]
-        if plain and blocked == 0 and looked >= 8 * lanes and n_samples >= N_POINTS:
-            # No squares: there is no variance.
+        # Use the closed form where nothing is in the way. It has no variance: `second` stays.
+        if untextured and blocked == 0 and tested >= _MIN_TESTS * lanes and n_samples >= N_POINTS:
             for lane in range(lanes):
-                exact[group + lane] = 1
+                analytic[group + lane] = 1
                 for c in range(3):
                     out[group + lane, c] += found[c * PACKET_WIDTH + lane]
                     out[group + lane, 3 + c] += found[c * PACKET_WIDTH + lane]
             continue
+        # Else sum over the points.
         for lane in range(lanes):
             squares = 0.0
             for k in range(N_POINTS):
@@ -316,15 +339,24 @@ def light_samples(
 
 @inner
 def emitter_hit(
-    row, lamp, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
-):
-    """Return the factor that turns the radiance of a hit emitter into its share of irradiance (0: back)."""
+    row, emitter_row, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
+):  # fmt: skip
+    """Return the factor from the radiance of emitter m, hit by a hemisphere ray, to its share of irradiance.
+
+    row : (T, 16) float32, see `TriangleLookup`; prim : triangle hit
+    emitter_row (M, 24), chance, cumulative (C,) : see `emitters.TileEmitters`
+    dx, dy, dz : unit direction of the ray; nx, ny, nz : unit normal of the texel's point
+    distance : metres; n_light, n_hemisphere : samples of the balance heuristic
+    0 for the back of a one-sided emitter.
+    """
     front = front_facing(row, prim, dx, dy, dz)
-    if not front and lamp[m, TWO_SIDED] == _f(0.0):
+    if not front and emitter_row[m, TWO_SIDED] == _f(0.0):
         return 0.0
     cosine = dx * nx + dy * ny + dz * nz
-    light = abs(dx * lamp[m, NORMAL] + dy * lamp[m, NORMAL + 1] + dz * lamp[m, NORMAL + 2])
+    light = abs(
+        dx * emitter_row[m, NORMAL] + dy * emitter_row[m, NORMAL + 1] + dz * emitter_row[m, NORMAL + 2]
+    )
     if cosine <= 0.0 or light <= 1.0e-6:
         return 0.0
-    density = emitter_density(lamp, chance, cumulative, m) * distance * distance / light
+    density = emitter_density(emitter_row, chance, cumulative, m) * distance * distance / light
     return mis_weighted(cosine, density, n_light, n_hemisphere)

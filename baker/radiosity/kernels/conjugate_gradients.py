@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One step of the conjugate gradients that solve the radiosity equation, in one pass over memory per vector.
+"""One step of the conjugate gradient solver of the radiosity equation, in one pass over each vector.
 
 Based on: Saad, Iterative methods for sparse linear systems, 2003, algorithm 9.1.
 """
@@ -14,20 +14,23 @@ _three = scratch((3,), np.float64)
 
 
 @kernel
-def conjugate_step(product, albedo, weight, direction, exitance, rest, allowed, dark, active, size, worst):
-    """Advance the solution of (I - rho F) x = rest by one step, for each colour of its own.
+def conjugate_step(
+    product, albedo, weight, direction, exitance, residual, allowed, dark, active, size, worst
+):
+    """Advance the solution of (I - rho F) x = b by one step, for each colour apart.
 
     product : (P, 3) float64, F direction; overwritten
     albedo, weight : (P, 3) float64, rho and A / rho
-    direction, exitance, rest : (P, 3) float64, search direction, solution and residual; changed in place
-    allowed : (P, 3) float64, residual allowed, as a share of exitance
-    dark : (3,) float64, exitance that the residual is held against at least
-    active : (3,) uint8, colours to advance; set to 0 where the direction has no curvature left
-    size : (3,) float64, weighted squared norm of the residual; renewed
-    worst : (3,) float64 output, largest residual as a share of what is allowed
+    direction, exitance, residual : (P, 3) float64, search direction, solution and b - (I - rho F) x; updated
+    allowed : (P, 3) float64, allowed residual, as a share of exitance
+    dark : (3,) float64, least exitance that `allowed` refers to
+    active : (3,) uint8, colours to advance; set to 0 where the direction has no curvature
+    size : (3,) float64, weighted squared norm of the residual; updated
+    worst : (3,) float64 output, largest ratio of residual and allowed residual
     """
-    n = len(rest)
-    curvature, step, turn = _three(), _three(), _three()
+    n = len(residual)
+    curvature, step, ratio = _three(), _three(), _three()
+    # Apply I - rho F to the direction, and compute the step length.
     for i in range(n):
         for c in range(3):
             product[i, c] = direction[i, c] - albedo[i, c] * product[i, c]
@@ -37,21 +40,23 @@ def conjugate_step(product, albedo, weight, direction, exitance, rest, allowed, 
             active[c] = 0
         if active[c] != 0:
             step[c] = size[c] / curvature[c]
-            turn[c] = size[c]
+            ratio[c] = size[c]
             size[c] = worst[c] = 0.0
+    # Advance solution and residual, and find the largest residual.
     for i in range(n):
         for c in range(3):
             if active[c] == 0:
                 continue
             exitance[i, c] += step[c] * direction[i, c]
-            rest[i, c] -= step[c] * product[i, c]
-            size[c] += weight[i, c] * rest[i, c] * rest[i, c]
+            residual[i, c] -= step[c] * product[i, c]
+            size[c] += weight[i, c] * residual[i, c] * residual[i, c]
             light = allowed[i, c] * larger(exitance[i, c], dark[c])
-            # Not as a quotient: both are 0 where no light is.
-            if abs(rest[i, c]) > worst[c] * light:
-                worst[c] = abs(rest[i, c]) / light
+            # Compare products: both sides are 0 where there is no light.
+            if abs(residual[i, c]) > worst[c] * light:
+                worst[c] = abs(residual[i, c]) / light
+    # Choose the next direction.
     for c in range(3):
-        turn[c] = size[c] / turn[c] if active[c] != 0 else 0.0
+        ratio[c] = size[c] / ratio[c] if active[c] != 0 else 0.0
     for i in range(n):
         for c in range(3):
-            direction[i, c] = rest[i, c] + turn[c] * direction[i, c]
+            direction[i, c] = residual[i, c] + ratio[c] * direction[i, c]

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Finds which clusters of emitters the texels of a tile can see at all, by a few shadow rays."""
+"""Shadow rays that estimate which clusters of emitters the texels of a tile can see."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from baker.kernels.emitters import CUMULATIVE, NORMAL, TWO_SIDED
+from baker.kernels.emitters import CORNER, CORNER_1, CORNER_2, CUMULATIVE, NORMAL, TWO_SIDED
 from baker.kernels.sampling import hash_combine, triangle_barycentric
 from baker.kernels.surface import N_POINTS
 from baker.kernels.transmittance import trace_shadow_lanes
@@ -13,21 +13,25 @@ from baker.trace.jit import inner, kernel, smaller
 from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
-# Shadow rays end this share of their length before the light.
+# Shadow rays end at this share of their length, just before the light.
 _SHORT = np.float32(0.9999)
+# First of the hash inputs for the uniform numbers of a ray.
 _SALT = 77
 _INV_2_24 = np.float32(5.9604645e-08)
 
 
 @kernel
 def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen):
-    """Count the rays to each cluster that could carry light, and those that nothing blocks.
+    """Count the rays from blocks of texels to each cluster that could carry light, and the unblocked ones.
 
-    origin, normal : (m, 16, 3) float32, points of neighbouring texels
-    row, first : see `emitters.Emitters`
-    bounds : (B + 1,) int64, where blocks of texels begin; chosen : (C,) bool, clusters that are asked about
-    n_rays : rays from each block to each cluster; they start at points spread over the block
-    asked, seen : (B, C) int32 output
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of neighbouring texels
+    row (M, 24) float32, first (C + 1,) int32 : see `emitters.Emitters`
+    buffers : PacketBuffers
+    bounds : (B + 1,) int64, texels of block b are bounds[b] to bounds[b + 1]
+    chosen : (C,) bool, clusters to probe
+    n_rays : rays from each block to each cluster, from points spread over the block
+    asked : (B, C) int32 output, rays between a front of the surface and a side that emits
+    seen : (B, C) int32 output, those of them that nothing blocks
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query
@@ -38,6 +42,7 @@ def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, 
         for c in range(len(chosen)):
             asked[b, c] = seen[b, c] = 0
             for group in range(0, n_rays if chosen[c] else 0, PACKET_WIDTH):
+                # Aim a packet of rays, each from a point in its stratum of the block.
                 for lane in range(PACKET_WIDTH):
                     on[lane] = 0
                     r = group + lane
@@ -49,6 +54,7 @@ def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, 
                             rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, k, a]
                         on[lane] = _aim(rays, lane, normal, i, k, row, first[c], first[c + 1], code)
                         asked[b, c] -= on[lane]
+                # Trace it, and count the rays that nothing blocks.
                 trace_shadow_lanes(
                     buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare
                 )
@@ -59,12 +65,19 @@ def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, 
 
 @inner
 def _uniform(code, dimension):
+    """Return a float32 in [0, 1) that depends on a ray's number and the dimension."""
     return _f(hash_combine(code, np.uint32(_SALT + dimension)) >> np.uint32(8)) * _INV_2_24
 
 
 @inner
 def _aim(rays, lane, normal, i, k, row, start, end, code):
-    """Write a ray to a point of a cluster's emitters start to end; return -1 if light may come from there."""
+    """Write a ray to a point of emitters `start` to `end`; return -1 if light may arrive along it, else 0.
+
+    rays : (21 * 16,) float32, a packet with origins
+    normal : (m, 16, 3) float32, unit; the ray starts at point [i, k]
+    row : (M, 24) float32, see `emitters.Emitters`; code : uint32, number of the ray
+    """
+    # Choose an emitter of the cluster in proportion to its power.
     u = _uniform(code, 2)
     m, high = np.int64(start), np.int64(end) - 1
     while m < high:
@@ -73,15 +86,16 @@ def _aim(rays, lane, normal, i, k, row, start, end, code):
             high = middle
         else:
             m = middle + 1
+    # Sample a point on it.
     b1, b2 = triangle_barycentric(_uniform(code, 3), _uniform(code, 4))
     received = sent = _f(0.0)
     for a in range(3):
-        corner = row[m, a]
-        point = corner + b1 * (row[m, 3 + a] - corner) + b2 * (row[m, 6 + a] - corner)
-        way = point - rays[(ORG_X + a) * PACKET_WIDTH + lane]
-        rays[(DIR_X + a) * PACKET_WIDTH + lane] = way
-        received += way * normal[i, k, a]
-        sent -= way * row[m, NORMAL + a]
+        corner = row[m, CORNER + a]
+        point = corner + b1 * (row[m, CORNER_1 + a] - corner) + b2 * (row[m, CORNER_2 + a] - corner)
+        direction = point - rays[(ORG_X + a) * PACKET_WIDTH + lane]
+        rays[(DIR_X + a) * PACKET_WIDTH + lane] = direction
+        received += direction * normal[i, k, a]
+        sent -= direction * row[m, NORMAL + a]
     rays[TFAR * PACKET_WIDTH + lane] = _SHORT
     if row[m, TWO_SIDED] > _f(0.0):
         sent = abs(sent)

@@ -1,7 +1,7 @@
 # mypy: disable-error-code="no-untyped-def"
 """Form factors of patches by cosine-weighted rays, and products with their matrix.
 
-    F_ij = share of what leaves patch i that arrives at j = share of i's cosine rays that hit j
+    F_ij = share of what leaves patch i that arrives at j = share of i's cosine-weighted rays that hit j
 
 Based on: Malley, A shading method for computer generated images, 1988; Goral et al., Modeling the
 interaction of light between diffuse surfaces, 1984; Cohen and Wallace, Radiosity and realistic image
@@ -32,26 +32,29 @@ from baker.trace.packets import (
 
 # Targets of rays that hit no patch; SPLIT - s: the split texel in row s of the table of sides.
 LOST, SKY, SPLIT = -1, -2, -3
+# Columns of `tally`: rays that left the scene, rays lost on black backs or uncovered texels.
+ESCAPED, ABSORBED = 0, 1
 
 
 @kernel
 def cast_form_factors(
-    origin, normal, table, seen, buffers, begin, sobol_points, shared, target, tally, colour
+    origin, normal, lookup, seen, buffers, begin, sobol_points, shared, target, tally, colour
 ):
-    """Cast the rays of patches.
+    """Trace the rays of patches, and write the patches that they hit.
 
-    origin, normal : (m, R, 3) float32, one point for each ray of patches begin to begin + m
-    seen : `side_table.SeenPatch`, patches that hits lie on
-    sobol_points : (R, 2) uint32
+    origin, normal : (m, R, 3) float32, metres, world, and unit; one point a ray of patches begin to begin + m
+    lookup : TriangleLookup; seen : SeenPatch, patches that hits lie on
+    buffers : PacketBuffers; begin : number of the first patch, for its random numbers
+    sobol_points : (R, 2) uint32, one row a ray; shared : uint32, see `sampling`
     target : (m, R) int32 output, patch hit, LOST or SKY
-    tally : (P, 2) int32 output: rays that left the scene; rays lost on black backs or uncovered texels
-    colour : (m, R, 3) float32 output, what light along a ray is multiplied by; no rows if nothing colours it
+    tally : (P, 2) int32, rays are added, see the column names
+    colour : (m, R, 3) float32 output, transmittance along each ray; (0, R, 3) if no BLEND surface is coloured
     """
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
     query = buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     spare_on, spare = buffers.valid, buffers.floats
-    row, size, n_pixels = table.row, table.size, table.n_pixels
+    row, size, n_pixels = lookup.row, lookup.size, lookup.n_pixels
     patch, of_side = seen.image, seen.value
     side_point, side_normal, side_height = seen.sides.point, seen.sides.normal, seen.sides.height
     side_member, side_length = seen.sides.member, seen.sides.side
@@ -63,18 +66,20 @@ def cast_form_factors(
         for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
         for r in range(len(sobol_points)):
+            # Trace ray r of sixteen patches.
             load_frames(rays, frame, origin, normal, group, lanes, r)
             aim_lanes(rays, words, frame, seeds, sobol_points[r, 0], sobol_points[r, 1], shared, FAR)
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             trace_transmittance(buffers.blend, buffers.occluded, width, on, rays, words, spare_on, spare)
             _note_colour(buffers.blend, colour, group, lanes, r)
+            # Find the patch of each hit; put hits on split texels aside.
             n_split = 0
             for lane in range(lanes):
                 p = group + lane
                 target[p, r] = LOST
                 if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
                     target[p, r] = SKY
-                    tally[begin + p, 0] += 1
+                    tally[begin + p, ESCAPED] += 1
                     continue
                 prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                 front = front_facing(
@@ -89,7 +94,8 @@ def cast_form_factors(
                     note_hit(hits, lane, rays, row, prim, front)
                     n_split += 1
                 elif target[p, r] < 0:
-                    tally[begin + p, 1] += 1
+                    tally[begin + p, ABSORBED] += 1
+            # Find the side of each hit on a split texel. That uses the packet's lanes.
             if n_split > 0:
                 for lane in range(lanes):
                     p = group + lane
@@ -103,7 +109,7 @@ def cast_form_factors(
                         if found >= 0:
                             target[p, r] = of_side[found]
                         else:
-                            tally[begin + p, 1] += 1
+                            tally[begin + p, ABSORBED] += 1
                 for lane in range(PACKET_WIDTH):
                     on[lane] = -1 if lane < lanes else 0
 
@@ -119,7 +125,11 @@ def _note_colour(blend, colour, group, lanes, r):
 
 @kernel
 def multiply(first, column, value, exitance, irradiance):
-    """Write irradiance = F exitance, both (P, 3) float64."""
+    """Write irradiance = F exitance.
+
+    first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR
+    exitance : (P, 3) float64, lx; irradiance : (P, 3) float64 output, lx
+    """
     for i in range(len(first) - 1):
         red = green = blue = 0.0
         for k in range(first[i], first[i + 1]):
@@ -135,7 +145,11 @@ def multiply(first, column, value, exitance, irradiance):
 
 @kernel
 def multiply_coloured(first, column, value, transmittance, exitance, irradiance):
-    """Write the same where light is multiplied by `transmittance` (nnz, 3) float32 on its way."""
+    """Write irradiance = F exitance, with a transmittance for each form factor and colour.
+
+    first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR
+    transmittance : (nnz, 3) float32; exitance : (P, 3) float64, lx; irradiance : (P, 3) float64 output, lx
+    """
     for i in range(len(first) - 1):
         red = green = blue = 0.0
         for k in range(first[i], first[i + 1]):
@@ -151,9 +165,11 @@ def multiply_coloured(first, column, value, transmittance, exitance, irradiance)
 
 @kernel
 def transpose(first, column, value, at, out_column, out_value):
-    """Write column and value of the transpose of a square CSR matrix; columns rise.
+    """Write column and value of the transpose of a square CSR matrix; columns of a row ascend.
 
-    at : (P,) int64, where each row of the transpose begins; moved to where it ends
+    first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : the matrix
+    at : (P,) int64, where each row of the transpose begins; advanced to where it ends
+    out_column (nnz,) int32, out_value (nnz,) float32 : output
     """
     for i in range(len(first) - 1):
         for k in range(first[i], first[i + 1]):
@@ -169,9 +185,16 @@ def merge_reciprocal_estimates(
 ):
     """Merge F_ij with its reciprocal estimate A_j F_ji / A_i, row by row.
 
-    `other` is the transpose of F in CSR: row i has the entries F_ji. The variance of A_i F_ij is
-    proportional to A_i, so the best weights are A_j for the own estimate and A_i for the other's.
-    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| of the two raw estimates.
+        F_ij' = (F_ij + F_ji) A_j / (A_i + A_j)
+
+    The variance of A_i F_ij is proportional to A_i, so the optimal weights are A_j / (A_i + A_j) for the
+    patch's own estimate and A_i / (A_i + A_j) for the reciprocal one.
+
+    first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR, columns of a row ascend
+    other_first, other_column, other_value : its transpose: row i has the entries F_ji
+    area : (P,) float64, m2
+    out_first (P + 1,), out_column, out_value (2 nnz or less,) : output
+    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| of the raw estimates.
     """
     at = 0
     exchanged = 0.0
@@ -204,21 +227,28 @@ def merge_reciprocal_estimates(
 
 @kernel
 def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
-    """Turn F_ij into d_i F_ij d_j, with factors d (P,) that make row sums `goal`; A_i F_ij stays symmetric.
+    """Replace F_ij by d_i F_ij d_j with factors d that make row sums `goal`; A_i F_ij stays symmetric.
 
-    `slack` (P,) is how uncertain a goal is: d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without it a
-    large patch whose few rays all missed a small one would take from the small one what that saw well.
-    In log d this is the minimum of a convex function, sum A_i F_ij d_i d_j / 2 - ..., and each step the exact
-    minimum along one coordinate: it needs no damping (15 passes where damped ones took over 30).
-    `value` is changed in place. Returns the largest distance of a row sum from its goal before that.
+    The condition is d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without slack a large patch whose few
+    rays all missed a small one would take energy from the small one's accurate estimate. In log d this is the
+    minimum of a convex function, and each step is the exact minimum along one coordinate, so no damping is
+    needed (15 passes; damped passes over all coordinates took over 30).
+
+    first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR; value is changed in place
+    goal : (P,) float64, row sums; slack : (P,) float64, uncertainty of each goal
+    factor : (P,) float64, d; ones on entry
+    steps : int, passes at most
+    Returns the largest distance of a row sum from its goal before balancing.
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008.
     """
+    # Measure the distance from the goal.
     error = 0.0
     for i in range(len(first) - 1):
         total = 0.0
         for k in range(first[i], first[i + 1]):
             total += value[k]
         error = max(error, abs(total - goal[i]))
+    # Minimise along one coordinate after the other until no factor moves.
     for _ in range(steps):
         most = 0.0
         for i in range(len(first) - 1):
@@ -231,6 +261,7 @@ def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
                 factor[i] = new
         if most < 1.0e-6:
             break
+    # Apply the factors.
     for i in range(len(first) - 1):
         for k in range(first[i], first[i + 1]):
             value[k] *= factor[i] * factor[column[k]]

@@ -1,10 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Final gather: what a texel's hemisphere rays see, and how far they go.
+"""Final gather: the light that a texel's hemisphere rays find, and ambient occlusion.
 
-    E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit (emitters aside)
+    E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit, without emission
     E_sky      = pi / n sum L_sky         over rays that leave the scene
-    E_emitted  = sum of MIS-weighted hits of emitters (the other half of `area_light`, where that left one)
-    AO         = share of rays that meet nothing within the distance
+    E_emitted  = sum of MIS-weighted hits of emitters, where `area_light` did not use the closed form
+    AO         = share of rays without a hit within the distance
 
 Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
 Christensen, Faster photon map global illumination, 1999.
@@ -24,9 +24,9 @@ from baker.kernels.transmittance import (
     trace_gather_transmittance,
     transmittance,
 )
-from baker.kernels.triangle_lookup import front_facing, hit_pixel
+from baker.kernels.triangle_lookup import EMITTER, front_facing, hit_pixel
 from baker.radiosity.kernels.area_light import emitter_hit
-from baker.radiosity.kernels.side_table import find_side, new_hits, note_hit
+from baker.radiosity.kernels.side_table import SIDE_ROW, find_side, new_hits, note_hit
 from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
@@ -43,46 +43,48 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of `out`: indirect RGB, sky and emitted RGB, AO, sum of squares over 16 batches.
+# Columns of `out`: indirect RGB; RGB of sky and emitters; AO; sum over 16 batches of the square of the light.
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
-# Memory of the kernels below.
-_parts, _floats = scratch((7 * PACKET_WIDTH,), np.float32), scratch((PACKET_WIDTH,), np.float32)
-_totals, _doubles = scratch((7 * PACKET_WIDTH,), np.float64), scratch((PACKET_WIDTH,), np.float64)
-_numbers, _counts, _rgba = (
-    scratch((PACKET_WIDTH,), np.int64),
-    scratch((PACKET_WIDTH,), np.int32),
-    scratch((4,), np.float64),
-)
+# Rows of `part` and `total`: the columns up to OPEN.
+_SUMS = 7
+# Working memory of the kernels.
+_parts, _floats = scratch((_SUMS * PACKET_WIDTH,), np.float32), scratch((PACKET_WIDTH,), np.float32)
+_totals, _doubles = scratch((_SUMS * PACKET_WIDTH,), np.float64), scratch((PACKET_WIDTH,), np.float64)
+_numbers, _counts = scratch((PACKET_WIDTH,), np.int64), scratch((PACKET_WIDTH,), np.int32)
+_rgba = scratch((4,), np.float64)
 
 
 @kernel
 def gather(
-    origin, normal, table, seen, lamps, shading, buffers, begin, sobol_points, shared, sky, limits, exact, out
-):
-    """Write the gathered light of texels.
+    origin, normal, lookup, seen, emitters, shading, buffers, begin, sobol_points, shared, sky, limits,
+    analytic, out,
+):  # fmt: skip
+    """Write the gathered light and ambient occlusion of texels.
 
-    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m
-    seen : `side_table.SeenLight`, light that texels reflect
-    shading : from `emitters.needed_shading`
-    sobol_points : (n, 2) uint32; shared : uint32; sky : (3,) float32, cd/m2
-    limits : (2,) float64, AO distance in metres and the number of shadow rays for MIS
-    exact : (m,) uint8, 1 for texels that have all light of emitters already
-    begin : number of the first texel, for its random numbers; out : (m, 8) float32, see the column names
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    lookup : TriangleLookup; seen : SeenLight, light that texels reflect
+    emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
+    buffers : PacketBuffers; begin : number of the first texel, for its random numbers
+    sobol_points : (n, 2) uint32, one row a ray; shared : uint32, see `sampling`
+    sky : (3,) float32, radiance, cd/m2
+    limits : (2,) float64, AO distance in metres, and the number of light samples for MIS
+    analytic : (m,) uint8, 1 for texels whose light of emitters is complete already
+    out : (m, 8) float32 output, see the column names; light in lx
     """
     n_samples = len(sobol_points)
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
     query = buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     spare_on, spare = buffers.valid, buffers.floats
-    row, size, n_pixels = table.row, table.size, table.n_pixels
-    lamp, chance, cumulative, node = lamps.row, lamps.chance, lamps.cumulative, lamps.node
-    apart = lamps.apart
+    row, size, n_pixels = lookup.row, lookup.size, lookup.n_pixels
+    emitter_row, chance, cumulative, node = emitters.row, emitters.chance, emitters.cumulative, emitters.node
+    apart = emitters.apart
     some_apart = False
     for c in range(len(apart)):
         some_apart = some_apart or apart[c] != 0
     radiance = _rgba()
-    # Sums of one point's samples are short: float32; those of all points are not.
+    # Sums over the few samples of one point are float32, those over all points float64.
     part, missed = _parts(), _floats()
     total, squares = _totals(), _doubles()
     pixel = _numbers()
@@ -92,7 +94,8 @@ def gather(
     hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
-    # Reflected light and `emitter_hit` are scaled so that all sums times pi / n are irradiance.
+    # All sums are multiplied by pi / n in the end: reflected light is divided by pi here, and what
+    # `emitter_hit` returns is multiplied by n / pi.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
@@ -103,25 +106,27 @@ def gather(
         for lane in range(PACKET_WIDTH):
             on[lane] = -1 if lane < lanes else 0
             squares[lane] = 0.0
-        for j in range(7 * PACKET_WIDTH):
+        for j in range(_SUMS * PACKET_WIDTH):
             total[j] = 0.0
         stopped = True
         for step in range(n_samples * turns):
             s, turn = step // turns, step % turns
+            # Start a batch with the next point of each texel.
             k = s * N_POINTS // n_samples
             if turn == 0 and (s == 0 or k != (s - 1) * N_POINTS // n_samples):
                 load_frames(rays, frame, origin, normal, group, lanes, k)
-                for j in range(7 * PACKET_WIDTH):
+                for j in range(_SUMS * PACKET_WIDTH):
                     part[j] = _f(0.0)
                 for lane in range(PACKET_WIDTH):
                     missed[lane] = _f(0.0)
+            # Trace one ray of each texel. Without a stop at a BLEND surface turn 1 finds the same hits.
             if turn == 0 or stopped:
                 aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
                     buffers.blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
                 )
             if turn == 0:
-                # AO goes by where rays stop by chance.
+                # AO counts the rays of turn 0, which BLEND surfaces stop with probability alpha.
                 opened = _f(1.0)
                 stopped = any_stopped(buffers.blend, words)
                 if not stopped:
@@ -129,6 +134,7 @@ def gather(
             trace_gather_transmittance(
                 buffers.blend, turn, buffers.occluded, width, on, rays, words, spare_on, spare
             )
+            # Count the rays that leave the scene, and those without a hit within the AO distance.
             for lane in range(PACKET_WIDTH):
                 none = words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)
@@ -136,7 +142,8 @@ def gather(
                 part[OPEN * PACKET_WIDTH + lane] += opened if free else _f(0.0)
             opened = _f(0.0)
             _add_coloured_sky(buffers.blend, words, sky, missed, part)
-            # First only find the pixels, then fetch them: the fetches do not wait for each other.
+            # Find the pixel of each hit, and add the emission of emitters. Pixels are read in a loop of their
+            # own below, so that cache misses overlap.
             for lane in range(lanes):
                 pixel[lane] = -1
                 if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
@@ -149,19 +156,19 @@ def gather(
                 )
                 hit_u, hit_v = rays[HIT_U * PACKET_WIDTH + lane], rays[HIT_V * PACKET_WIDTH + lane]
                 i = group + lane
-                m = np.int64(row[prim, 12])
-                if m < -1 and (exact[i] == 0 or some_apart):
+                m = np.int64(row[prim, EMITTER])
+                if m < -1 and (analytic[i] == 0 or some_apart):
                     m = emitter_at(node, m, hit_u, hit_v)
-                if m >= 0 and (exact[i] == 0 or apart[np.int64(lamp[m, CLUSTER])] != 0):
+                if m >= 0 and (analytic[i] == 0 or apart[np.int64(emitter_row[m, CLUSTER])] != 0):
                     weight = whole * emitter_hit(
-                        row, lamp, chance, cumulative, prim, m, dx, dy, dz,
+                        row, emitter_row, chance, cumulative, prim, m, dx, dy, dz,
                         normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * PACKET_WIDTH + lane],
                         limits[1], n_samples,
                     )  # fmt: skip
                     if weight > 0.0:
                         for c in range(3):
-                            radiance[c] = lamp[m, RADIANCE + c]
-                        if shading is not None and lamp[m, TEXTURED] > _f(0.0):
+                            radiance[c] = emitter_row[m, RADIANCE + c]
+                        if shading is not None and emitter_row[m, TEXTURED] > _f(0.0):
                             emitted_radiance(shading, prim, hit_u, hit_v, radiance)
                         for c in range(3):
                             kept = transmittance(buffers.blend, c, lane)
@@ -169,16 +176,18 @@ def gather(
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             if lit:
+                # Add the light that the texels reflect; put hits on split texels aside.
                 n_split = 0
                 for lane in range(lanes):
                     p = pixel[lane]
                     if p >= 0:
-                        if exitance[p, 3] > _f(0.0):
+                        if exitance[p, SIDE_ROW] > _f(0.0):
                             prim = np.int64(words[PRIM_ID * PACKET_WIDTH + lane])
                             dx, dy, dz = (
-                                rays[DIR_X * PACKET_WIDTH + lane], rays[DIR_Y * PACKET_WIDTH + lane],
+                                rays[DIR_X * PACKET_WIDTH + lane],
+                                rays[DIR_Y * PACKET_WIDTH + lane],
                                 rays[DIR_Z * PACKET_WIDTH + lane],
-                            )  # fmt: skip
+                            )
                             note_hit(hits, lane, rays, row, prim, front_facing(row, prim, dx, dy, dz))
                             split[n_split] = lane
                             n_split += 1
@@ -191,20 +200,14 @@ def gather(
                         part[2 * PACKET_WIDTH + lane] += (
                             exitance[p, 2] * inverse_pi * transmittance(blend, 2, lane)
                         )
+                # Find the side of each hit on a split texel. That uses the packet's lanes.
                 for j in range(n_split):
                     lane = int(split[j])
-                    at = np.int64(exitance[pixel[lane], 3]) - 1
+                    at = np.int64(exitance[pixel[lane], SIDE_ROW]) - 1
                     found = find_side(
-                        side_point,
-                        side_normal,
-                        side_height,
-                        side_member,
-                        side_length,
-                        at,
-                        hits,
-                        lane,
-                        buffers,
-                    )
+                        side_point, side_normal, side_height, side_member, side_length,
+                        at, hits, lane, buffers,
+                    )  # fmt: skip
                     if found >= 0:
                         for c in range(3):
                             kept = transmittance(buffers.blend, c, lane)
@@ -212,6 +215,7 @@ def gather(
                 if n_split > 0:
                     for lane in range(PACKET_WIDTH):
                         on[lane] = -1 if lane < lanes else 0
+            # End a batch: add the sky and the batch's sums.
             if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(PACKET_WIDTH):
                     for c in range(3):
@@ -220,8 +224,9 @@ def gather(
                     for c in range(6):
                         now += part[c * PACKET_WIDTH + lane]
                     squares[lane] += now * now
-                    for c in range(7):
+                    for c in range(_SUMS):
                         total[c * PACKET_WIDTH + lane] += part[c * PACKET_WIDTH + lane]
+        # Write the means.
         scale = np.pi / n_samples
         for lane in range(lanes):
             i = group + lane
@@ -233,7 +238,11 @@ def gather(
 
 @inner
 def _add_coloured_sky(blend, words, sky, missed, part):
-    """Add the sky's light where it passed coloured surfaces; those rays do not count as `missed`."""
+    """Add the sky's light of rays that coloured surfaces filter; those rays no longer count as `missed`.
+
+    blend : of `PacketBuffers`; words : (21 * 16,) uint32, the packet; sky : (3,) float32, cd/m2
+    missed : (16,) float32, rays without a hit; part : (7 * 16,) float32, sums, see `gather`
+    """
     if blend is None:
         return
     for lane in range(PACKET_WIDTH):
@@ -250,12 +259,15 @@ def _add_coloured_sky(blend, words, sky, missed, part):
 
 
 @kernel
-def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, distance, look, out):
-    """Write the cosine-weighted share of the hemisphere that is open within `distance` metres.
+def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, distance, early_out, out):
+    """Write the ambient occlusion of texels, 1: nothing within `distance`; return the number of rays cast.
 
-    origin, normal : (m, 16, 3) float32, points of entries begin to begin + m; out : (n_entries,) float32
-    look : after so many rays sixteen texels are done if at most one of each one's rays was blocked; 0: never
-    Returns the number of rays cast.
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    buffers : PacketBuffers, without transmittance
+    sobol_points : (n, 2) uint32, one row a ray; shared : uint32, see `sampling`
+    distance : float32, metres
+    early_out : sixteen texels are done after this number of rays if at most one of each was blocked; 0: never
+    out : (n_entries,) float32 output
     """
     n_samples = len(sobol_points)
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
@@ -273,6 +285,7 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
             count[lane] = 0
         done = 0
         for s in range(n_samples):
+            # Trace one ray of each texel, and count those that nothing blocks.
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
@@ -281,10 +294,11 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
             for lane in range(PACKET_WIDTH):
                 count[lane] += np.int32(1) if rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0) else np.int32(0)
             done += 1
-            if done == look:
+            # Early out where hardly any ray is blocked.
+            if done == early_out:
                 clear = 0
                 for lane in range(lanes):
-                    clear += 1 if count[lane] >= look - 1 else 0
+                    clear += 1 if count[lane] >= early_out - 1 else 0
                 if clear == lanes:
                     break
         cast += done * lanes

@@ -1,11 +1,13 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Irradiance from evenly shining triangles with nothing in between, in closed form.
+"""Unoccluded irradiance from triangles of uniform radiance, in closed form.
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
 
-over the edges of what of a triangle lies above the surface; angle_i is the angle that edge i fills as seen
-from the point, Gamma_i the unit normal of the plane through both. With a, b the arms to its ends,
-angle Gamma = angle / sin(angle) (a x b) / |a||b|.
+over the edges of the part of a triangle that lies above the tangent plane n; angle_i is the angle that edge i
+subtends at the point, Gamma_i the unit normal of the plane through both. With a, b the vectors from the point
+to the edge's ends,
+
+    angle Gamma = angle / sin(angle) (a x b) / |a||b|
 
 Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995;
 Abramowitz and Stegun, Handbook of mathematical functions, 1964, 4.4.46 (the polynomial).
@@ -17,27 +19,33 @@ import math
 
 import numpy as np
 
-from baker.kernels.emitters import AREA, NORMAL, RADIANCE, TWO_SIDED
+from baker.kernels.emitters import AREA, CORNER, CORNER_1, CORNER_2, NORMAL, RADIANCE, TWO_SIDED
 from baker.kernels.surface import N_POINTS
 from baker.trace.jit import inner, larger, pasted, scratch, smaller
 from baker.trace.packets import PACKET_WIDTH
 
 _f = np.float32
-# Rows of the working memory: origin, normal, four corners as arms, heights of three, the sum over edges,
-# what a triangle that looks small gives (-1: it does not), 1 if the triangle's shining side is turned here.
-_ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _TURNED = 0, 3, 6, 18, 21, 22, 23
+# Rows of the working memory:
+#
+#     _ORIGIN, _NORMAL   of the point (3 each)
+#     _ARM               vectors from the point to up to four corners (12)
+#     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
+#     _SUM               sum over the edges
+#     _SMALL             E / L of a triangle of small extent, -1 for others
+#     _FACING            1 if a side that emits faces the point, else 0
+_ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
-# Triangles whose longest edge is under a hundredth of their distance shine from their centroid: the sum over
-# edges would lose digits, and the error is of the order of the square, 1e-5.
+# Triangles whose longest edge is below a hundredth of their distance (squares here) count as points at their
+# centroid: the sum over edges would lose digits, and the error is of the order of the square, 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
 @inner
 def angle_over_sine(x, sine):
-    """Return an angle over its sine from its cosine x in [-1, 1], float32; relative error under 1e-6.
+    """Return angle / sin(angle) from the cosine x in [-1, 1] and the sine; relative error under 1e-6.
 
-    Both are asked for: near a straight angle the cosine alone does not tell the sine any more.
+    Both are needed: near a straight angle the float32 cosine does not determine the sine.
     """
     y = abs(x)
     series = _f(1.5707963050) + y * (
@@ -59,11 +67,11 @@ def angle_over_sine(x, sine):
 
 @inner
 def unoccluded_irradiance(origin, normal, group, lanes, row, found):
-    """Write the irradiance of sixteen texels from all emitters, as if nothing stood in between.
+    """Write the irradiance of sixteen texels from all emitters, without occlusion.
 
-    origin, normal : (m, 16, 3) float32, texels group to group + lanes are lit
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; texels `group` to `group + lanes` are lit
     row : (M, 24) float32, see `emitters`; none textured
-    found : (3 * 16,) float32, lx: RGB by lane, means over the texels' points
+    found : (3 * 16,) float32 output, lx: RGB by lane, means over the texels' points
     """
     work = _work()
     for j in range(3 * PACKET_WIDTH):
@@ -74,7 +82,7 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
                 work[(_ORIGIN + a) * PACKET_WIDTH + lane] = origin[group + lane, k, a]
                 work[(_NORMAL + a) * PACKET_WIDTH + lane] = normal[group + lane, k, a]
         for m in range(len(row)):
-            corners = _reach_for_corners(work, row, m, lanes)
+            corners = _load_triangle(work, row, m, lanes)
             if corners:
                 _add_edges(work, corners)
                 for c in range(3):
@@ -82,7 +90,7 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
                     for lane in range(PACKET_WIDTH):
                         small, turned = (
                             work[_SMALL * PACKET_WIDTH + lane],
-                            work[_TURNED * PACKET_WIDTH + lane],
+                            work[_FACING * PACKET_WIDTH + lane],
                         )
                         light = abs(_f(0.5) * work[_SUM * PACKET_WIDTH + lane])
                         found[c * PACKET_WIDTH + lane] += (
@@ -91,8 +99,11 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
 
 
 @pasted
-def _reach_for(work, j, x, y, z):
-    """Write the arms to corner j of a triangle and its heights above the surfaces."""
+def _load_corner(work, j, x, y, z):
+    """Write the vectors from the points to corner j at (x, y, z), and its heights above their planes.
+
+    work : (24 * 16,) float32, see the row names
+    """
     for lane in range(PACKET_WIDTH):
         ax, ay, az = x - work[lane], y - work[PACKET_WIDTH + lane], z - work[2 * PACKET_WIDTH + lane]
         work[(_ARM + 3 * j) * PACKET_WIDTH + lane] = ax
@@ -103,24 +114,28 @@ def _reach_for(work, j, x, y, z):
 
 
 @inner
-def _reach_for_corners(work, row, m, lanes):
-    """Write the arms to the corners of what of triangle m lies above each surface.
+def _load_triangle(work, row, m, lanes):
+    """Write the corners of the part of triangle m above each point's tangent plane.
 
-    Returns how many corners that are at most, 3 or 4, and 0 if no lane sees any of it.
+    work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `emitters`
+    Returns the largest number of corners, 3 or 4, and 0 if no lane sees any part of it.
     """
-    # Out of the row first, and offsets as constants: else the loops over lanes are no vector code.
-    _reach_for(work, 0, row[m, 0], row[m, 1], row[m, 2])
-    _reach_for(work, 1, row[m, 3], row[m, 4], row[m, 5])
-    _reach_for(work, 2, row[m, 6], row[m, 7], row[m, 8])
+    # Load the corners. Values are read from the row first, and offsets are constants, or the compiler would
+    # not vectorise the loops over lanes.
+    _load_corner(work, 0, row[m, CORNER], row[m, CORNER + 1], row[m, CORNER + 2])
+    _load_corner(work, 1, row[m, CORNER_1], row[m, CORNER_1 + 1], row[m, CORNER_1 + 2])
+    _load_corner(work, 2, row[m, CORNER_2], row[m, CORNER_2 + 1], row[m, CORNER_2 + 2])
+    # Compute the longest edge (squared).
     longest = _f(0.0)
     for j in range(3):
         edge = _f(0.0)
         for a in range(3):
-            step = row[m, 3 * ((j + 1) % 3) + a] - row[m, 3 * j + a]
+            step = row[m, CORNER + 3 * ((j + 1) % 3) + a] - row[m, CORNER + 3 * j + a]
             edge += step * step
         longest = larger(longest, edge)
     nx, ny, nz = row[m, NORMAL], row[m, NORMAL + 1], row[m, NORMAL + 2]
     two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
+    # Compute the irradiance from the centroid, and which side faces the point.
     third = _f(1.0 / 3.0)
     for lane in range(PACKET_WIDTH):
         x = (
@@ -149,24 +164,28 @@ def _reach_for_corners(work, row, m, lanes):
         work[_SMALL * PACKET_WIDTH + lane] = (
             area * height * abs(facing) / (square * square) if small else _f(-1.0)
         )
-        work[_TURNED * PACKET_WIDTH + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
+        work[_FACING * PACKET_WIDTH + lane] = _f(1.0) if two_sided or facing > _f(0.0) else _f(0.0)
+    # Clip the triangles that cross a tangent plane.
     corners = 0
     for lane in range(lanes):
         above = 0
         for j in range(3):
             above += 1 if work[(_HEIGHT + j) * PACKET_WIDTH + lane] > _f(0.0) else 0
         if above == 0:
-            work[_TURNED * PACKET_WIDTH + lane] = _f(0.0)
-        if work[_TURNED * PACKET_WIDTH + lane] > _f(0.0):
+            work[_FACING * PACKET_WIDTH + lane] = _f(0.0)
+        if work[_FACING * PACKET_WIDTH + lane] > _f(0.0):
             corners = larger(corners, 3 if above == 3 else 4)
             if above < 3:
-                _cut(work, lane)
+                _clip(work, lane)
     return corners
 
 
 @inner
-def _cut(work, lane):
-    """Cut off what of a lane's triangle lies below its surface: three or four corners remain."""
+def _clip(work, lane):
+    """Clip a lane's triangle to the half space above its tangent plane: three or four corners remain.
+
+    work : (24 * 16,) float32, see the row names
+    """
     corner = _corners()
     n = 0
     for j in range(3):
@@ -190,7 +209,10 @@ def _cut(work, lane):
 
 @pasted
 def _add_edge(work, first, second):
-    """Add the edge between two corners of every lane to its sum; one without length adds nothing."""
+    """Add the edge between two corners to the sum of every lane; edges of no length add 0.
+
+    work : (24 * 16,) float32, see the row names
+    """
     for lane in range(PACKET_WIDTH):
         ax, bx = (
             work[(_ARM + 3 * first) * PACKET_WIDTH + lane],
@@ -217,7 +239,10 @@ def _add_edge(work, first, second):
 
 @inner
 def _add_edges(work, corners):
-    """Write the sum over the edges between the corners of every lane."""
+    """Write the sum over the edges between the corners of every lane.
+
+    work : (24 * 16,) float32, see the row names
+    """
     for lane in range(PACKET_WIDTH):
         work[_SUM * PACKET_WIDTH + lane] = _f(0.0)
     _add_edge(work, 0, 1)

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Regions of charts: texels that see each other along the surface, by links between neighbours."""
+"""Regions of charts: sets of texels that links between neighbours connect."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from baker.trace.jit import kernel
 
 @kernel
 def join_linked(link, root):
-    """Write the smallest node that each node is linked to, directly or over others: union-find.
+    """Write the smallest node that each node is connected to by links (union-find).
 
-    link : (m, 2) int32; root : (n,) int32, each node's own number on entry
+    link : (m, 2) int32, nodes; root : (n,) int32, each node's own number on entry
     """
     for m in range(len(link)):
         a, b = link[m, 0], link[m, 1]
@@ -25,7 +25,7 @@ def join_linked(link, root):
         else:
             root[a] = b
     for i in range(len(root)):
-        # Roots are smaller than what they stand for: the one above is final already.
+        # A root is smaller than its nodes, so its own root is final already.
         root[i] = root[root[i]]
 
 
@@ -33,7 +33,8 @@ def join_linked(link, root):
 def flood_regions(chart, region, queue):
     """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
 
-    chart, region : (H, W) int32, -1: empty, no region yet; queue : (H * W,) int64, memory
+    chart : (H, W) int32, -1 for empty texels; region : (H, W) int32, -1 for texels without one; filled
+    queue : (H * W,) int64, working memory
     """
     height, width = chart.shape
     end = 0
@@ -59,10 +60,11 @@ def flood_regions(chart, region, queue):
 
 @kernel
 def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):
-    """List neighbouring entries of one chart and side; return how many pairs were written.
+    """List pairs of neighbouring entries of one chart and side; return the number of pairs.
 
-    pixel (n,) int64, back (n,) bool, chart (n,) int32, lookup (P * H * W,) int32 and back_entry (n_front,)
-    int32: see `TexelBuffer`; size : int, of a page
+    pixel (n,) int64, back (n,) bool, chart (n,) int32 : see `TexelBuffer`
+    lookup (P * H * W,) int32, back_entry (n_front,) int32 : see `TexelBuffer`
+    size : int, of a page, texels
     chosen : (n,) bool; both : bool, whether both entries of a pair must be chosen, or one of them
     pair : (2 n, 2) int32 output
     """
@@ -72,6 +74,7 @@ def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, 
             continue
         rest = pixel[i] % (size * size)
         for turn in range(2):
+            # Turn 0: the pixel to the right; 1: the one below.
             if (rest % size if turn == 0 else rest // size) == size - 1:
                 continue
             beside = pixel[i] + (1 if turn == 0 else size)

@@ -1,7 +1,8 @@
-"""The sides of split texels as rays look them up: which one a hit lies on.
+# mypy: disable-error-code="no-untyped-def"
+"""The sides of split texels, and which of them a hit lies on.
 
-A hit lies on the side of the nearest of the texel's points that is visible from just before the hit, or from
-just above it. See `sides` for the height of such segments.
+A hit lies on the side of the texel's nearest point that is visible from a position shortly before the hit, or
+from one just above it. See `sides` for the height of such segments.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from baker.kernels.surface import N_POINTS
 from baker.kernels.transmittance import set_blend_rule
+from baker.kernels.triangle_lookup import FACE_NORMAL
 from baker.trace.jit import inner, scratch, smaller
 from baker.trace.packets import (
     DIR_X,
@@ -25,26 +27,36 @@ from baker.trace.packets import (
     SOLID,
     TFAR,
     trace_lanes,
-)
+)  # fmt: skip
 
 _f = np.float32
-# A segment before a hit starts this far back along the ray, one above it that high, in sides of a texel.
+# Start of a segment: this far back along the ray, or that high above the hit, in sides of a texel.
 _BACK, _ABOVE = 0.25, 0.02
-# Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, face normal.
+# Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, normal of the face that was hit.
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
-# Memory of the kernels.
+# Column of `SeenLight.image` behind RGB.
+SIDE_ROW = 3
+# Working memory of the kernels.
 new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 * PACKET_WIDTH,), np.float32)
 
 
 class SideTable(NamedTuple):
-    """The S texel entries that are split into sides, and their points.
+    """The S split texel entries and their points.
 
-    Or whose surface has a corner that none of its points sees: a ray that hits there finds nothing.
+    Entries whose surface has a corner that none of its points sees are in it, too: a ray that hits such a
+    corner finds nothing.
 
-    point, normal (S, 16, 3) float32: ray origins and shading normals; height (S, 16) float32, metres;
-    member (S, 16) int32: row of the values of the point's side, -1 for points inside geometry;
-    side (S,) float32, metres, of the texel.
+    Attributes
+    ----------
+    point, normal : (S, 16, 3) float32
+        Ray origins, metres, world, and unit shading normals.
+    height : (S, 16) float32
+        Height of segments, metres, see `sides`.
+    member : (S, 16) int32
+        Row of the values of the point's side, -1 for points inside geometry.
+    side : (S,) float32
+        Side length of the texel, metres.
     """
 
     point: NDArray[np.float32]
@@ -66,11 +78,17 @@ def no_sides() -> SideTable:
 
 
 class SeenLight(NamedTuple):
-    """What rays of the final gather find.
+    """The light that rays of the final gather find.
 
-    image (sides * P * H * W, 4) float32, lx: light that the texel at each pixel reflects (RGB), and the
-    number of its row in `sides` plus 1, or 0; no rows if nothing reflects; value (K, 4) float32: the same
-    light of each side of the split texels; sides : SideTable
+    Attributes
+    ----------
+    image : (sides * P * H * W, 4) float32
+        RGB in lx that the texel at each pixel reflects; SIDE_ROW: its row in `sides` plus 1, 0 if it is not
+        split. No rows if nothing reflects.
+    value : (K, 4) float32
+        The same light for each side of the split texels.
+    sides : SideTable
+        The split texels.
     """
 
     image: NDArray[np.float32]
@@ -79,15 +97,27 @@ class SeenLight(NamedTuple):
 
 
 def nothing_seen() -> SeenLight:
-    """Return the light that rays find where nothing reflects any."""
+    """Return the light that rays find where nothing reflects any.
+
+    Returns
+    -------
+    SeenLight
+        Without rows.
+    """
     return SeenLight(np.zeros((0, 4), _f), np.zeros((0, 4), _f), no_sides())
 
 
 class SeenPatch(NamedTuple):
-    """What form-factor rays find.
+    """The patches that form-factor rays find.
 
-    image (sides * P * H * W,) int32: patch at each pixel, -1: none, `form_factor.SPLIT` - s: the texel in
-    row s of `sides`; value (K,) int32: patch of each side of the split texels; sides : SideTable
+    Attributes
+    ----------
+    image : (sides * P * H * W,) int32
+        Patch at each pixel, -1 for none, `form_factor.SPLIT` - s for the texel in row s of `sides`.
+    value : (K,) int32
+        Patch of each side of the split texels.
+    sides : SideTable
+        The split texels.
     """
 
     image: NDArray[np.int32]
@@ -96,8 +126,11 @@ class SeenPatch(NamedTuple):
 
 
 @inner
-def segment(rays, lane, x, y, z, tx, ty, tz):  # type: ignore[no-untyped-def]
-    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; returns -1 if it has a length, else 0."""
+def segment(rays, lane, x, y, z, tx, ty, tz):
+    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; return -1 if it has a length, else 0.
+
+    rays : (21 * 16,) float32, a packet; coordinates in metres, world
+    """
     dx, dy, dz = tx - x, ty - y, tz - z
     rays[ORG_X * PACKET_WIDTH + lane] = x
     rays[ORG_Y * PACKET_WIDTH + lane] = y
@@ -110,26 +143,32 @@ def segment(rays, lane, x, y, z, tx, ty, tz):  # type: ignore[no-untyped-def]
 
 
 @inner
-def note_hit(hits, lane, rays, face, prim, front):  # type: ignore[no-untyped-def]
-    """Copy what `find_side` needs of a lane's hit to `hits` (10 * 16,); face: rows of the hit table."""
+def note_hit(hits, lane, rays, row, prim, front):
+    """Copy the hit of a lane for `find_side`.
+
+    hits : (10 * 16,) float32 output, see the row names; rays : (21 * 16,) float32, the packet
+    row : (T, 16) float32, see `TriangleLookup`; prim : triangle hit; front : whether its front was
+    """
     sign = _f(1.0) if front else _f(-1.0)
     for a in range(3):
         hits[(HIT_ORIGIN + a) * PACKET_WIDTH + lane] = rays[(ORG_X + a) * PACKET_WIDTH + lane]
         hits[(HIT_DIRECTION + a) * PACKET_WIDTH + lane] = rays[(DIR_X + a) * PACKET_WIDTH + lane]
-        hits[(HIT_NORMAL + a) * PACKET_WIDTH + lane] = sign * face[prim, 8 + a]
+        hits[(HIT_NORMAL + a) * PACKET_WIDTH + lane] = sign * row[prim, FACE_NORMAL + a]
     hits[HIT_DISTANCE * PACKET_WIDTH + lane] = rays[TFAR * PACKET_WIDTH + lane]
 
 
 @inner
-def find_side(point, normal, height, member, side, s, hits, lane, buffers):  # type: ignore[no-untyped-def]
-    """Return the row of values of the side that a hit on split texel s lies on, or -1 if no point sees it.
+def find_side(point, normal, height, member, side, s, hits, lane, buffers):
+    """Return the row of values of the side that a hit on split texel s lies on, -1 if no point sees it.
 
-    point, normal, height, member, side : arrays of a `SideTable`
-    hits : (10 * 16,) float32, from `note_hit`; lane : int, which of them
-    The buffers's sixteen rays are overwritten, but for their origins.
+    point, normal : (S, 16, 3) float32; height : (S, 16) float32; member : (S, 16) int32; side : (S,) float32;
+        of a `SideTable`
+    hits : (10 * 16,) float32, from `note_hit`; lane : which of them
+    buffers : PacketBuffers; its sixteen rays are overwritten, except their origins
     """
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     set_blend_rule(buffers.blend, words, SOLID)
+    # Save the origins of the packet.
     saved = _saved()
     for j in range(3 * PACKET_WIDTH):
         saved[j] = rays[ORG_X * PACKET_WIDTH + j]
@@ -143,7 +182,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):  # t
     z = hits[(HIT_ORIGIN + 2) * PACKET_WIDTH + lane] + distance * dz
     found = np.int32(-1)
     for turn in range(2):
-        # First from the ray, before it hits, which is on the right side whatever rounding did to the hit.
+        # Start before the hit, which is on the side of the ray's origin however the hit was rounded; if no
+        # point is visible from there, start above the hit.
         step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
         vx, vy, vz = -dx, -dy, -dz
         if turn == 1:
@@ -152,6 +192,7 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):  # t
                 hits[HIT_NORMAL * PACKET_WIDTH + lane], hits[(HIT_NORMAL + 1) * PACKET_WIDTH + lane],
                 hits[(HIT_NORMAL + 2) * PACKET_WIDTH + lane],
             )  # fmt: skip
+        # Trace a segment to each point.
         for k in range(N_POINTS):
             on[k] = 0
             if member[s, k] >= 0:
@@ -162,24 +203,20 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):  # t
                     point[s, k, 2] + h * normal[s, k, 2],
                 )  # fmt: skip
         trace_lanes(
-            buffers.occluded,
-            buffers.scene,
-            buffers.width,
-            buffers.query,
-            on,
-            rays,
-            buffers.valid,
+            buffers.occluded, buffers.scene, buffers.width, buffers.query, on, rays, buffers.valid,
             buffers.floats,
-        )
-        least = _f(np.inf)
+        )  # fmt: skip
+        # Choose the visible point that is nearest to the hit.
+        nearest = _f(np.inf)
         for k in range(N_POINTS):
             if on[k] != 0 and rays[TFAR * PACKET_WIDTH + k] >= _f(0.0):
                 px, py, pz = point[s, k, 0] - x, point[s, k, 1] - y, point[s, k, 2] - z
                 square = px * px + py * py + pz * pz
-                if square < least:
-                    least, found = square, member[s, k]
+                if square < nearest:
+                    nearest, found = square, member[s, k]
         if found >= 0:
             break
+    # Restore the origins.
     for j in range(3 * PACKET_WIDTH):
         rays[ORG_X * PACKET_WIDTH + j] = saved[j]
     set_blend_rule(buffers.blend, words, np.uint32(0))

@@ -1,13 +1,13 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Texels that lie on both sides of a surface passing through them: which of their points see each other.
+"""Texels with points on both sides of a surface that passes through them.
 
-A floor that runs on under a wall has texels with points on both sides of that wall. Two points of a texel lie
-on the same side if the segment between them is free at a small height above the surface:
+A floor that continues under a wall has texels with points on both sides of the wall. Two points of a texel
+are on the same side if the segment between them, raised above the surface, is not blocked:
 
     height = min(HIGH s, half the headroom of either point)        s: side of the texel, metres
 
-A step lower than that separates nothing; a gap lower than that connects nothing. The same test chooses the
-side of a ray's hit: the side of the nearest point that is visible from just before the hit.
+So a step lower than that does not separate points, and a gap lower than that does not connect them. The same
+test chooses the side of a ray's hit (`side_table`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from baker.kernels.clip import clip_to_square, new_polygon, new_triangle
 from baker.kernels.rays import FAR, aim_lanes, lane_seeds, load_frames, new_frame, new_seeds
-from baker.kernels.surface import N_POINTS, inverse_uv, place
-from baker.kernels.triangle_lookup import front_facing
+from baker.kernels.surface import N_POINTS, inverse_uv, place_point
+from baker.kernels.triangle_lookup import DOUBLE_SIDED, front_facing
 from baker.radiosity.kernels.side_table import segment
 from baker.trace.jit import inner, kernel, scratch, smaller
 from baker.trace.packets import (
@@ -38,21 +38,23 @@ from baker.trace.packets import (
 _f = np.float32
 # Heights of segments above the surface, in sides of a texel.
 HIGH, LOW = 0.25, 0.02
-# Half length of the diagonals that look for a crossing surface: a little beyond the texel, so that a surface
-# exactly between two texels is met from both.
-_REACH = 0.55
-# Corners of a texel's surface are examined at this share of their distance from its middle.
+# Half length of the diagonals that test for a crossing surface, as a share of the texel's diagonal: slightly
+# more than the texel, so that both texels find a surface exactly between them.
+_HALF_DIAGONAL = 0.55
+# Corners of a texel's surface are tested at this share of their distance from its centroid.
 _CORNER = 0.998
-# Memory of the kernels.
+# Rows of `frame`, by lane: centre, the two half diagonals, and the normal times the side of the texel.
+_CENTRE, _DIAGONAL_1, _DIAGONAL_2, _NORMAL = 0, 3, 6, 9
+# Working memory of the kernels.
 _points, _heights = scratch((1, PACKET_WIDTH, 3), np.float32), scratch((1, PACKET_WIDTH), np.float32)
 _frame = scratch((12 * PACKET_WIDTH,), np.float32)
 
 
 @kernel
 def crossed_texels(surface, begin, end, buffers, crossed, side):
-    """Find texels that some surface may pass through: a line just above their square is blocked.
+    """Find texels that a surface may pass through: a segment just above their square is blocked.
 
-    Entries begin to end are examined.
+    surface : Surface; entries `begin` to `end` are examined; buffers : PacketBuffers
     crossed : (n,) uint8 output, 1 where one of two diagonals is blocked at one of two heights, or one of the
         four edges at the upper one
     side : (n,) float32 output, metres, root mean square of the two sides of the whole texel
@@ -64,12 +66,12 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
     scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
     on, rays = buffers.lane_valid, buffers.lane_floats
     spare_on, spare = buffers.valid, buffers.floats
-    # By lane: centre, the two half diagonals, the normal times the texel's side.
     frame = _frame()
     cast = 0
     for group in range(begin, end, PACKET_WIDTH):
         lanes = smaller(PACKET_WIDTH, end - group)
         for lane in range(lanes):
+            # Write the texel's frame in the plane of the triangle that covers most of it.
             i = group + lane
             front = fronts[i]
             most = _f(-1.0)
@@ -87,27 +89,27 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
                 p0 = float(position[i0, axis])
                 e1, e2 = position[i1, axis] - p0, position[i2, axis] - p0
                 right, down = a * e1 + d * e2, b * e1 + g * e2
-                frame[axis * PACKET_WIDTH + lane] = p0 + b1 * e1 + b2 * e2
-                frame[(3 + axis) * PACKET_WIDTH + lane] = _REACH * (right + down)
-                frame[(6 + axis) * PACKET_WIDTH + lane] = _REACH * (right - down)
+                frame[(_CENTRE + axis) * PACKET_WIDTH + lane] = p0 + b1 * e1 + b2 * e2
+                frame[(_DIAGONAL_1 + axis) * PACKET_WIDTH + lane] = _HALF_DIAGONAL * (right + down)
+                frame[(_DIAGONAL_2 + axis) * PACKET_WIDTH + lane] = _HALF_DIAGONAL * (right - down)
                 across += right * right + down * down
             side[i] = math.sqrt(0.5 * across)
             sign = -side[i] if back[i] else side[i]
             for axis in range(3):
-                frame[(9 + axis) * PACKET_WIDTH + lane] = sign * face[t, axis]
+                frame[(_NORMAL + axis) * PACKET_WIDTH + lane] = sign * face[t, axis]
             crossed[group + lane] = 0
         for turn in range(8):
-            # Two diagonals high and low, then four edges.
+            # Turns 0 to 3: the two diagonals, high, then low; 4 to 7: the four edges, high.
             height = _f(LOW if turn == 2 or turn == 3 else HIGH)
-            row = 3 + 3 * (turn % 2)
+            row = _DIAGONAL_1 + 3 * (turn % 2)
             for lane in range(PACKET_WIDTH):
                 on[lane] = 0
             for lane in range(lanes):
                 if crossed[group + lane] != 0:
                     continue
-                x = frame[lane] + height * frame[9 * PACKET_WIDTH + lane]
-                y = frame[PACKET_WIDTH + lane] + height * frame[10 * PACKET_WIDTH + lane]
-                z = frame[2 * PACKET_WIDTH + lane] + height * frame[11 * PACKET_WIDTH + lane]
+                x = frame[lane] + height * frame[_NORMAL * PACKET_WIDTH + lane]
+                y = frame[PACKET_WIDTH + lane] + height * frame[(_NORMAL + 1) * PACKET_WIDTH + lane]
+                z = frame[2 * PACKET_WIDTH + lane] + height * frame[(_NORMAL + 2) * PACKET_WIDTH + lane]
                 ex, ey, ez = (
                     frame[row * PACKET_WIDTH + lane], frame[(row + 1) * PACKET_WIDTH + lane],
                     frame[(row + 2) * PACKET_WIDTH + lane],
@@ -116,18 +118,18 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
                 if turn < 4:
                     on[lane] = segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
                     continue
-                # From one end of a diagonal to one of the other.
-                to = 9 - row
+                # From an end of one diagonal to an end of the other.
+                to = _DIAGONAL_1 + _DIAGONAL_2 - row
                 fx, fy, fz = (
                     frame[to * PACKET_WIDTH + lane],
                     frame[(to + 1) * PACKET_WIDTH + lane],
                     frame[(to + 2) * PACKET_WIDTH + lane],
                 )
-                way = _f(1.0) if turn < 6 else _f(-1.0)
-                back_way = way if row == 3 else -way
+                step = _f(1.0) if turn < 6 else _f(-1.0)
+                other_step = step if row == _DIAGONAL_1 else -step
                 on[lane] = segment(
-                    rays, lane, x + way * ex, y + way * ey, z + way * ez,
-                    x + back_way * fx, y + back_way * fy, z + back_way * fz,
+                    rays, lane, x + step * ex, y + step * ey, z + step * ez,
+                    x + other_step * fx, y + other_step * fy, z + other_step * fz,
                 )  # fmt: skip
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for lane in range(lanes):
@@ -138,7 +140,10 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
 
 @inner
 def _between(rays, lane, origin, normal, height, m, i, k):
-    """Write the segment between points i of item m and k of the same arrays into a lane."""
+    """Write the segment between points i and k of item m into a lane; see `segment`.
+
+    rays : (21 * 16,) float32, a packet; origin, normal : (m, 16, 3) float32; height : (m, 16) float32, metres
+    """
     h = smaller(height[m, i], height[m, k])
     return segment(
         rays, lane,
@@ -151,9 +156,10 @@ def _between(rays, lane, origin, normal, height, m, i, k):
 
 @kernel
 def point_heights(origin, normal, side, buffers, height):
-    """Write the height at which segments from points run, (n,) float32: see the module.
+    """Write the height of segments from points, see the module.
 
-    origin, normal : (n, 3) float32; side : (n,) float32, metres, of the texel of each
+    origin, normal : (n, 3) float32, metres, world, and unit; side : (n,) float32, metres, of each one's texel
+    buffers : PacketBuffers; height : (n,) float32 output, metres
     """
     scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
@@ -175,22 +181,24 @@ def point_heights(origin, normal, side, buffers, height):
 
 
 @kernel
-def group_points(origin, normal, height, mask, buffers, label):
-    """Group the points of texels by mutual visibility.
+def group_points(origin, normal, height, valid_points, buffers, label):
+    """Group the points of texels by mutual visibility; return the number of rays cast.
 
-    origin, normal : (m, 16, 3) float32; height : (m, 16) float32, from `point_heights`
-    mask : (m,) uint16, bit k is set where point k is outside geometry
+    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    height : (m, 16) float32, metres, from `point_heights`
+    valid_points : (m,) uint16, bit k is set where point k is not inside geometry
+    buffers : PacketBuffers
     label : (m, 16) int8 output, group of each point from 0, -1 for points inside geometry
-    Returns the number of rays cast.
     """
     scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
     on, rays = buffers.lane_valid, buffers.lane_floats
     spare_on, spare = buffers.valid, buffers.floats
     cast = 0
     for m in range(len(origin)):
-        bits = np.int64(mask[m])
+        bits = np.int64(valid_points[m])
         for k in range(N_POINTS):
             label[m, k] = -1
+        # Grow a group from each point that has none.
         groups = 0
         for seed in range(N_POINTS):
             if (bits >> seed) & 1 == 0 or label[m, seed] >= 0:
@@ -198,17 +206,17 @@ def group_points(origin, normal, height, mask, buffers, label):
             own = np.int8(groups)
             groups += 1
             label[m, seed] = own
-            asked = 0
+            n_rays = 0
             for k in range(N_POINTS):
                 on[k] = 0
                 if (bits >> k) & 1 and label[m, k] != own:
                     on[k] = _between(rays, k, origin, normal, height, m, seed, k)
-                    asked += 1
+                    n_rays += 1
                     if on[k] == 0:
                         label[m, k] = own
-            if asked == 0:
+            if n_rays == 0:
                 continue
-            cast += asked
+            cast += n_rays
             trace_lanes(occluded, scene, width, query, on, rays, spare_on, spare)
             for k in range(N_POINTS):
                 if on[k] == 0 or rays[TFAR * PACKET_WIDTH + k] < _f(0.0):
@@ -219,10 +227,10 @@ def group_points(origin, normal, height, mask, buffers, label):
                 if other < 0:
                     label[m, k] = own
                     continue
-                # The seed sees a point of an earlier group: both are one.
+                # The seed sees a point of an earlier group: merge both.
                 for j in range(N_POINTS):
                     label[m, j] = own if label[m, j] == other else label[m, j]
-        # Close the gaps that merged groups left in the numbers.
+        # Number the remaining groups from 0.
         left = 0
         for number in range(groups):
             found = 0
@@ -235,14 +243,16 @@ def group_points(origin, normal, height, mask, buffers, label):
 
 
 @kernel
-def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers, hidden):
+def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
     """Find texels with a corner of their surface that none of their points sees, or with a blocked outline.
 
-    A surface that cuts off a corner leaves no point behind itself, but rays may hit what lies there. An edge
-    between two walls may reach into a texel through one side of it: then the way along that side is blocked.
+    A surface that cuts off a corner has no point behind it, but rays may hit the surface there. The edge
+    between two walls may reach into a texel through one side of it; that blocks the segment along that side.
 
-    chosen : (m,) int64, texel entries; origin, normal : (m, 16, 3) float32; height : (m, 16) float32
-    mask : (m,) uint16, see `group_points`; side : (m,) float32, metres; hidden : (m,) uint8 output
+    surface : Surface; chosen : (m,) int64, texel entries
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; height : (m, 16) float32, metres
+    valid_points : (m,) uint16, see `group_points`; side : (m,) float32, metres
+    buffers : PacketBuffers; hidden : (m,) uint8 output
     Returns the number of rays cast.
     """
     position, shading, face = surface.position, surface.normal, surface.face_normal
@@ -263,6 +273,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers,
             for j in range(3):
                 corner[j, 0] = uv[triangle[t, j], 0] * size
                 corner[j, 1] = uv[triangle[t, j], 1] * size
+            # Clip the triangle to the square, and place the corners of the polygon.
             n = clip_to_square(corner, x0, y0, cut, spare)
             if n < 3:
                 continue
@@ -274,7 +285,7 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers,
             for j in range(n):
                 x = x0 + cx + _CORNER * (cut[j, 0] - cx)
                 y = y0 + cy + _CORNER * (cut[j, 1] - cy)
-                place(
+                place_point(
                     position,
                     shading,
                     face,
@@ -289,8 +300,8 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers,
                     0,
                     j,
                 )
-            cast += _look_for_corners(
-                point, facing, headroom, n, m, origin, normal, height, mask, side, buffers, hidden
+            cast += _trace_corners(
+                point, facing, headroom, n, m, origin, normal, height, valid_points, side, buffers, hidden
             )
             if hidden[m] != 0:
                 break
@@ -299,7 +310,12 @@ def hidden_corners(surface, chosen, origin, normal, height, mask, side, buffers,
 
 @inner
 def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m, k):
-    """Write the segment from corner j to point k of item m into a lane."""
+    """Write the segment from corner j to point k of item m into a lane; see `segment`.
+
+    rays : (21 * 16,) float32, a packet
+    point, facing : (1, 16, 3) float32, corners, metres, and unit normals; headroom : (1, 16) float32, metres
+    origin, normal : (m, 16, 3) float32; height : (m, 16) float32, metres
+    """
     h = smaller(headroom[0, j], height[m, k])
     return segment(
         rays, lane,
@@ -311,9 +327,14 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 
 
 @inner
-def _look_for_corners(point, facing, headroom, found, m, origin, normal, height, mask, side, buffers, hidden):
-    """Set hidden[m] if no point of item m sees one of `found` corners (1, 16, 3), or one not the next.
+def _trace_corners(
+    point, facing, headroom, found, m, origin, normal, height, valid_points, side, buffers, hidden
+):
+    """Set hidden[m] if no point of item m sees one of `found` corners, or one corner not the next.
 
+    point, facing : (1, 16, 3) float32, corners, metres, and unit normals
+    headroom : (1, 16) float32, metres, working memory
+    origin, normal, height, valid_points, side, buffers, hidden : see `hidden_corners`
     Returns the number of rays cast.
     """
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
@@ -336,8 +357,10 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
         buffers.valid,
         buffers.floats,
     )
+    # Their headroom.
     for j in range(found):
         headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * PACKET_WIDTH + j])
+    # Trace the outline, from each corner to the next.
     for j in range(PACKET_WIDTH):
         on[j] = 0
     for j in range(found):
@@ -358,11 +381,11 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
             hidden[m] = 1
     if hidden[m] != 0:
         return 2 * found
-    bits = np.int64(mask[m])
+    bits = np.int64(valid_points[m])
     first = 0
     while first + 1 < N_POINTS and bits != 0 and (bits >> first) & 1 == 0:
         first += 1
-    # One point sees most corners; only for the others all are asked.
+    # Trace from the first valid point to all corners, then from all points to the corners it does not see.
     for j in range(found):
         on[j] = _to_point(rays, j, point, facing, headroom, j, origin, normal, height, m, first)
     trace_lanes(
@@ -402,9 +425,11 @@ def _look_for_corners(point, facing, headroom, found, m, origin, normal, height,
 
 @kernel
 def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, buffers, free):
-    """Find out which pairs of points see each other.
+    """Test which pairs of points see each other.
 
-    origin_*, normal_* : (n, 3) float32; height_* : (n,) float32; free : (n,) uint8 output
+    origin_a, normal_a, origin_b, normal_b : (n, 3) float32, metres, world, and unit
+    height_a, height_b : (n,) float32, metres; the lower one of a pair counts
+    buffers : PacketBuffers; free : (n,) uint8 output, 1 if the segment is not blocked
     """
     scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
     on, rays = buffers.lane_valid, buffers.lane_floats
@@ -429,16 +454,17 @@ def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, bu
 
 
 @kernel
-def count_backs(origin, normal, table, buffers, sobol_points, shared, count):
-    """Count how many rays, one from each point of a texel, meet the back of a one-sided surface first.
+def count_backs(origin, normal, lookup, buffers, sobol_points, shared, count):
+    """Count the rays, one from each point of a texel, that hit the back of a one-sided surface first.
 
-    origin, normal : (m, 16, 3) float32; sobol_points : (16, 2) uint32; shared : uint32, see `sampling`
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; lookup : TriangleLookup
+    buffers : PacketBuffers; sobol_points : (16, 2) uint32; shared : uint32, see `sampling`
     count : (m,) int32 output
     """
     scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     spare_on, spare = buffers.valid, buffers.floats
-    row = table.row
+    row = lookup.row
     seeds, frame = new_seeds(), new_frame()
     for group in range(0, len(origin), PACKET_WIDTH):
         lanes = smaller(PACKET_WIDTH, len(origin) - group)
@@ -458,5 +484,5 @@ def count_backs(origin, normal, table, buffers, sobol_points, shared, count):
                     rays[DIR_Y * PACKET_WIDTH + lane],
                     rays[DIR_Z * PACKET_WIDTH + lane],
                 )
-                if row[prim, 7] == _f(0.0) and not front_facing(row, prim, dx, dy, dz):
+                if row[prim, DOUBLE_SIDED] == _f(0.0) and not front_facing(row, prim, dx, dy, dz):
                     count[group + lane] += 1

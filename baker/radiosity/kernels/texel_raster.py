@@ -1,7 +1,8 @@
+# mypy: disable-error-code="no-untyped-def"
 """Conservative rasterisation of charts: which triangles each texel's square touches.
 
-A texel is an area. Two passes (count, fill) give a list of triangles per texel with the area of
-each inside the texel's square; a texel belongs to the chart that covers most of it.
+A texel is an area. Two passes (count, fill) list the triangles of each texel with their areas inside its
+square; a texel belongs to the chart that covers most of it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,11 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 
 @inner
-def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
+def _corners(uv, triangle, t, size, corner):
+    """Write the corners of triangle t in texels, and return first x, first y, last x, last y of its texels.
+
+    uv : (V, 2) float32; triangle : (T, 3) int32; corner : (3, 2) float64 output
+    """
     low_x = low_y = 1.0e30
     high_x = high_y = -1.0e30
     for i in range(3):
@@ -26,7 +31,7 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
         corner[i, 1] = y
         low_x, high_x = smaller(low_x, x), larger(high_x, x)
         low_y, high_y = smaller(low_y, y), larger(high_y, y)
-    # A border exactly on a texel's edge belongs to the texel that is filled, not to its neighbour.
+    # A border exactly on a texel's edge must not touch the texel on its other side.
     tiny = 1.0e-4
     first_x = larger(math.floor(low_x + tiny), 0)
     first_y = larger(math.floor(low_y + tiny), 0)
@@ -36,12 +41,13 @@ def _corners(uv, triangle, t, size, corner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def list_overlaps(uv, triangle, page, size, at, entry, area):  # type: ignore[no-untyped-def]
-    """Write each texel's triangles and their areas (in texels) to `entry` and `area`, from `at` on.
+def list_overlaps(uv, triangle, page, size, at, entry, area):
+    """Write the triangles that each texel's square touches, and their areas in it, in ascending order.
 
-    at : (P * H * W,) int64, moved by the number of triangles that touch each texel's square
-    entry, area : without items nothing is written, only counted
-    Triangles come in rising order.
+    uv : (V, 2) float32; triangle : (T, 3) int32; page : (T,) int32; size : int, of a page, texels
+    at : (P * H * W,) int64, where the next triangle of each texel is written; advanced by their number
+    entry : (m,) int32 output, triangles; (0,): they are only counted
+    area : (m,) float32 output, texels
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
@@ -63,12 +69,13 @@ def list_overlaps(uv, triangle, page, size, at, entry, area):  # type: ignore[no
 
 
 @kernel
-def keep_main_chart(first, entry, area, chart, texel_chart, kept):  # type: ignore[no-untyped-def]
-    """Choose for each texel the chart with the largest area; mark its entries in `kept`.
+def keep_main_chart(first, entry, area, chart, texel_chart, kept):
+    """Choose for each texel the chart with the largest area, and mark its entries.
 
     first : (n + 1,) int64, entries of texel i are first[i] to first[i + 1]
-    texel_chart : (n,) int32 output; kept : (m,) bool output
-    Entries of no area (touching corners) are dropped where the texel has others.
+    entry : (m,) int32, triangles; area : (m,) float32, texels; chart : (T,) int32, of each triangle
+    texel_chart : (n,) int32 output; kept : (m,) bool output, set for the entries of that chart
+    Entries without area (touching corners) are dropped where the texel has others.
     """
     for i in range(len(first) - 1):
         best = -1.0

@@ -11,6 +11,8 @@ from tiny_scenes import Quad, grey, quad_world
 from baker.core.geometry import Geometry, face_normals
 from baker.core.scene import Material, Texture
 from baker.kernels.emitters import (
+    CLUSTER,
+    SHARE,
     bounding_sphere,
     cluster_chances,
     emitted_radiance,
@@ -104,7 +106,7 @@ def test_the_table_holds_every_emitter_once(n):
     for c in range(len(emitters.power)):
         span = slice(emitters.first[c], emitters.first[c + 1])
         assert emitters.power[c] == pytest.approx(power[span].sum(), rel=1e-5)
-        np.testing.assert_allclose(emitters.row[span, 14], power[span] / power[span].sum(), rtol=1e-5)
+        np.testing.assert_allclose(emitters.row[span, SHARE], power[span] / power[span].sum(), rtol=1e-5)
         corner = geometry.position[geometry.triangle[emitters.triangle[span]]].reshape(-1, 3)
         assert (np.linalg.norm(corner - emitters.centre[c], axis=1) <= emitters.radius[c] * 1.0001).all()
         if emitters.spread[c] < 3:
@@ -153,7 +155,7 @@ def test_extreme_numbers_choose_a_triangle_that_can_be_chosen():
         )
         assert 0 <= m < len(emitters.triangle)
         assert density > 0
-        assert chance[int(emitters.row[m, 16])] > 0
+        assert chance[int(emitters.row[m, CLUSTER])] > 0
         assert min(b1, b2) >= 0
         assert b1 + b2 <= 1
 
@@ -250,8 +252,8 @@ def test_the_two_halves_of_mis_make_one_whole():
         if not lit:
             continue
         # The density is one over solid angle, written out.
-        c = int(emitters.row[m, 16])
-        density = chance[c] * emitters.row[m, 14] / world.geometry.area[t] * distance**2 / abs(facing)
+        c = int(emitters.row[m, CLUSTER])
+        density = chance[c] * emitters.row[m, SHARE] / world.geometry.area[t] * distance**2 / abs(facing)
         light = mis_weighted(cosine, float(density), float(n_light), float(n_hemisphere))
         total = n_light * density * light + n_hemisphere * cosine / np.pi * found
         assert total == pytest.approx(cosine, rel=2e-4)

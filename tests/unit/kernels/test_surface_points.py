@@ -18,13 +18,13 @@ from baker.kernels.surface import (
     N_POINTS,
     OFFSET,
     ROUNDING,
-    place,
+    place_point,
     place_points,
     valid_point,
 )
 from baker.radiosity.texels import build_texels
 
-valid_point, place = compiled(valid_point, place)
+valid_point, place_point = compiled(valid_point, place_point)
 
 EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
@@ -167,7 +167,7 @@ def place_one(position, normal, b1, b2, flip=False):
     cross = np.cross(position[1] - position[0], position[2] - position[0])
     face = np.float32([cross / max(np.linalg.norm(cross), 1e-30)])
     origin, facing = np.zeros((1, 1, 3), np.float32), np.zeros((1, 1, 3), np.float32)
-    place(
+    place_point(
         position,
         normal,
         face,
@@ -214,7 +214,7 @@ def test_normals_that_make_no_sense_give_the_face_normal():
     np.testing.assert_allclose(spot, [1 + step[0], step[1], 1e-5], atol=1e-6)
 
 
-def test_a_buried_point_is_replaced_by_a_free_one(slanted):
+def test_a_point_inside_geometry_is_replaced_by_a_valid_one(slanted):
     _, texels, surface = slanted
     rng = np.random.default_rng(8)
     mask = rng.integers(0, 65536, texels.n).astype(np.uint16)

@@ -7,7 +7,7 @@ import numpy as np
 from inner import compiled
 from tiny_scenes import Quad, grey, quad_world
 
-from baker.kernels.triangle_lookup import BACK_FACE, front_facing, hit_pixel
+from baker.kernels.triangle_lookup import BACK_FACE, DOUBLE_SIDED, front_facing, hit_pixel
 
 front_facing, hit_pixel = compiled(front_facing, hit_pixel)
 
@@ -97,7 +97,7 @@ def test_two_sides_without_a_texel_are_looked_up_nowhere():
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((2, 0, 0), (1, 0, 0), (0, 1, 0))], 16)
     world.geometry.double_sided[2] = True
     table = build_triangle_lookup(world.geometry, world.texels, world.emitters)
-    assert (table.row[:, 7] == 0).all()
+    assert (table.row[:, DOUBLE_SIDED] == 0).all()
     assert len(world.texels.hit_image(np.zeros(world.texels.n))) == 256
 
 
