@@ -44,8 +44,8 @@ _INV_PI = np.float32(1.0 / math.pi)
 _SHORT = np.float32(0.9999)
 # The closed form is used for at most one emitter for each of these samples of a texel.
 _SAMPLES_PER_EMITTER = 8
-# Early out: sixteen texels count as unoccluded if none of their first rays is blocked, and these are at least
-# so many a texel.
+# Early out: sixteen texels count as unoccluded if none of their first rays is blocked, and there are at least
+# this many of them a texel.
 _MIN_TESTS = 8
 # Rows of `sampled`, the emitters that lanes chose: corner 0, edges 1 and 2, normal (3 each), density per m2,
 # 1 if two-sided, radiance (3).
