@@ -1,4 +1,4 @@
-"""Which triangles let light through, and what decides where."""
+"""Finds the triangles that let light through, and builds their table of alpha."""
 
 from __future__ import annotations
 
@@ -7,7 +7,20 @@ from numpy.typing import NDArray
 
 from baker.core.geometry import Geometry
 from baker.core.scene import Scene
-from baker.kernels.alpha import ALPHA, CUTOFF, ROW_LENGTH, SURFACE, TEXTURE, UV, AlphaTable, no_alpha
+from baker.kernels.alpha import (
+    ALPHA,
+    ALPHA_EDGE_1,
+    ALPHA_EDGE_2,
+    CUTOFF,
+    ROW_LENGTH,
+    SURFACE,
+    TEXTURE,
+    UV,
+    UV_EDGE_1,
+    UV_EDGE_2,
+    AlphaTable,
+    no_alpha,
+)
 from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
 from baker.kernels.transmittance import TransmittanceTable
@@ -22,17 +35,28 @@ def build_alpha(
     base_texture: NDArray[np.int32],
     base_uv: NDArray[np.float32],
 ) -> AlphaTable:
-    """Find the triangles of MASK and BLEND materials whose alpha may fall below what blocks.
+    """Find the triangles of MASK and BLEND materials that let light through somewhere.
 
     Parameters
     ----------
+    scene : Scene
+        Materials and meshes.
+    geometry : Geometry
+        Made from the same scene.
+    pack : TexturePack
+        Textures.
     base_texture : (M,) int32
         Number in `pack` of each material's base colour texture, -1 for none.
     base_uv : (V, 2) float32
         Its image uv by lightmap vertex; (1, 2) if nothing is textured.
+
+    Returns
+    -------
+    AlphaTable
+        The triangles that let light through.
     """
     mode = np.array([m.alpha_mode for m in scene.materials])
-    # Alpha from which on nothing passes; opaque materials block at any.
+    # Alpha above which a material blocks: the cutoff of MASK, 1 for BLEND.
     blocks = np.array(
         [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
     )
@@ -42,7 +66,7 @@ def build_alpha(
     material = geometry.material[candidate]
     factor = np.array([m.base_colour[3] for m in scene.materials], np.float32)
     alpha = factor[material][:, None] * _corner_alpha(scene, geometry, candidate)
-    lowest = np.array([1.0 if k < 0 else _least(pack, int(k)) for k in base_texture], np.float32)
+    lowest = np.array([1.0 if k < 0 else _lowest_alpha(pack, int(k)) for k in base_texture], np.float32)
     chosen = np.flatnonzero(alpha.min(axis=1) * lowest[material] < blocks[material])
     if not len(chosen):
         return no_alpha()
@@ -53,10 +77,10 @@ def build_alpha(
     if len(base_uv) > 1:
         uv = base_uv[geometry.triangle[triangle]]
         row[:, UV : UV + 2] = uv[:, 0]
-        row[:, UV + 2 : UV + 4] = uv[:, 1] - uv[:, 0]
-        row[:, UV + 4 : UV + 6] = uv[:, 2] - uv[:, 0]
+        row[:, UV_EDGE_1 : UV_EDGE_1 + 2] = uv[:, 1] - uv[:, 0]
+        row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, ALPHA] = alpha[:, 0]
-    row[:, ALPHA + 1 : ALPHA + 3] = alpha[:, 1:] - alpha[:, :1]
+    row[:, ALPHA_EDGE_1 : ALPHA_EDGE_2 + 1] = alpha[:, 1:] - alpha[:, :1]
     row[:, CUTOFF] = np.where(mode[material] == "MASK", blocks[material], np.float32(-1.0))
     row[:, TEXTURE] = base_texture[material]
     blend = np.flatnonzero(row[:, CUTOFF] < 0)
@@ -65,18 +89,23 @@ def build_alpha(
 
 
 def hit_filter(shading: Shading, table: TransmittanceTable | None = None) -> HitFilter | None:
-    """Return what the ray tree has to know of triangles that let light through, None without any.
+    """Return the filter of triangles that let light through, None without any.
 
     Parameters
     ----------
     shading : Shading
-        Materials as kernels see them.
+        Materials.
     table : TransmittanceTable, optional
-        Those that let a share of it through; None if none do.
+        BLEND triangles; None without any.
+
+    Returns
+    -------
+    HitFilter or None
+        For `RayScene`.
     """
     if not len(shading.alpha.row):
         return None
-    # Loading the compiled function takes time that other scenes need not spend.
+    # Loading the compiled function takes time: only scenes that need it do so.
     from baker.shading.kernels.alpha_filter import filter_of
 
     return filter_of(shading.alpha, table, shading.pack)
@@ -85,7 +114,7 @@ def hit_filter(shading: Shading, table: TransmittanceTable | None = None) -> Hit
 def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return (n, 3) float32: the vertex colours' alpha at the corners of triangles, 1 without colours."""
     alpha = np.ones((len(triangle), 3), np.float32)
-    # Triangles lie in the order of instances.
+    # Triangles are sorted by instance.
     bound = np.searchsorted(geometry.instance[triangle], np.arange(len(scene.instances) + 1))
     for index, instance in enumerate(scene.instances):
         colour = scene.meshes[instance.mesh].colour
@@ -96,10 +125,10 @@ def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64])
 
 
 def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n,) int64, below 2^24: equal numbers for triangles of an instance that hang together.
+    """Return (n,) int64, below 2^24: equal numbers for triangles of one connected surface of an instance.
 
-    Corners at the same place are one vertex. Of triangles with the same three vertices each is a surface of
-    its own: they are layers, not neighbours.
+    Corners at the same position are one vertex. Triangles with the same three vertices are layers: each
+    belongs to another surface.
     """
     if not len(triangle):
         return np.zeros(0, np.int64)
@@ -107,10 +136,10 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     from scipy.sparse.csgraph import connected_components
 
     corner = geometry.triangle[triangle].reshape(-1)
-    # Negative zeros are zeros.
-    place = geometry.position[corner] + np.float32(0.0)
+    # Adding 0 makes -0 equal to 0.
+    position = geometry.position[corner] + np.float32(0.0)
     instance = np.repeat(geometry.instance[triangle], 3)[:, None]
-    kept, vertex = compact(first_equal([place, instance], len(corner)))
+    kept, vertex = compact(first_equal([position, instance], len(corner)))
     vertex = np.sort(vertex.reshape(-1, 3), axis=1)
     link = np.concatenate([vertex[:, :2], vertex[:, 1:]])
     graph = coo_array((np.ones(len(link), bool), (link[:, 0], link[:, 1])), shape=(len(kept), len(kept)))
@@ -124,7 +153,7 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     return compact(first_equal([part[:, None], layer[:, None]], len(part)))[1] % (1 << 24)
 
 
-def _least(pack: TexturePack, k: int) -> float:
+def _lowest_alpha(pack: TexturePack, k: int) -> float:
     """Return the smallest alpha of a texture."""
     offset, width, height = (int(x) for x in pack.level[k, 0])
     return float(pack.pixels[offset : offset + width * height, 3].min(initial=1.0))

@@ -1,4 +1,4 @@
-"""Materials resolved for triangles: constants, texture numbers and the uv of each corner."""
+"""Resolves materials for triangles: factors, texture numbers and the uv of each corner."""
 
 from __future__ import annotations
 
@@ -13,15 +13,21 @@ from baker.shading.alpha import build_alpha
 
 
 def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = False) -> Shading:
-    """Pack the textures that materials use and find every triangle corner's uv.
+    """Pack the textures of all materials, and find the uv of every triangle corner.
 
     Parameters
     ----------
     scene : Scene
+        Materials and meshes.
     geometry : Geometry
         Made from the same scene.
     reflections : bool
-        Also resolve metallic and roughness textures, which bakes do not look at.
+        Whether to resolve metallic and roughness textures, too, which bakes do not use.
+
+    Returns
+    -------
+    Shading
+        Materials for kernels.
     """
     images: list[tuple[NDArray[np.generic], tuple[str, str]]] = []
     nearest: list[bool] = []
@@ -30,13 +36,13 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
         if texture is None:
             return -1
-        # What reflects is looked up smoothly whatever the sampler says: nobody would see a difference.
+        # Only emission honours a nearest sampler: elsewhere the difference is not visible in a bake.
         sharp = sharp and texture.nearest
         key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:
             numbers[key] = len(images)
-            plain = texture.image.dtype == np.uint8 and linear
-            images.append((texture.image / np.float32(255) if plain else texture.image, texture.wrap))
+            linear_bytes = texture.image.dtype == np.uint8 and linear
+            images.append((texture.image / np.float32(255) if linear_bytes else texture.image, texture.wrap))
             nearest.append(sharp)
         return numbers[key]
 
@@ -66,9 +72,21 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
 
 
 def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) -> NDArray[np.float32]:
-    """Return (V, 2) float32: image uv of each lightmap vertex; (0, 0) rows where nothing is textured.
+    """Return the image uv of each lightmap vertex.
 
-    Coordinates beyond `LARGEST_UV` are moved to it.
+    Parameters
+    ----------
+    scene : Scene
+        Meshes.
+    geometry : Geometry
+        Made from the same scene.
+    textures : list of Texture or None
+        Texture of each material.
+
+    Returns
+    -------
+    (V, 2) float32
+        0 where a vertex has no texture; (1, 2) if no material has one.
     """
     if all(texture is None for texture in textures):
         return np.zeros((1, 2), np.float32)
@@ -93,7 +111,20 @@ def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) 
 
 
 def vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
-    """Return (V, 4) float32 linear vertex colours with alpha, or (1, 4) ones if no mesh has any."""
+    """Return the vertex colours of lightmap vertices.
+
+    Parameters
+    ----------
+    scene : Scene
+        Meshes.
+    geometry : Geometry
+        Made from the same scene.
+
+    Returns
+    -------
+    (V, 4) float32
+        Linear RGB and alpha; (1, 4) ones if no mesh has any.
+    """
     if all(scene.meshes[i.mesh].colour is None for i in scene.instances):
         return np.ones((1, 4), np.float32)
     colour = np.ones((len(geometry.position), 4), np.float32)

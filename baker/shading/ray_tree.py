@@ -1,4 +1,4 @@
-"""The ray tree of a scene, with what lets light through."""
+"""Builds the ray tree of a scene, with the filters of triangles that let light through."""
 
 from __future__ import annotations
 
@@ -15,10 +15,16 @@ def build_ray_tree(geometry: Geometry, shading: Shading, *, threads: int) -> Ray
     Parameters
     ----------
     geometry : Geometry
+        Triangles.
     shading : Shading
-        Materials as kernels see them.
+        Their materials.
     threads : int
         Threads of the build; 0 means all.
+
+    Returns
+    -------
+    RayScene
+        The tree.
     """
     table = build_transmittance_table(shading)
     passing, colouring = hit_filter(shading, table), transmittance_filter(shading, table)

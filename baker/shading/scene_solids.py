@@ -1,4 +1,4 @@
-"""What is solid in a scene, and what rays from inside of it meet."""
+"""Classifies the triangles of a scene as solids, rooms and sheets, and what a hit on each proves."""
 
 from __future__ import annotations
 
@@ -15,15 +15,21 @@ from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids,
 
 
 def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
-    """Tell solids from rooms and open sheets.
+    """Classify the closed parts of a scene as solids, rooms and covers.
 
     Parameters
     ----------
     scene : Scene
-        Its lamps and cameras show where somebody sees.
+        A part with one of its lights or cameras inside is a room.
     geometry : Geometry
         Made from the same scene.
     shading : Shading
+        Materials.
+
+    Returns
+    -------
+    Solids
+        Classification of each triangle.
     """
     surfaces = Surfaces(
         position=geometry.position,
@@ -31,20 +37,31 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
         instance=geometry.instance,
         opaque=_opaque(geometry, shading),
         double_sided=geometry.double_sided,
-        glows=(shading.emission.max(axis=1) > 0)[geometry.material],
+        emits=(shading.emission.max(axis=1) > 0)[geometry.material],
     )
     return find_solids(surfaces, lights_and_cameras(scene))
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
-    """Return the geometry with faces of solids one-sided, and what each triangle tells rays.
+    """Make the faces of solids one-sided, and find what a hit on each triangle proves.
 
-    No light gets to the backs of a solid without holes, whatever its material says of them.
+    No light gets to the backs of a solid without holes, whether or not its material is double-sided.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights and cameras.
+    geometry : Geometry
+        Made from the same scene.
+    shading : Shading
+        Materials.
 
     Returns
     -------
     Geometry
-    tells : (T,) uint8, see `kernels.probe`
+        With those faces not double-sided.
+    hit_kind : (T,) uint8
+        See `kernels.probe`.
     """
     solids = scene_solids(scene, geometry, shading)
     hidden = solids.sealed & (solids.inside == BEHIND) & geometry.double_sided
@@ -54,18 +71,32 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
 
 
 def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
-    """Return (T,) uint8 for `kernels.probe`: what a ray from inside of something meets.
+    """Return what a triangle proves of a point whose ray hits it first.
 
-    Backs of one-sided sheets are black, those of covers as good as black; those of rooms and of what lets
-    light through say nothing.
+    Backs of one-sided sheets are black, and those of covers as good as black. Rooms and triangles that let
+    light through prove nothing.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Triangles.
+    shading : Shading
+        Materials.
+    solids : Solids
+        Their classification.
+
+    Returns
+    -------
+    (T,) uint8
+        See `kernels.probe`.
     """
-    tells = np.where(geometry.double_sided, 0, BLACK_BACK).astype(np.uint8)
-    tells[~_opaque(geometry, shading)] = 0
-    tells[solids.room] = 0
-    tells[solids.cover] = BLACK_BACK
-    tells[solids.inside == BEHIND] = SOLID_BACK
-    tells[solids.inside == BEFORE] = SOLID_FRONT
-    return tells
+    hit_kind = np.where(geometry.double_sided, 0, BLACK_BACK).astype(np.uint8)
+    hit_kind[~_opaque(geometry, shading)] = 0
+    hit_kind[solids.room] = 0
+    hit_kind[solids.cover] = BLACK_BACK
+    hit_kind[solids.inside == BEHIND] = SOLID_BACK
+    hit_kind[solids.inside == BEFORE] = SOLID_FRONT
+    return hit_kind
 
 
 def _opaque(geometry: Geometry, shading: Shading) -> NDArray[np.bool_]:

@@ -1,8 +1,8 @@
-"""Which triangles of the world form closed surfaces, and on which side of each the enclosed space lies.
+"""Finds the triangles that form closed surfaces, and on which side of each the enclosed space lies.
 
-A part is a set of triangles of one object that hang together by edges. Open parts whose open edges coincide
-are taken together: a box of six objects is closed, too. Winding need not be consistent: for the test,
-triangles are turned until their edges match.
+A part is a set of triangles of one object that are connected by edges. Open parts whose boundary edges
+coincide are joined: a box of six objects is closed, too. Winding may be inconsistent: for the test, triangles
+are turned until the directions of their edges match.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 from baker.topology.edges import Edges, find_edges
 from baker.topology.weld import connected, number_by_first, number_rows
 
-# A part is nearly closed if the area of its holes is at most this share of the area of its triangles.
+# A part is closed if the area of its holes is at most this share of the area of its triangles,
 SMALL_HOLES = 0.005
-# ... and closed if it is at most this one: slits of no width where an edge meets two shorter ones.
+# and watertight if it is at most this share: slits of no width, where an edge meets two shorter ones.
 NO_HOLES = 1e-6
-# A part whose mean thickness is below this share of its diagonal encloses nothing: origins of rays leave
-# a surface by as much.
+# A part whose mean thickness is below this share of its diagonal encloses nothing: ray origins are offset
+# from a surface by as much.
 THINNEST = 1e-5
-# The one open loop of a part without a lid is flat: it leaves its plane by at most this share of its width.
+# The only boundary loop of a part without a lid is flat: it deviates from its plane by at most this share of
+# its width (square root of its area),
 _FLAT = 0.1
-# ... and its area is at most this share of the part's, or the part is but a sheet.
+# and its area is at most this share of the part's; beyond that the part is a sheet.
 _WIDEST_LID = 0.9
-# Vertices of different objects are one if they differ by at most this share of the largest coordinate.
+# Vertices of different objects coincide if they differ by at most this share of the largest coordinate.
 _TOGETHER = 4e-7
 
 
@@ -36,22 +37,24 @@ class ClosedParts(NamedTuple):
     Attributes
     ----------
     part : (T,) int32
-        Part of each triangle, -1 = left out, also a wall between two boxes of one object.
+        Part of each triangle, -1 for those left out, among them a wall between two boxes of one object.
     outward : (T,) int8
-        1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it;
-        0 if its part encloses none. The same for parts without a lid.
-    closed, exact : (P,) bool
-        The part encloses a space; it has no holes at all.
+        1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it,
+        0 if its part encloses none. Parts without a lid count as closed here.
+    closed, watertight : (P,) bool
+        Whether the part encloses a space; whether it has no holes at all.
     lidless : (P,) bool
-        The part is open, but a flat lid on its only hole would close it.
-    area : (P,) float64, m2
-    low, high : (P, 3) float64, bounds, metres
+        Whether the part is open, but a flat lid on its only hole would close it.
+    area : (P,) float64
+        m2.
+    low, high : (P, 3) float64
+        Bounds, metres.
     """
 
     part: NDArray[np.int32]
     outward: NDArray[np.int8]
     closed: NDArray[np.bool_]
-    exact: NDArray[np.bool_]
+    watertight: NDArray[np.bool_]
     lidless: NDArray[np.bool_]
     area: NDArray[np.float64]
     low: NDArray[np.float64]
@@ -61,8 +64,20 @@ class ClosedParts(NamedTuple):
 class _Pieces(NamedTuple):
     """Pieces that F faces form.
 
-    piece (F,), of each face; turn (F,), 1 or -1, see `_turns`; bad (B,), edges that do not cancel;
-    holes, area (P,) float64, m2; flat (P,) bool, there is one hole, and it is flat.
+    Attributes
+    ----------
+    piece : (F,) int32
+        Piece of each face.
+    turn : (F,) int8
+        1 or -1, see `_turns`.
+    bad : (B,) int64
+        Edges at which the directions of the faces do not cancel.
+    edges : Edges
+        Edges of the faces.
+    holes, area : (P,) float64
+        Area of the holes and of the faces, m2.
+    flat : (P,) bool
+        Whether the piece has one hole, and that is flat.
     """
 
     piece: NDArray[np.int32]
@@ -85,10 +100,18 @@ def find_closed_parts(
     Parameters
     ----------
     position : (V, 3) float32, metres, world
+        Vertices.
     triangle : (T, 3) int
-    instance : (T,) int, object of each triangle
+        Their corners.
+    instance : (T,) int
+        Object of each triangle.
     used : (T,) bool
         Which triangles count; the others are left out.
+
+    Returns
+    -------
+    ClosedParts
+        Parts of all triangles.
     """
     n = len(triangle)
     part, outward = np.full(n, -1, np.int32), np.zeros(n, np.int8)
@@ -100,8 +123,8 @@ def find_closed_parts(
         none = np.zeros((0, 3))
         nothing = np.zeros(0, bool)
         return ClosedParts(part, outward, nothing, nothing, nothing, np.zeros(0), none, none)
-    first, same_way = _twins(vertex)
-    single = _single(vertex, first, same_way)
+    first, same_winding = _twins(vertex)
+    single = _single(vertex, first, same_winding)
     corner = position[triangle[rows[single]]].astype(np.float64)
     vertex = vertex[single]
     pieces = _pieces(vertex, corner)
@@ -111,7 +134,7 @@ def find_closed_parts(
     number[single] = np.arange(len(single))
     of = number[first]
     part[rows] = np.where(of >= 0, pieces.piece[of], -1)
-    outward[rows] = np.where(of >= 0, whole[of] * same_way, 0)
+    outward[rows] = np.where(of >= 0, whole[of] * same_winding, 0)
     n_parts = len(pieces.area)
     closed = np.zeros(n_parts, bool)
     closed[pieces.piece[whole != 0]] = True
@@ -122,12 +145,16 @@ def find_closed_parts(
     a, b, c = (corner[order, k] for k in range(3))
     low = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), start, axis=0)
     high = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), start, axis=0)
-    exact = closed & (pieces.holes <= NO_HOLES * pieces.area)
-    return ClosedParts(part, outward, closed, exact, lidless, pieces.area, low, high)
+    watertight = closed & (pieces.holes <= NO_HOLES * pieces.area)
+    return ClosedParts(part, outward, closed, watertight, lidless, pieces.area, low, high)
 
 
 def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the areas (F,) of triangles, corners (F, 3, 3)."""
+    """Return the areas of triangles.
+
+    corner : (F, 3, 3) float64, metres
+    Returns (F,) float64, m2.
+    """
     (ux, uy, uz), (vx, vy, vz) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     area: NDArray[np.float64] = 0.5 * np.sqrt(x * x + y * y + z * z)
@@ -135,7 +162,7 @@ def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return (F,) bool: the three corners of a face (F, 3) differ."""
+    """Return (F,) bool: whether the three corners of a face (F, 3) differ."""
     a, b, c = vertex.T
     distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
     return distinct
@@ -144,7 +171,7 @@ def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
 def _weld(
     position: NDArray[np.float32], triangle: NDArray[np.integer], instance: NDArray[np.integer]
 ) -> NDArray[np.int64]:
-    """Return (F, 3) int64: number of each corner's position within its object."""
+    """Return (F, 3) int64: corners, numbered alike where position and object are equal."""
     marked = np.zeros(len(position), bool)
     marked[triangle.reshape(-1)] = True
     used = np.flatnonzero(marked)
@@ -157,37 +184,37 @@ def _weld(
 
 
 def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
-    """Return (F,) the first face with the same three corners, and 1 if that is wound alike, else -1."""
+    """Return (F,) int64, the first face with the same corners, and (F,) int8, 1 if wound alike, else -1."""
     a, b, c = vertex.T
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     ordered = np.stack([low, a + b + c - low - high, high], axis=1)
     n = int(ordered.max(initial=0)) + 1
-    # One number for three would overflow: the hash of all is enough to find candidates.
+    # Three corners in one number would overflow: their hash finds the candidates.
     key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
     order = np.argsort(key, kind="stable")
-    of, way = np.arange(len(vertex)), np.ones(len(vertex), np.int8)
+    of, winding = np.arange(len(vertex)), np.ones(len(vertex), np.int8)
     begin, end = order[:-1], order[1:]
     for k in np.flatnonzero(key[begin] == key[end]):
         if (ordered[begin[k]] == ordered[end[k]]).all():
             twin, first = int(end[k]), int(of[begin[k]])
             of[twin] = first
             turned = [np.roll(vertex[twin], shift).tolist() for shift in range(3)]
-            way[twin] = 1 if vertex[first].tolist() in turned else -1
-    return of, way
+            winding[twin] = 1 if vertex[first].tolist() in turned else -1
+    return of, winding
 
 
 def _single(
-    vertex: NDArray[np.int64], first: NDArray[np.int64], same_way: NDArray[np.int8]
+    vertex: NDArray[np.int64], first: NDArray[np.int64], same_winding: NDArray[np.int8]
 ) -> NDArray[np.int64]:
-    """Return the faces that make pieces: one of each set of twins.
+    """Return the faces that form pieces: one of each set of faces with the same corners.
 
-    Two boxes of one object that touch have a wall in common, once for each: it lies inside both together and
-    is left out. Where all faces of a piece are there for both sides, one of each stays.
+    Two boxes of one object that touch share a wall, once from each: it lies inside both together and is left
+    out. Where all faces of a piece occur with both windings, one of each stays.
     """
     single = np.flatnonzero(first == np.arange(len(first)))
     paired = np.zeros(len(first), bool)
-    paired[first[same_way < 0]] = True
+    paired[first[same_winding < 0]] = True
     if not paired.any():
         return single
     piece = find_edges(vertex[single]).connected_faces(len(single))
@@ -197,7 +224,7 @@ def _single(
 
 
 def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
-    """Find pieces, turn their faces to one winding, and measure their holes."""
+    """Find the pieces of faces (F, 3), turn their faces to one winding, and measure their holes."""
     n = len(vertex)
     edges = find_edges(vertex)
     piece = edges.connected_faces(n)
@@ -205,13 +232,13 @@ def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
     turn = _turns(edges, piece, n_pieces)
     half = np.repeat(np.arange(len(edges.first)), edges.count)
     begin = vertex[edges.face, edges.corner]
-    way = np.where(begin == edges.low[half], 1, -1) * turn[edges.face]
-    net = np.add.reduceat(way, edges.first)
+    direction = np.where(begin == edges.low[half], 1, -1) * turn[edges.face]
+    balance = np.add.reduceat(direction, edges.first)
     total = np.bincount(piece, face_areas(corner), minlength=n_pieces).astype(np.float64)
-    bad = np.flatnonzero(net != 0)
+    bad = np.flatnonzero(balance != 0)
     holes, flat = np.zeros(n_pieces), np.zeros(n_pieces, bool)
     if len(bad):
-        loop, size, even = _loops(vertex, corner, edges, bad, net[bad])
+        loop, size, even = _loops(vertex, corner, edges, bad, balance[bad])
         owner = np.zeros(len(size), np.int64)
         owner[loop] = piece[edges.face[edges.first[bad]]]
         holes = holes + np.bincount(owner, size, minlength=n_pieces)
@@ -226,9 +253,12 @@ def _loops(
     corner: NDArray[np.float64],
     edges: Edges,
     bad: NDArray[np.int64],
-    net: NDArray[np.int64],
+    balance: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the loop of each bad edge (those that share vertices), loops' areas, m2, and which are flat."""
+    """Return the boundary loops of bad edges; edges that share vertices are of one loop.
+
+    Returns (B,) int32, loop of each bad edge; (L,) float64, areas in m2; (L,) bool, which loops are flat.
+    """
     name, ends = np.unique(np.stack([edges.low[bad], edges.high[bad]]), return_inverse=True)
     ends = ends.reshape(2, -1)
     loop = number_by_first(connected(ends[0], ends[1], len(name))[ends[0]])
@@ -238,7 +268,7 @@ def _loops(
     begin, end = np.where(forward, begin, end), np.where(forward, end, begin)
     count = np.bincount(loop)
     middle = np.stack([np.bincount(loop, begin[:, k]) / count for k in range(3)], axis=1)[loop]
-    turned = 0.5 * net[:, None] * np.cross(begin - middle, end - middle)
+    turned = 0.5 * balance[:, None] * np.cross(begin - middle, end - middle)
     vector = np.stack([np.bincount(loop, turned[:, k]) for k in range(3)], axis=1)
     size = np.linalg.norm(vector, axis=1)
     normal = vector / np.maximum(size, 1e-300)[:, None]
@@ -248,10 +278,10 @@ def _loops(
 
 
 def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
-    """Return (F,) int8: 1 or -1, so that faces times that are wound alike across edges of two faces.
+    """Return (F,) int8, 1 or -1: factors of normals that make windings agree across edges of two faces.
 
-    Each face stands twice in a graph, as it is and turned over; edges join the copies that match. A surface
-    with one side only (a Moebius strip) cannot be turned and is left as it is.
+    Each face is two nodes of a graph, one for each winding; edges connect the nodes that match. A surface
+    with one side only (a Moebius strip) cannot be turned and keeps its winding.
     """
     n = len(piece)
     turn = np.ones(n, np.int8)
@@ -270,7 +300,7 @@ def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.
 
 
 def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
-    """Take pieces together whose open edges coincide, if that closes them."""
+    """Join pieces whose boundary edges coincide, if that closes them."""
     edges, bad = pieces.edges, pieces.bad
     is_open = pieces.holes > SMALL_HOLES * pieces.area
     bad = bad[is_open[pieces.piece[edges.face[edges.first[bad]]]]]
@@ -279,9 +309,9 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     at = edges.first[bad]
     face, c = edges.face[at], edges.corner[at]
     ends = np.stack([corner[face, c], corner[face, (c + 1) % 3]]).reshape(-1, 3)
-    place = _near_alike(ends, _TOGETHER * float(np.abs(corner).max(initial=0.0)))
-    here = np.sort(place.reshape(2, -1), axis=0)
-    _, key = np.unique(here[0] * (int(place.max()) + 1) + here[1], return_inverse=True)
+    label_of_end = _near_alike(ends, _TOGETHER * float(np.abs(corner).max(initial=0.0)))
+    here = np.sort(label_of_end.reshape(2, -1), axis=0)
+    _, key = np.unique(here[0] * (int(label_of_end.max()) + 1) + here[1], return_inverse=True)
     key = key.reshape(-1)
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
@@ -293,25 +323,25 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     joined = np.zeros(len(pieces.area), bool)
     joined[np.unique(np.concatenate([group[a], group[b]]))] = True
     chosen = np.flatnonzero(joined[group[pieces.piece]])
-    # Open corners get the number of their place; the others keep their own.
+    # Corners on the boundary get one number for each position; the others keep theirs.
     shared = vertex.copy()
     base = int(vertex.max()) + 1
     renamed = np.arange(base)
-    renamed[np.concatenate([vertex[face, c], vertex[face, (c + 1) % 3]])] = base + place
+    renamed[np.concatenate([vertex[face, c], vertex[face, (c + 1) % 3]])] = base + label_of_end
     shared = renamed[vertex[chosen]]
     distinct = _distinct(shared)
     chosen, shared = chosen[distinct], shared[distinct]
     again = _pieces(shared, corner[chosen])
-    good = again.holes <= SMALL_HOLES * again.area
-    use = good[again.piece]
-    if not use.any():
+    closes = again.holes <= SMALL_HOLES * again.area
+    chosen_closes = closes[again.piece]
+    if not chosen_closes.any():
         return pieces
     piece, turn = pieces.piece.astype(np.int64), pieces.turn.copy()
-    piece[chosen[use]] = len(pieces.area) + again.piece[use]
-    turn[chosen[use]] = again.turn[use]
+    piece[chosen[chosen_closes]] = len(pieces.area) + again.piece[chosen_closes]
+    turn[chosen[chosen_closes]] = again.turn[chosen_closes]
     name, number = np.unique(piece, return_inverse=True)
     holes = np.concatenate([pieces.holes, again.holes])[name]
-    # What is left of a piece that lost faces to a closed one keeps its holes, and more.
+    # The rest of a piece that lost faces to a closed one has at least its former holes.
     area = np.concatenate([pieces.area, again.area])[name]
     flat = np.concatenate([pieces.flat, again.flat])[name]
     return pieces._replace(
@@ -320,7 +350,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
 
 
 def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
-    """Number (N, 3) points alike if no coordinate has a gap wider than `step` between them."""
+    """Number points (N, 3) alike if no gap wider than `step` separates them along an axis."""
     label = np.zeros(point.shape, np.int64)
     for axis in range(3):
         order = np.argsort(point[:, axis], kind="stable")

@@ -1,17 +1,16 @@
-"""Which closed parts are solids, so that nobody ever sees their inside, and which are rooms.
+"""Classifies closed parts as solids, whose inside is never visible, or rooms.
 
-The rule does not ask whether materials are double-sided where the shape tells enough:
+The rules use shape and contents; whether a material is double-sided counts only where these do not decide:
 
 - An opaque closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock).
-- It is a room all the same if a lamp, a camera or an object that emits light lies inside, if it glows on both
-  sides and has anything inside, if it has small holes and anything inside, or if most of the scene is inside
-  (sky spheres).
-- One whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls), else
-  a room. If it has nothing inside and does not glow, it is a solid wound the wrong way.
+- It is a room if a light, a camera or an object that emits light is inside, if it emits on both sides and has
+  anything inside, if it has small holes and anything inside, or if most of the scene is inside (sky spheres).
+- A part whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls),
+  else a room. If it has nothing inside and does not emit, it is a solid wound inwards.
 - An open part that a flat lid would close, wound outwards and with nothing inside (a crate without a bottom),
-  is a cover: what sees nothing but its inside is hidden, for something else is the lid.
+  is a cover: points that see nothing but its inside are hidden, since another surface is its lid.
 
-A solid has no light inside and lets none in, so what a wrong guess can hide is dark in any case.
+A solid contains no light and lets none in, so a room that is classified as a solid by mistake is dark anyway.
 """
 
 from __future__ import annotations
@@ -26,25 +25,34 @@ from baker.core.scene import Scene
 from baker.topology.closed_parts import ClosedParts, face_areas, find_closed_parts
 from baker.topology.winding_number import MANY, Enclosure
 
-# Where the inside of a solid is, seen from a triangle.
+# Side of a triangle on which the inside of a solid lies: none, its back, its front.
 NOWHERE, BEHIND, BEFORE = 0, 1, 2
-# A part is inside another one if most of so many of its triangles' centres are and none is outside.
+# Triangle centres that are tested: a part is inside another one if most of them are and none is outside.
 _WITNESSES = 8
-# Winding numbers above and below which a point is inside or outside.
+# A point is inside above these winding numbers (of a closed part, of one without a lid), outside below the
+# last.
 _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
 # A part that holds more than this share of the other parts' area is a room.
 _MOST_OF_SCENE = 0.5
-# At most so many parts are examined as holding most of the scene, and so many as being held.
+# Parts that are tested for holding most of the scene, and parts that are tested for being held, at most.
 _LARGEST, _HELD = 32, 64
-# Faces of a part times parts that are asked whether they are in it: a second of work.
+# Faces of a part times parts tested for being inside it, at most: a second of work.
 _MOST_WORK = 200_000_000
 
 
 class Surfaces(NamedTuple):
     """The world's triangles.
 
-    position (V, 3) float32, metres; triangle (T, 3) int; instance (T,) int; opaque, double_sided, glows (T,)
-    bool: nothing passes, the back reflects, emits light.
+    Attributes
+    ----------
+    position : (V, 3) float32
+        Metres.
+    triangle : (T, 3) int
+        Vertices.
+    instance : (T,) int
+        Object, negative for triangles to leave out.
+    opaque, double_sided, emits : (T,) bool
+        Whether no light passes, whether the back reflects, whether the triangle emits light.
     """
 
     position: NDArray[np.float32]
@@ -52,26 +60,27 @@ class Surfaces(NamedTuple):
     instance: NDArray[np.integer]
     opaque: NDArray[np.bool_]
     double_sided: NDArray[np.bool_]
-    glows: NDArray[np.bool_]
+    emits: NDArray[np.bool_]
 
 
 class Solids(NamedTuple):
-    """What is solid in the world.
+    """Classification of the world's triangles.
 
     Attributes
     ----------
     inside : (T,) uint8
-        `BEHIND` if the inside of a solid lies behind the triangle, `BEFORE` if it lies in front of it
-        (wound the wrong way), else `NOWHERE`.
+        `BEHIND` if the inside of a solid lies behind the triangle, `BEFORE` if it lies in front of it (wound
+        inwards), else `NOWHERE`.
     sealed : (T,) bool
-        The triangle belongs to a solid without any hole.
+        Whether the triangle belongs to a solid without any hole.
     room : (T,) bool
-        The triangle belongs to a closed part that is a room.
+        Whether it belongs to a closed part that is a room.
     cover : (T,) bool
-        The triangle belongs to a cover.
+        Whether it belongs to a cover.
     part : (T,) int32
         Part of each triangle, -1 for those that let light through.
     parts : ClosedParts
+        All parts.
     """
 
     inside: NDArray[np.uint8]
@@ -83,19 +92,36 @@ class Solids(NamedTuple):
 
 
 def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
-    """Return where lamps and cameras are, (N, 3) float64, metres, relative to the scene's origin."""
+    """Return the positions of lights and cameras, from where insides are visible.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lights without a position are left out.
+
+    Returns
+    -------
+    (N, 3) float64, metres
+        Relative to the scene's origin.
+    """
     cameras = np.array([camera.position for camera in scene.cameras], np.float64).reshape(-1, 3)
     return np.concatenate([light_positions(scene), cameras]) - scene.origin
 
 
-def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:
-    """Tell solids from rooms.
+def find_solids(surfaces: Surfaces, viewpoints: NDArray[np.float64]) -> Solids:
+    """Classify closed parts as solids, rooms and covers.
 
     Parameters
     ----------
     surfaces : Surfaces
-    places : (N, 3) float64, metres
-        Lamps and cameras, relative to the same origin as the surfaces: where one is, somebody sees.
+        All triangles.
+    viewpoints : (N, 3) float64, metres
+        Lights and cameras, relative to the same origin as the surfaces: a part with one inside is a room.
+
+    Returns
+    -------
+    Solids
+        Classification of each triangle.
     """
     parts = find_closed_parts(
         surfaces.position, surfaces.triangle, surfaces.instance, surfaces.opaque & (surfaces.instance >= 0)
@@ -104,50 +130,51 @@ def find_solids(surfaces: Surfaces, places: NDArray[np.float64]) -> Solids:
     if not parts.closed.any() and not parts.lidless.any():
         none = np.zeros(n, bool)
         return Solids(np.zeros(n, np.uint8), none, none, none, parts.part, parts)
-    judge = _Judge(surfaces, parts, places)
-    room = judge.rooms()
-    known = parts.part >= 0
+    classifier = _Classifier(surfaces, parts, viewpoints)
+    room = classifier.rooms()
+    in_part = parts.part >= 0
     is_room, is_cover = np.zeros(n, bool), np.zeros(n, bool)
-    is_room[known] = room[parts.part[known]]
-    is_cover[known] = judge.covers()[parts.part[known]]
+    is_room[in_part] = room[parts.part[in_part]]
+    is_cover[in_part] = classifier.covers()[parts.part[in_part]]
     solid = np.zeros(n, bool)
-    solid[known] = (parts.closed & ~room)[parts.part[known]]
+    solid[in_part] = (parts.closed & ~room)[parts.part[in_part]]
     outward = np.where(solid, parts.outward, 0)
-    # A hollow is wound as a solid's surface is: its normals point out of the material.
-    outward[np.isin(parts.part, judge.hollows()) & known] *= -1
+    # Normals of a hollow point out of the material, as those of the solid around it do.
+    outward[np.isin(parts.part, classifier.hollows()) & in_part] *= -1
     inside = np.where(outward > 0, BEHIND, np.where(outward < 0, BEFORE, NOWHERE)).astype(np.uint8)
-    sealed = (inside != NOWHERE) & parts.exact[parts.part]
+    sealed = (inside != NOWHERE) & parts.watertight[parts.part]
     return Solids(inside, sealed, is_room, is_cover, parts.part, parts)
 
 
-class _Judge:
-    """Decides part by part."""
+class _Classifier:
+    """Classifies one part after the other."""
 
-    def __init__(self, surfaces: Surfaces, parts: ClosedParts, places: NDArray[np.float64]) -> None:
-        self.surfaces, self.parts, self.places = surfaces, parts, places
+    def __init__(self, surfaces: Surfaces, parts: ClosedParts, viewpoints: NDArray[np.float64]) -> None:
+        self.surfaces, self.parts, self.viewpoints = surfaces, parts, viewpoints
         n = len(parts.area)
-        known = np.flatnonzero(parts.part >= 0)
-        of = parts.part[known]
-        self.order = known[np.argsort(of, kind="stable")]
+        in_part = np.flatnonzero(parts.part >= 0)
+        of = parts.part[in_part]
+        self.order = in_part[np.argsort(of, kind="stable")]
         self.start = np.searchsorted(parts.part[self.order], np.arange(n + 1))
-        weight = self._areas(known)
+        weight = self._areas(in_part)
         area = np.maximum(parts.area, 1e-300)
         # Slivers may have been left out of the area.
-        self.inward = np.bincount(of, weight * (parts.outward[known] < 0), minlength=n) > 0.5 * area
-        self.two_sided = np.bincount(of, weight * surfaces.double_sided[known], minlength=n) > 0.5 * area
-        self.glows = np.bincount(of, surfaces.glows[known], minlength=n) > 0
-        glows_behind = surfaces.glows & surfaces.double_sided
-        self.glows_behind = np.bincount(of, glows_behind[known], minlength=n) > 0
-        # Boxes are compared but for rounding, which follows the coordinates of each part.
+        self.inward = np.bincount(of, weight * (parts.outward[in_part] < 0), minlength=n) > 0.5 * area
+        self.two_sided = np.bincount(of, weight * surfaces.double_sided[in_part], minlength=n) > 0.5 * area
+        self.emits = np.bincount(of, surfaces.emits[in_part], minlength=n) > 0
+        emits_behind = surfaces.emits & surfaces.double_sided
+        self.emits_behind = np.bincount(of, emits_behind[in_part], minlength=n) > 0
+        # Tolerance for comparing boxes: rounding grows with the coordinates of a part.
         self.slack = 1e-6 * np.maximum(np.abs(parts.low), np.abs(parts.high)).max(axis=1, initial=0.0)
         self.around: dict[int, int] = {}
 
     def _areas(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the areas of triangles, m2."""
         corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
         return face_areas(corner)
 
     def hollows(self) -> NDArray[np.int64]:
-        """Return the parts that are hollows of solids, known after `rooms`."""
+        """Return the parts that are hollows of solids; call `rooms` first."""
         return np.array(sorted(self.around), np.int64)
 
     def rooms(self) -> NDArray[np.bool_]:
@@ -175,67 +202,71 @@ class _Judge:
         return room
 
     def covers(self) -> NDArray[np.bool_]:
-        """Return (P,) bool: parts without a lid that hide what is under them."""
+        """Return (P,) bool: parts without a lid that hide the points under them."""
         parts = self.parts
         cover = parts.lidless & ~self.inward
         for part in np.flatnonzero(cover):
-            # Black backs hide what is under them anyway.
-            few = self.start[part + 1] - self.start[part] <= MANY
+            # One-sided parts need no test: their backs are black anyway.
+            is_small = self.start[part + 1] - self.start[part] <= MANY
             cover[part] = (
-                bool(self.two_sided[part] and few)
-                and not self._holds_place(int(part))
+                bool(self.two_sided[part] and is_small)
+                and not self._holds_viewpoint(int(part))
                 and not self._holds(int(part), None, mostly=True)
             )
         return cover
 
     def _outward_room(self, part: int, large: bool) -> bool:
-        # A lamp may stick in the ceiling of a room, whose back would shine. Black backs make no room.
+        # With double-sided walls an emitter that is mostly inside counts: it may be set into the ceiling.
+        # Backs of one-sided walls are black.
+        """Return whether a closed part with normals outwards is a room; large: see `_largest`."""
         mostly = bool(self.two_sided[part])
-        if self._holds_place(part) or self._holds(part, self.glows, mostly=mostly):
+        if self._holds_viewpoint(part) or self._holds(part, self.emits, mostly=mostly):
             return True
-        if (self.glows_behind[part] or not self.parts.exact[part]) and self._holds(part, None):
+        if (self.emits_behind[part] or not self.parts.watertight[part]) and self._holds(part, None):
             return True
         return large and self._holds_most(part)
 
     def _inward_room(self, part: int) -> bool:
-        if self.glows[part] or len(self.parts.area) == 1:
+        """Return whether a closed part with normals inwards, and not a hollow, is a room."""
+        if self.emits[part] or len(self.parts.area) == 1:
             return True
-        return self._holds_place(part) or self._holds(part, None, mostly=True)
+        return self._holds_viewpoint(part) or self._holds(part, None, mostly=True)
 
     def _largest(self) -> set[int]:
-        """Return the few closed parts whose boxes may hold most of the scene."""
+        """Return the closed parts with the largest boxes, which may hold most of the scene."""
         parts = self.parts
         closed = np.flatnonzero(parts.closed & ~self.inward)
         size = np.prod(parts.high[closed] - parts.low[closed], axis=1)
         return set(closed[np.argsort(-size, kind="stable")][:_LARGEST].tolist())
 
     def _surface(self, part: int) -> Enclosure:
-        """Return a part and its hollows, wound so that a solid counts 1."""
+        """Return a part and its hollows, wound so that the winding number inside a solid is 1."""
         corners = []
         for one in (part, *(hollow for hollow, shell in self.around.items() if shell == part)):
             rows = self.order[self.start[one] : self.start[one + 1]]
             corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
             outward = self.parts.outward[rows] * (1 if one == part else -1)
-            # Twins of the other winding would cancel the face they lie on.
+            # Faces without a side, twins of the other winding among them, would cancel others.
             keep = outward != 0
             turned = np.where((outward < 0)[:, None, None], corner[:, ::-1], corner)
             corners.append(turned[keep])
         return Enclosure(np.concatenate(corners))
 
-    def _holds_place(self, part: int) -> bool:
-        """Tell whether a lamp or camera is inside."""
+    def _holds_viewpoint(self, part: int) -> bool:
+        """Return whether a light or camera is inside."""
         low, high = self.parts.low[part], self.parts.high[part]
-        near = self.places[((self.places > low) & (self.places < high)).all(axis=1)]
+        near = self.viewpoints[((self.viewpoints > low) & (self.viewpoints < high)).all(axis=1)]
         if not len(near):
             return False
         surface, inside = self._surface(part), self._inside_from(part)
-        return any(surface.winding(place) > inside for place in near)
+        return any(surface.winding(viewpoint) > inside for viewpoint in near)
 
     def _inside_from(self, part: int) -> float:
         """Return the winding number above which points are inside: 1/2 in the plane of a missing lid."""
         return _WITHOUT_LID if self.parts.lidless[part] else _INSIDE
 
     def _boxes_around(self, part: int, shells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of some parts have a box that contains the box of a part."""
         low, high = self.parts.low, self.parts.high
         slack = self.slack[part]
         inside = (low[shells] <= low[part] + slack) & (high[shells] >= high[part] - slack)
@@ -243,7 +274,7 @@ class _Judge:
         return found
 
     def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None, share: bool) -> NDArray[np.int64]:
-        """Return parts whose boxes lie within that of a part, or share space with it."""
+        """Return parts whose boxes lie within that of a part, or overlap it for `share`."""
         low, high = self.parts.low, self.parts.high
         if share:
             inside = ((low < high[part]) & (high > low[part])).all(axis=1)
@@ -256,7 +287,7 @@ class _Judge:
         return np.flatnonzero(inside if wanted is None else inside & wanted)
 
     def _holds(self, part: int, wanted: NDArray[np.bool_] | None, *, mostly: bool = False) -> bool:
-        """Tell whether another part (one of the wanted ones) is inside, at least mostly."""
+        """Return whether another part (one of the wanted ones) is inside, or for `mostly`, mostly inside."""
         held = self._held_boxes(part, wanted, mostly)
         if not len(held):
             return False
@@ -267,29 +298,29 @@ class _Judge:
         return any(self._is_inside(int(other), part, surface, mostly=mostly) for other in held)
 
     def _holds_most(self, part: int) -> bool:
-        """Tell whether most of the other parts' area is inside."""
+        """Return whether most of the other parts' area is inside."""
         area = self.parts.area
         others = float(area.sum() - area[part])
         held = self._held_boxes(part, None, False)
         if area[held].sum() <= _MOST_OF_SCENE * others:
             return False
-        # The largest are asked, and speak for the rest.
+        # Only the largest are tested.
         held = held[np.argsort(-area[held], kind="stable")][:_HELD]
-        found, open_ = 0.0, float(area[held].sum())
-        enough = _MOST_OF_SCENE * open_
+        found, remaining = 0.0, float(area[held].sum())
+        enough = _MOST_OF_SCENE * remaining
         surface = self._surface(part)
         for other in held:
-            if found > enough or found + open_ <= enough:
+            if found > enough or found + remaining <= enough:
                 break
-            open_ -= float(area[other])
+            remaining -= float(area[other])
             found += float(area[other]) * self._is_inside(int(other), part, surface)
         return found > enough
 
     def _is_inside(self, part: int, shell: int, surface: Enclosure, *, mostly: bool = False) -> bool:
-        """Tell whether a part lies inside another one, possibly touching it, or whether most of it does."""
+        """Return whether a part, or for `mostly` most of it, is inside another one; it may touch it."""
         rows = self.order[self.start[part] : self.start[part + 1]]
-        if mostly and self.glows[part]:
-            rows = rows[self.surfaces.glows[rows]]
+        if mostly and self.emits[part]:
+            rows = rows[self.surfaces.emits[rows]]
         chosen = rows[np.linspace(0, len(rows) - 1, min(_WITNESSES, len(rows))).round().astype(int)]
         points = self.surfaces.position[self.surfaces.triangle[chosen]].astype(np.float64).mean(axis=1)
         found, inside = 0, self._inside_from(shell)

@@ -1,4 +1,4 @@
-"""Finds triangles that must not be baked: unusable vertices, no area, exact doubles of another face."""
+"""Finds triangles that must not be baked: unusable vertices, no area, duplicates of another face."""
 
 from __future__ import annotations
 
@@ -9,36 +9,67 @@ from baker.topology.unique_rows import mix
 
 # Largest coordinate that is kept; Embree's own limit for single precision is 1.8e18.
 LARGEST_COORDINATE = 1e18
-# Height over longest edge. Below single precision's step the plane of the triangle is only rounding.
+# Height over longest edge. Below the step of float32 the plane of the triangle is undefined.
 _FLATTEST = 1e-7
 
 
 def in_range(
     triangle: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Tell which (T, 3) triangles name only vertices from `low` to below `high` (T,), (T,) bool."""
+    """Return which triangles name only vertices of their range.
+
+    Parameters
+    ----------
+    triangle : (T, 3) int64
+        Vertices.
+    low, high : (T,) int64
+        The range is `low` to `high` - 1.
+
+    Returns
+    -------
+    (T,) bool
+        Whether all three vertices are in the range.
+    """
     within: NDArray[np.bool_] = np.asarray((triangle.min(axis=1) >= low) & (triangle.max(axis=1) < high))
     return within
 
 
 def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Tell which (V, 3) positions are finite and within single precision's safe range, (V,) bool."""
+    """Return which positions are finite and within the safe range of float32.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, metres
+        Vertices.
+
+    Returns
+    -------
+    (V,) bool
+        Whether no coordinate is NaN, infinite or beyond `LARGEST_COORDINATE`.
+    """
     # A comparison with NaN is false, so this one test covers NaN, inf and huge values.
     usable: NDArray[np.bool_] = np.asarray((np.abs(position) <= LARGEST_COORDINATE).all(axis=1))
     return usable
 
 
 def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell which triangles are points or lines, (T,) bool.
+    """Return which triangles are points or lines.
 
     Parameters
     ----------
-    position : (V, 3) float32, finite where used
+    position : (V, 3) float32, metres
+        Finite where used.
     triangle : (T, 3) int64
+        Vertices.
+
+    Returns
+    -------
+    (T,) bool
+        Whether the height is at most 1e-7 of the longest edge.
     """
     a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
     ab, ac, bc = b - a, c - a, c - b
-    # Scaled by the longest side first: squares of tiny or huge sides would leave the exponent's range.
+    # Scale by the longest side: squares of tiny or huge sides would leave the range of exponents.
     longest = np.maximum(np.maximum(np.abs(ab).max(axis=1), np.abs(ac).max(axis=1)), np.abs(bc).max(axis=1))
     scale = 1.0 / np.where(longest > 0, longest, 1.0)[:, None]
     ab, ac, bc = ab * scale, ac * scale, bc * scale
@@ -50,13 +81,26 @@ def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
 
 
 def face_normal(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return (T, 3) normals as long as twice the area; the winding is counter-clockwise."""
+    """Return the normals of triangles, as long as twice their area.
+
+    Parameters
+    ----------
+    position : (V, 3) float32, metres
+        Vertices.
+    triangle : (T, 3) int64
+        Corners, counter-clockwise.
+
+    Returns
+    -------
+    (T, 3) float64, m2
+        Cross products of the edges.
+    """
     a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
     return _cross(b - a, c - a)
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    # np.cross takes three times as long on (n, 3) arrays.
+    """Return the cross products of (n, 3) vectors; `np.cross` takes three times as long."""
     out = np.zeros_like(a)
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -70,18 +114,27 @@ def duplicates(
     material: NDArray[np.int32],
     double_sided: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Tell which triangles repeat an earlier one, by position, (T,) bool.
+    """Return which triangles repeat an earlier one, by position.
 
-    A triangle with the same three corner positions and the same winding, from whichever corner it starts,
-    is a duplicate. One with the opposite winding is the back of the first and stays, unless both have the
-    same double-sided material, which shows both sides already.
+    A triangle with the same three corner positions and the same winding, whichever corner it starts at, is a
+    duplicate. One with the opposite winding is the back of the first and stays, unless both have the same
+    double-sided material, which shows both sides already.
 
     Parameters
     ----------
-    position : (V, 3) float32, finite where used
+    position : (V, 3) float32, metres
+        Finite where used.
     triangle : (T, 3) int64
+        Vertices.
     material : (T,) int32
-    double_sided : (M,) bool, for each material
+        Material of each triangle.
+    double_sided : (M,) bool
+        Whether each material is.
+
+    Returns
+    -------
+    (T,) bool
+        Whether the triangle is a duplicate.
     """
     repeated = np.zeros(len(triangle), bool)
     candidate = _same_key(position, triangle)
@@ -94,7 +147,7 @@ def duplicates(
     winding = b > c
     low, high = np.minimum(b, c), np.maximum(b, c)
 
-    # Sorted by face, winding, then file order: the first of each run is the one that stays.
+    # Sort by face, winding, then file order: the first of each run stays.
     order = np.lexsort((candidate, winding, high, low, a))
     face = np.stack([a, low, high], axis=1)[order]
     wound = winding[order]
@@ -104,7 +157,7 @@ def duplicates(
     same[1:] &= wound[1:] == wound[:-1]
     repeated[candidate[order[same]]] = True
 
-    # What is left of a face is one triangle, or one of each winding: the later one may be a double.
+    # Of each face one triangle is left, or one of each winding: the later one may be a duplicate.
     left, left_face = order[~same], face[~same]
     pair = np.flatnonzero((left_face[1:] == left_face[:-1]).all(axis=1))
     one, two = candidate[left[pair]], candidate[left[pair + 1]]
@@ -114,7 +167,7 @@ def duplicates(
 
 
 def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return, sorted, the triangles whose corners hash like those of another: few in a clean mesh."""
+    """Return, ascending, the triangles whose corners hash like those of another one."""
     with np.errstate(invalid="ignore"):
         bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)
@@ -129,7 +182,7 @@ def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
 
 
 def _position_number(position: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Number equal positions alike, (N,) int64."""
+    """Number equal positions (N, 3) alike, (N,) int64."""
     order = np.lexsort((position[:, 2], position[:, 1], position[:, 0]))
     ordered = position[order]
     step = np.zeros(len(order), np.int64)

@@ -1,7 +1,7 @@
-"""Finds rows of bytes that are equal.
+"""Finds rows that are equal, bit for bit.
 
-Rows are told apart by a 64 bit hash first and compared in full after, so that millions of them take a moment
-and no two different ones are ever taken for one.
+Rows are compared by a 64 bit hash first and in full afterwards, so that millions of them take less than a
+second and different ones are never merged.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
     column : sequence of (N, any) arrays
         Rows are equal if they are so in every array.
     n_rows : int
-        N, which no column says if there are none: then all rows are equal.
+        N, needed if there are no columns: then all rows are equal.
 
     Returns
     -------
     (N,) int64
+        Number of the first equal row.
     """
     if n_rows == 0:
         return np.zeros(0, np.int64)
@@ -37,27 +38,29 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
     first: NDArray[np.int64] = index[inverse].astype(np.int64)
     if all(np.array_equal(words, words[first]) for words in data):
         return first
-    # Two different rows share a hash, which is next to impossible: sort the rows themselves.
+    # Two different rows share a hash, which is very unlikely: sort the rows themselves.
     joined = np.concatenate(data, axis=1)
     _, index, inverse = np.unique(joined, axis=0, return_index=True, return_inverse=True)
     return index[inverse.ravel()].astype(np.int64)
 
 
 def compact(first: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows that are the first of their kind, and each row's place among them.
+    """Return the distinct rows, and for each row its number among them.
 
     Parameters
     ----------
     first : (N,) int64
-        As `first_equal` gives it.
+        Result of `first_equal`.
 
     Returns
     -------
-    kept : (K,) int64, ascending
-    place : (N,) int64, below K
+    kept : (K,) int64
+        The first row of each kind, ascending.
+    inverse : (N,) int64
+        first = kept[inverse].
     """
-    kept, place = np.unique(first, return_inverse=True)
-    return kept.astype(np.int64), place.astype(np.int64)
+    kept, inverse = np.unique(first, return_inverse=True)
+    return kept.astype(np.int64), inverse.astype(np.int64)
 
 
 def _words(array: NDArray[np.generic]) -> NDArray[np.uint64]:

@@ -1,4 +1,4 @@
-"""Whether points lie inside a closed surface.
+"""Tests whether points lie inside a closed surface.
 
     winding number = sum of the solid angles of all faces / (4 pi)
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Faces above which solid angles take too long.
+# Faces of a surface above which solid angles take too long.
 MANY = 4096
-# About a rotation, and one that no modeller uses: lines along its last axis miss edges and vertices.
+# Nearly a rotation, with no modelled direction as its last axis: lines along that miss edges and vertices.
 _TURN = np.array(
     [
         [0.6363961031, 0.7071067812, 0.3082207001],
@@ -24,12 +24,19 @@ _TURN = np.array(
 
 
 def winding_number(corner: NDArray[np.float64], point: NDArray[np.float64]) -> float:
-    """Return how often a surface goes round a point: 1 inside, 0 outside, -1 inside one that looks inwards.
+    """Return the winding number of a surface about a point: 1 inside, 0 outside, -1 inside one wound inwards.
 
     Parameters
     ----------
-    corner : (F, 3, 3) float64
-    point : (3,) float64
+    corner : (F, 3, 3) float64, metres
+        Corners of the faces.
+    point : (3,) float64, metres
+        The point.
+
+    Returns
+    -------
+    float
+        Sum of the solid angles of all faces / (4 pi).
     """
     a, b, c = (corner[:, k] - point for k in range(3))
     la, lb, lc = (np.sqrt(np.einsum("fx,fx->f", v, v)) for v in (a, b, c))
@@ -42,14 +49,15 @@ def winding_number(corner: NDArray[np.float64], point: NDArray[np.float64]) -> f
 
 
 class Enclosure:
-    """A closed surface that many points are asked about.
+    """A closed surface, for winding numbers about many points.
 
-    With many faces a point's winding number is counted along a line, at the faces that it crosses: less work
-    than their solid angles, but not to be trusted on the surface itself or beside large holes.
+    With more than `MANY` faces the winding number is counted along a line, from the faces that it crosses:
+    less work than their solid angles, but not reliable on the surface itself or near large holes.
 
     Parameters
     ----------
-    corner : (F, 3, 3) float64
+    corner : (F, 3, 3) float64, metres
+        Corners of the faces.
     """
 
     def __init__(self, corner: NDArray[np.float64]) -> None:
@@ -79,12 +87,26 @@ class Enclosure:
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the z component of the cross products of (n, 2 or more) vectors."""
     found: NDArray[np.float64] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return found
 
 
 def first_inside(corner: NDArray[np.float64], points: NDArray[np.float64]) -> int | None:
-    """Return the number of the first of (N, 3) points that is inside a closed surface, or None."""
+    """Return the first of some points that is inside a closed surface.
+
+    Parameters
+    ----------
+    corner : (F, 3, 3) float64, metres
+        Corners of the faces.
+    points : (N, 3) float64, metres
+        Points to test.
+
+    Returns
+    -------
+    int or None
+        Its number, None if none is inside.
+    """
     if not len(corner):
         return None
     low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))

@@ -1,4 +1,4 @@
-"""Embree's C API, ray packets, and how kernels are compiled and kept; nothing else knows Embree."""
+"""Embree's C API, ray packets, and how kernels are compiled and cached; no other package calls Embree."""
 
 from baker.trace.kernel_cache import keep_kernels
 

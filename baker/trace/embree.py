@@ -1,7 +1,7 @@
-"""Embree's C API, loaded from the library that the `embreex` wheel carries.
+"""Embree's C API, loaded from the library in the `embreex` wheel.
 
-This is the only file that knows Embree's functions and constants. `RayScene` owns device, scene
-and the vertex memory; kernels get plain integers (function addresses and the scene pointer).
+No other file uses Embree's functions and constants. `RayScene` owns the device, its scenes and the vertex
+memory; kernels get integers (function addresses and scene pointers).
 
 Based on: Embree 4 API reference (Intel, 2023), rtcore.h of Embree 4.4.
 """
@@ -24,9 +24,10 @@ _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
 _SCENE_ROBUST = 1 << 2
-# Up to so many triangles rays of neighbouring texels meet the same ones, and packets of them are traced as
-# coherent. *Measured*, final gather at 512 with 64 rays, share of the time without: 0.79 with 36 triangles,
-# 0.81 with 446, 0.77 with 986, 0.74 with 2714, 0.93 to 1.2 with 11 thousand, 1.35 with 70 thousand.
+# Up to this number of triangles rays of neighbouring texels hit the same ones, and their packets are traced
+# as coherent. *Measured*, final gather at 512 with 64 rays, time relative to incoherent: 0.79 with 36
+# triangles, 0.81 with 446, 0.77 with 986, 0.74 with 2714, 0.93 to 1.2 with 11 thousand, 1.35 with 70
+# thousand.
 MAX_COHERENT_TRIANGLES = 4096
 _QUALITY_MEDIUM = 1
 _ERROR_OUT_OF_MEMORY = 4
@@ -72,7 +73,7 @@ def _library() -> ctypes.CDLL:
     try:
         library = ctypes.CDLL(str(named[0].locate()))
     except OSError:
-        # The library's own dependency (TBB) is found through the extension module that links both.
+        # Its dependency TBB is found after the import of the extension module that links both.
         import embreex.rtcore  # noqa: F401
 
         library = ctypes.CDLL(str(named[0].locate()))
@@ -84,7 +85,13 @@ def _library() -> ctypes.CDLL:
 
 
 def embree_version() -> str:
-    """Return the version of the Embree library in use, as "4.4.0"."""
+    """Return the version of the Embree library in use, for example "4.4.0".
+
+    Returns
+    -------
+    str
+        Major, minor and patch number.
+    """
     library = _library()
     device = library.rtcNewDevice(None)
     number = int(library.rtcGetDeviceProperty(device, _PROPERTY_VERSION))
@@ -93,7 +100,7 @@ def embree_version() -> str:
 
 
 class Tracer(NamedTuple):
-    """What a kernel needs to trace: plain integers, valid while its `RayScene` lives.
+    """Integers that a kernel needs to trace rays; valid while its `RayScene` lives.
 
     Attributes
     ----------
@@ -102,14 +109,14 @@ class Tracer(NamedTuple):
     intersect, occluded : int
         Addresses of rtcIntersectN and rtcOccludedN.
     width : int
-        N, the widest packet this CPU traces natively.
+        N, the widest packet that this CPU traces natively.
     blend_scene : int or None
-        RTCScene of the triangles that let a share of light through (BLEND), None without any.
-    coloured : bool
-        Whether any of these colours what it lets through.
+        RTCScene of the BLEND triangles that let light through; None without any.
     coherent : bool
         Whether packets are traced as coherent: the scene has at most `MAX_COHERENT_TRIANGLES`, and rays of
-        neighbouring texels meet the same ones.
+        neighbouring texels hit the same ones.
+    coloured : bool
+        Whether any triangle of `blend_scene` colours the light that passes.
     """
 
     scene: int
@@ -121,24 +128,25 @@ class Tracer(NamedTuple):
     coloured: bool = False
 
     def without_transmittance(self) -> Tracer:
-        """Return the same for rays that ask only whether and where they end."""
+        """Return a tracer without coloured transmittance, for occlusion and distance queries."""
         return self._replace(blend_scene=None)
 
 
 class HitFilter(NamedTuple):
-    """Triangles of whose hits a function is told, and decides whether they count.
+    """Triangles with an Embree filter callback that accepts or rejects each hit.
 
     Attributes
     ----------
     chosen : (T,) bool
+        Triangles with the callback.
     function : int
-        Address of `void f(RTCFilterFunctionNArguments*)`; it sets `valid` of hits that do not count to 0.
+        Address of `void f(RTCFilterFunctionNArguments*)`; it sets `valid` of rejected hits to 0.
     data : int
-        Address that the function finds as `geometryUserPtr`.
+        `geometryUserPtr` of the callback.
     owner : object
         Keeps function and data alive.
     coloured : bool
-        Whether any of those that let a share of light through colours it.
+        Whether any of the triangles colours the light that passes.
     """
 
     chosen: NDArray[np.bool_]
@@ -149,22 +157,27 @@ class HitFilter(NamedTuple):
 
 
 class RayScene:
-    """Triangles that rays can be cast at.
+    """Triangles that rays are traced against.
+
+    A hit on a triangle of `hit_filter` has geometry 1, on one of `blend_filter` geometry 2, on another one 0.
+    Triangles keep their numbers.
 
     Parameters
     ----------
     position : (V, 3) float32, metres, world
+        Vertices.
     triangle : (T, 3) uint32 or int32
+        Their corners.
     robust : bool
-        Embree's ROBUST flag: rays through shared edges never leak. Of rays aimed exactly at a vertex
-        0.7 % do (17 % without the flag): Embree's own limit.
+        Embree's ROBUST flag: rays through shared edges never leak. Of rays aimed exactly at a vertex 0.7 % do
+        (17 % without the flag): Embree's own limit.
     threads : int
         Threads of the tree's build; 0 means all.
     hit_filter : HitFilter, optional
-        A hit on these triangles has geometry 1 instead of 0; triangles keep their numbers.
+        Triangles that do not block everywhere.
     blend_filter : HitFilter, optional
-        Some of these triangles, whose hits have geometry 2. They also form a second tree,
-        `Tracer.blend_scene`.
+        Those of them that let a share of the light through. They also form a second tree,
+        `Tracer.blend_scene`, in which this filter is called.
 
     Raises
     ------
@@ -186,8 +199,8 @@ class RayScene:
         self._library = library
         self._owners = hit_filter, blend_filter
         n = len(position)
-        # Row n belongs to triangles that a geometry leaves out: Embree skips those with a vertex that is no
-        # number. It reads 16 bytes from each vertex: one spare row keeps the last read inside.
+        # Row n is NaN: triangles that a geometry leaves out get it as vertices, and Embree skips them. The
+        # last row is spare: Embree reads 16 bytes at each vertex.
         self._position = np.zeros((n + (1 if hit_filter is None else 2), 3), np.float32)
         self._position[:n] = position
         whole = np.ascontiguousarray(triangle, np.uint32)
@@ -209,7 +222,7 @@ class RayScene:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
         filters = (None, hit_filter, hit_filter)
         parts = zip(range(3), self._triangles, filters, strict=False) if len(triangle) else ()
-        # A geometry in which no triangle is left needs no place in the tree; the others keep their numbers.
+        # Leave out a filtered geometry without triangles; the others keep their numbers.
         scene = self._add_scene([part for part in parts if part[0] != 1 or kept[1].any()], robust)
         blend_scene = None
         if blend_filter is not None:
@@ -280,7 +293,7 @@ class RayScene:
         return intersect, occluded
 
     def close(self) -> None:
-        """Release scene and device; the tracer must not be used any more."""
+        """Release scenes and device; the tracer must not be used afterwards."""
         if self._device:
             for scene in self._scenes:
                 self._library.rtcReleaseScene(scene)
@@ -288,6 +301,6 @@ class RayScene:
             self._device = None
 
     def __del__(self) -> None:
-        """Release what `close` did not."""
+        """Release them if `close` was not called."""
         if getattr(self, "_device", None):
             self.close()

@@ -1,10 +1,13 @@
-"""How kernels are compiled, and small things they are made of that compile fast.
+"""Decorators and primitives of kernels, chosen for short compile times.
 
-The first bake after an install waits for the compiler, and how kernels are written decides how long. Measured
-with Numba 0.68: a wrapper that makes a function callable from Python or C takes 40 ms, so an `inner` function
-has none and a `kernel` one; both do without reference counts, since they get their arrays from Python and
-keep none; `np.zeros` compiles three functions (0.2 s), `scratch` none; `min` and `max` compile a function for
-each combination of types (40 ms) and call it, `smaller` and `larger` become one instruction.
+The first bake after an install waits for the compiler. Measured with Numba 0.68:
+
+- A wrapper that makes a function callable from Python or C takes 40 ms. A `kernel` has one, an `inner`
+  function none.
+- Both are compiled without reference counts: their arrays come from Python, and they keep none.
+- `np.zeros` compiles three functions (0.2 s), `scratch` none.
+- `min` and `max` compile a function for each combination of types (40 ms) and call it; `smaller` and `larger`
+  are one instruction.
 """
 
 from __future__ import annotations
@@ -25,16 +28,28 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wra
 
 # Decorator of a function that Python calls.
 kernel: Any = njit(cache=True, **_OPTIONS)
-# Decorator of a function that kernels call: it stays a Python function, and is compiled into each kernel.
+# Decorator of a function that kernels call: it remains a Python function, and is compiled into each kernel.
 inner: Any = register_jitable(**_OPTIONS)
-# The same, copied to wherever it is called: numbers that it is called with become part of its code.
+# The same, always inlined by LLVM: literal arguments become constants of its code.
 pasted: Any = register_jitable(forceinline=True, **_OPTIONS)
 
 
 def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
-    """Return a function for kernels that makes a zeroed array in the memory of the kernel that calls it.
+    """Return a function for kernels that makes a zeroed array on the stack of the calling kernel.
 
-    The array must not be returned. Its size is part of the code, so loops over it need no checks.
+    The array must not be returned. Its shape is part of the code, so loops over it need no checks.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the array.
+    dtype : data-type
+        Type of its items.
+
+    Returns
+    -------
+    intrinsic
+        Takes no arguments, and returns the array.
     """
     element = from_dtype(np.dtype(dtype))
     array = types.Array(element, len(shape), "C")
@@ -65,6 +80,8 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
 
 
 def _choice(comparison: str) -> Any:
+    """Return an intrinsic `choose(a, b)`: b if `b comparison a`, else a."""
+
     def choose(typing_context, a, b):  # type: ignore[no-untyped-def]
         common = typing_context.unify_types(a, b)
 
@@ -86,6 +103,6 @@ def _choice(comparison: str) -> Any:
     return intrinsic(choose)
 
 
-# The smaller and the larger of two numbers, for kernels; the first one if either is no number.
+# The smaller and the larger of two numbers, for kernels; the first one if either is NaN.
 smaller = _choice("<")
 larger = _choice(">")

@@ -1,9 +1,12 @@
-"""Where compiled kernels are kept, and when they are not.
+"""Invalidates cached kernels, and allows kernels where nothing can be cached.
 
-Numba compiles a kernel anew when the kernel's own file has changed. What the kernel was made of may lie in
-other files: after an update of a checkout it would run yesterday's code, with arrays it does not know.
-It also refuses to define a function that asks to be kept on disk where it can keep nothing, in a read-only
-install without a cache folder. Ours are compiled in memory then, anew in every process.
+Numba compiles a cached kernel again only if the kernel's own file has changed. Functions compiled into it may
+be in other files: after an update of those it would run outdated code, on arrays of another layout. So
+importing a package with kernels deletes cache files that are older than any file they depend on.
+
+Numba also refuses to define a function with `cache=True` where no cache folder can be written, as in a
+read-only install. Then this file replaces a method of Numba's dispatcher classes for the process
+(`allow_no_cache`), and the kernels of this program are compiled in memory, in every process.
 """
 
 from __future__ import annotations
@@ -20,11 +23,13 @@ from typing import Any
 def keep_kernels(package_file: str, *made_of: str) -> None:
     """Prepare a package whose kernels are about to be defined.
 
+    Deletes outdated cache files of the package, and lets its kernels be defined where nothing can be cached.
+
     Parameters
     ----------
     package_file : str
-        `__file__` of the package, or of the only file in it that has some.
-    made_of : str
+        `__file__` of the package, or of the only file in it that has kernels.
+    *made_of : str
         Dotted names of the other packages that its kernels take functions from.
     """
     folder = Path(package_file).parent
@@ -41,21 +46,21 @@ def _folder_of(package: str) -> Path:
 
 
 def drop_stale(folder: Path, made_of: list[Path]) -> None:
-    """Remove what was compiled for a package before one of the files it may be made of was last written.
+    """Delete cache files of a package that are older than a file that its kernels may depend on.
 
     Parameters
     ----------
     folder : Path
         The package.
     made_of : list of Path
-        Folders of the packages that its kernels take functions from, its own among them.
+        Packages with those files.
     """
     newest = max((file.stat().st_mtime for part in made_of for file in part.glob("*.py")), default=0.0)
     if newest > time.time():
         # A clock is wrong: all would look stale for ever.
         return
     for index in folder.glob("__pycache__/*.nbi"):
-        # Another process may be quicker, or the folder not ours.
+        # Another process may have deleted it, or the folder is read-only.
         with contextlib.suppress(OSError):
             if index.stat().st_mtime < newest:
                 index.unlink()

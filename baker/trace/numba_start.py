@@ -1,7 +1,7 @@
-"""A quicker start of Numba for processes that are all ours.
+"""A faster start of Numba for processes of the command line.
 
-Before Numba runs its first function it asks whether scipy's BLAS is there, for `np.dot` in kernels, and
-scipy.linalg takes 0.15 to 0.3 s to load, a tenth of a small bake. No kernel here uses it.
+Before Numba compiles its first function it imports scipy.linalg, for `np.dot` in kernels. That takes 0.15 to
+0.3 s, a tenth of a small bake, and no kernel here uses it.
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ import sys
 
 
 def skip_blas() -> None:
-    """Let Numba start without scipy: call it before anything else imports Numba's array functions.
+    """Import Numba's array functions without scipy.linalg.
 
-    Kernels of this process can then not use `np.dot` and `np.linalg`; a program that merely imports `baker`
-    must not be changed like this.
+    `sys.modules["scipy"]` is None while they are imported, and restored afterwards. Kernels of this process
+    can then not use `np.dot` and `np.linalg`, so a program that imports `baker` as a library must not call
+    this. It has no effect if scipy.linalg is loaded already.
     """
     if "scipy.linalg" in sys.modules:
         return
-    # An entry of None makes an import fail at once. `import numba` loads scipy, but not its BLAS.
+    # An entry of None makes the import fail at once. `import numba` loads scipy, but not scipy.linalg.
     loaded = sys.modules.get("scipy")
     sys.modules["scipy"] = None  # type: ignore[assignment]
     try:

@@ -1,12 +1,12 @@
-"""Ray packets as Numba kernels see them: memory layout and calls through function addresses.
+"""Ray packets in Numba kernels: memory layout, and calls through function addresses.
 
-A packet of width N is 12 rows (ray) and 9 rows (hit) of N four-byte numbers, as RTCRayN and
-RTCRayHitN lay them out. A call through an address held in an integer, unlike one through a
-ctypes object, lets Numba keep the compiled kernel on disk.
+A packet of width N is 12 rows (ray) and 9 rows (hit) of N four-byte numbers, laid out as RTCRayN and
+RTCRayHitN. Kernels call Embree through an address held in an integer: with a ctypes object Numba could not
+cache them.
 
-The kernels of a bake handle sixteen rays at a time, whatever the width that the processor traces natively
-(`trace_lanes`): with rows at constant offsets in one array, loops over lanes become
-vector code. Making a cosine ray takes 3.5 ns that way, and 28 ns where the width is a variable.
+The kernels of a bake trace PACKET_WIDTH rays at a time, whatever width the processor traces natively
+(`trace_lanes`): with rows at constant offsets in one array, loops over lanes are vectorised. Generating a
+cosine-weighted ray takes 3.5 ns that way, and 28 ns where the width is a variable.
 
 Based on: Embree 4 API reference, RTCRayHitN.
 """
@@ -29,9 +29,11 @@ ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = r
 NG_X, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID = range(12, 19)
 ROWS = 21
 MAX_WIDTH = 16
-# Rays that the kernels of a bake handle together.
+# Rays that the kernels of a bake trace together.
 PACKET_WIDTH = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
+# Fields of RTCFilterFunctionNArguments, 8 bytes each; FILTER_WIDTH has 4.
+FILTER_VALID, FILTER_DATA, FILTER_CONTEXT, FILTER_RAY, FILTER_HIT, FILTER_WIDTH = range(6)
 # Geometry of BLEND triangles.
 BLEND_GEOMETRY = np.uint32(2)
 # ID row of a ray: how it meets BLEND surfaces of alpha a and colour c.
@@ -56,7 +58,7 @@ _COHERENT = 1 << 16
 
 
 def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-    """Call `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`; without the last Embree takes its own."""
+    """Emit a call of `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`, the last NULL if not given."""
     byte_pointer = ir.IntType(8).as_pointer()
     function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
     function = builder.inttoptr(args[0], function_type.as_pointer())
@@ -71,7 +73,10 @@ def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 
 def _call_embree(typing_context, address, valid, scene, ray):  # type: ignore[no-untyped-def]
-    """Call the function at an address for a scene and the lanes of a packet; valid, ray: arrays."""
+    """Call the function at an address for a scene and the lanes of a packet.
+
+    address, scene : int64; valid : (N,) int32; ray : the packet, float32
+    """
     signature = types.void(types.int64, valid, types.int64, ray)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -84,7 +89,7 @@ call_embree: Any = intrinsic(_call_embree)
 
 
 def _call_embree_with(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
-    """Do the same with arguments that an array holds."""
+    """Do the same with the arguments in an array, see `arguments_of`."""
     signature = types.void(types.int64, valid, types.int64, ray, arguments)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -97,7 +102,7 @@ call_embree_with: Any = intrinsic(_call_embree_with)
 
 
 def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-untyped-def]
-    """Copy source[start : start + 4] to target[to : to + 4]; four bytes an item, no bounds are checked."""
+    """Copy source[start : start + 4] to target[to : to + 4], four bytes an item, without bounds checks."""
     signature = types.void(target, types.intp, source, types.intp)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -116,14 +121,22 @@ copy_four: Any = intrinsic(_copy_four)
 
 
 class BlendBuffers(NamedTuple):
-    """Memory for the transmittance of BLEND surfaces along rays; each thread has its own.
+    """Memory for the transmittance of BLEND surfaces along sixteen rays, for one thread.
 
-    scene : int, see `Tracer.blend_scene`
-    coloured : int, 0 if no triangle of that tree colours light
-    arguments : (5,) int64, RTCOccludedArguments; they hand the arrays below to filter functions
-    stop : (16,) uint32, triangle at which each of sixteen rays ends: it lets nothing through
-    transmittance : (3 * 16,) float32, what RGB is multiplied by
-    edges : (16,) uint32, hits on edges of triangles found so far, see `edge_hits`
+    Attributes
+    ----------
+    scene : int
+        See `Tracer.blend_scene`.
+    coloured : int
+        0 if no triangle of that scene colours light.
+    arguments : (5,) int64
+        RTCOccludedArguments, whose context passes the arrays below to the filter functions.
+    stop : (16,) uint32
+        Triangle at which each ray ends; it lets nothing through.
+    transmittance : (3 * 16,) float32
+        Rows R, G, B.
+    edges : (16,) uint32
+        Number of hits on edges of triangles so far, see `edge_hits`.
     """
 
     scene: int
@@ -135,13 +148,22 @@ class BlendBuffers(NamedTuple):
 
 
 class PacketBuffers(NamedTuple):
-    """A tracer with the memory of one packet; each thread has its own.
+    """A tracer with the memory of one packet, for one thread.
 
-    scene, intersect, occluded, width: see `Tracer`; valid (16,) int32, -1 for lanes to trace;
-    floats (21 * 16,) float32 and words, the same memory as uint32: a packet of the native width.
-    lane_valid, lane_floats, lane_words: the same for sixteen rays, rows 16 numbers apart.
-    query: (5,) int64, `arguments_of` rays of neighbouring texels in this scene.
-    blend: None if there are no BLEND triangles; Numba then compiles kernels without it.
+    Attributes
+    ----------
+    scene, intersect, occluded, width : int
+        See `Tracer`.
+    valid : (16,) int32
+        -1 for lanes to trace, 0 for others.
+    floats, words : (21 * 16,) float32 and uint32
+        A packet of the native width; both are the same memory.
+    lane_valid, lane_floats, lane_words : ndarray
+        The same for PACKET_WIDTH rays: rows lie 16 numbers apart.
+    query : (5,) int64
+        `arguments_of` rays of neighbouring texels in this scene.
+    blend : BlendBuffers or None
+        None without BLEND triangles; Numba then compiles kernels without transmittance.
     """
 
     scene: int
@@ -159,11 +181,21 @@ class PacketBuffers(NamedTuple):
 
 
 def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
-    """Return packet memory at multiples of 64 bytes, as Embree wants.
+    """Return memory for a packet, at multiples of 64 bytes as Embree requires.
 
-    What no kernel changes is set here: time and tnear 0, all bits of the mask.
+    Rows that no kernel changes are set: time and tnear 0, all bits of the mask.
 
-    solid : whether the sixteen rays stop at BLEND surfaces wherever alpha is above 0, see `SOLID`
+    Parameters
+    ----------
+    tracer : Tracer
+        Scene to trace.
+    solid : bool
+        Whether the sixteen rays stop at BLEND surfaces wherever alpha is above 0, see `SOLID`.
+
+    Returns
+    -------
+    PacketBuffers
+        Memory for one thread.
     """
     valid, floats = _packet_memory(tracer.width)
     lane_valid, lane_floats = _packet_memory(PACKET_WIDTH)
@@ -179,12 +211,26 @@ def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
 
 
 def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
-    """Return the memory that one thread needs for transmittance; see `Tracer.blend_scene` and `coloured`."""
-    # RTCRayQueryContext (without instances), and what the filter functions find behind it.
+    """Return memory for transmittance.
+
+    Parameters
+    ----------
+    scene : int
+        See `Tracer.blend_scene`.
+    coloured : bool
+        See `Tracer.coloured`.
+
+    Returns
+    -------
+    BlendBuffers
+        Memory for one thread.
+    """
+    # RTCRayQueryContext (without instances), and the arrays that the filter functions use, behind it.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:BLEND_STOP] = NO_HIT
-    # Never coherent: Embree then follows the rays of each octant apart, but asks about all rays at each leaf.
+    # Never coherent: Embree then traverses the rays of each octant apart, but calls the filter for all of
+    # them.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]
@@ -192,24 +238,44 @@ def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
 
 
 def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:
-    """Return (5,) RTCIntersectArguments or RTCOccludedArguments, which lie alike.
+    """Return RTCIntersectArguments or RTCOccludedArguments, whose layouts are the same.
 
-    Flags and features (32 bits each), no context, no functions of its own.
+    32 bits of flags, 32 bits of features, no context, no filter or other functions.
 
-    coherent : the rays of a packet go alike: it is followed through the tree as one
+    Parameters
+    ----------
+    coherent : bool
+        Whether Embree traverses the rays of a packet together (RTC_RAY_QUERY_FLAG_COHERENT).
+
+    Returns
+    -------
+    (5,) int64
+        The structure.
     """
     flags = _COHERENT if coherent else 0
     return np.array([0xFFFFFFFF << 32 | flags, 0, 0, 0, 0], np.uint64).view(np.int64)
 
 
 def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return `valid` and a packet of `width` lanes with all bits of the mask set."""
     valid, floats = aligned_floats(MAX_WIDTH).view(np.int32), aligned_floats(ROWS * MAX_WIDTH)
     floats.view(np.uint32)[MASK * width : (MASK + 1) * width] = NO_HIT
     return valid, floats
 
 
 def aligned_floats(n: int) -> NDArray[np.float32]:
-    """Return n zeros at a multiple of 64 bytes."""
+    """Return zeros at a multiple of 64 bytes.
+
+    Parameters
+    ----------
+    n : int
+        Number of items.
+
+    Returns
+    -------
+    (n,) float32
+        Zeros.
+    """
     raw = np.zeros(4 * n + 64, np.uint8)
     start = -raw.ctypes.data % 64
     return raw[start : start + 4 * n].view(np.float32)
@@ -217,7 +283,11 @@ def aligned_floats(n: int) -> NDArray[np.float32]:
 
 @inner
 def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ignore[no-untyped-def]
-    """Write one ray into a lane of the packet."""
+    """Write one ray into a lane of a packet.
+
+    floats, words : (21 * width,) float32 and uint32, the packet, one memory
+    x, y, z : origin, metres; dx, dy, dz : direction; tfar : in units of its length
+    """
     floats[ORG_X * width + lane] = x
     floats[ORG_Y * width + lane] = y
     floats[ORG_Z * width + lane] = z
@@ -230,7 +300,10 @@ def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ign
 
 @inner
 def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
-    """Trace the lanes whose `valid` is -1; results are written into the packet."""
+    """Trace the lanes whose `valid` is -1; hits are written into the packet.
+
+    function : address; scene : of `Tracer`; valid : (width,) int32; floats : (21 * width,) float32
+    """
     call_embree(function, valid, scene, floats)
 
 
@@ -238,12 +311,14 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
-    function, scene, width, query and the four arrays are a buffers's
+    function : address of intersect or occluded; scene, width, query : of `PacketBuffers`
+    lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, the rays; hits are written into them
+    valid, floats : packet memory of the native width, of `PacketBuffers`
     """
     if width == PACKET_WIDTH:
         call_embree_with(function, lane_valid, scene, lane_floats, query)
         return
-    # Four at a time by hand: what the compiler makes of loops over lanes here is twenty times as long.
+    # Copy four lanes at a time: for loops over lanes the compiler generates twenty times as much code.
     for first in range(0, PACKET_WIDTH, width):
         lane = first
         while lane < first + width and lane_valid[lane] == 0:

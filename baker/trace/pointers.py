@@ -1,4 +1,4 @@
-"""Memory at an address: as compiled callbacks of Embree see it, and fetched before it is needed."""
+"""Access to memory by address: arrays in compiled callbacks, and prefetches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 
 def _pointer(typing_context, address):  # type: ignore[no-untyped-def]
-    """Return an int64 address as a pointer that `numba.carray` takes."""
+    """Return an int64 address as a pointer for `numba.carray`."""
     signature = types.voidptr(types.int64)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -23,7 +23,7 @@ pointer: Any = intrinsic(_pointer)
 
 
 def _prefetch(typing_context, address):  # type: ignore[no-untyped-def]
-    """Ask for the cache line at an int64 address, to read it soon."""
+    """Prefetch the cache line at an int64 address for reading."""
     signature = types.void(types.int64)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:

@@ -98,7 +98,7 @@ def _solids(context: CheckContext, world: WorldTriangles) -> Solids:
         instance=world.instance,
         opaque=np.array([m.alpha_mode == "OPAQUE" for m in materials], bool)[world.material],
         double_sided=world.double_sided,
-        glows=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
+        emits=np.array([max(m.emission) > 0 for m in materials], bool)[world.material],
     )
     return find_solids(surfaces, lights_and_cameras(context.scene))
 

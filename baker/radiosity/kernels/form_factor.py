@@ -116,6 +116,10 @@ def cast_form_factors(
 
 @inner
 def _note_colour(blend, colour, group, lanes, r):
+    """Write the transmittance of ray r of patches `group` to `group + lanes`.
+
+    blend : of `PacketBuffers`; colour : (m, R, 3) float32 output, or without rows
+    """
     if blend is None or len(colour) == 0:
         return
     for lane in range(lanes):

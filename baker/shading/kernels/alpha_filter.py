@@ -1,16 +1,16 @@
-"""The function that Embree asks at hits of MASK and BLEND triangles whether they count.
+# mypy: disable-error-code="no-untyped-def"
+"""The filter function of MASK and BLEND triangles: decides whether a hit counts.
 
-A MASK hit counts where alpha reaches the cutoff. For a BLEND hit it depends on the ray (its ID row):
+A MASK hit counts where alpha reaches the cutoff. A BLEND hit depends on the ray (its ID row):
 
 - Shadow rays (ID 1 to 16, the ray's number): the transmittance T = (1 - a) lerp(1, c, a) is multiplied into
   `packets.BlendBuffers.transmittance`, and the hit does not count. The ends of these rays are fixed, so
   Embree reports every crossing on the way, in any order.
-- Rays that pass BLEND surfaces unaware (ID `packets.UNAWARE`): the hit counts where alpha is 1.
-- Rays that ask what lies on which side (ID `packets.SOLID`): the hit counts where alpha is above 0.
-- Other rays (ID 0): the hit counts with probability alpha. The number that decides is a hash of the bits of
-  the ray and the triangle: the same ray always gets the same answer, however it is packed and on whatever
-  thread, and surfaces along a ray decide independently. Rays of one texel differ in direction, so each has
-  a decision of its own.
+- Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit counts only where alpha is 1.
+- Rays between points of a texel (ID `packets.SOLID`): the hit counts wherever alpha is above 0.
+- Other rays (ID 0): the hit counts with probability alpha. The random number is a hash of the bits of the ray
+  and the triangle: a ray gets the same result in any packet and on any thread, and surfaces along a ray
+  decide independently. Rays of a texel differ in direction, so they decide independently, too.
 
 Based on: Enderton et al., Stochastic transparency, 2010; Embree 4 API reference, RTCFilterFunctionN.
 """
@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
+from baker.kernels.alpha import ROW_LENGTH as ALPHA_ROW_LENGTH
 from baker.kernels.alpha import SURFACE, AlphaTable, opacity
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import MAX_LEVELS, TexturePack
@@ -31,6 +32,12 @@ from baker.trace.packets import (
     BLEND_TRANSMITTANCE,
     CONTEXT_WORDS,
     DIR_X,
+    FILTER_CONTEXT,
+    FILTER_DATA,
+    FILTER_HIT,
+    FILTER_RAY,
+    FILTER_VALID,
+    FILTER_WIDTH,
     HIT_U,
     HIT_V,
     ID,
@@ -44,14 +51,16 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _INV_2_32 = 1.0 / 4294967296.0
+# The user data: address and length of each array.
+_ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 16, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# Shadow rays that keep less than this share of their light are blocked.
+# Shadow rays whose transmittance is below this are blocked.
 _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
 def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: TexturePack) -> HitFilter:
-    """Return what the ray tree has to know of the triangles that let light through."""
+    """Return the filter of triangles that let light through; `blend` are the BLEND ones, None without any."""
     blend = no_transmittance() if blend is None else blend
     arrays = (
         *(alpha.slot, alpha.row, pack.pixels, pack.level, pack.n_levels, pack.wrap),
@@ -62,8 +71,8 @@ def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: Texture
 
 
 @inner
-def _hash_ray(bits, ray, n, lane):  # type: ignore[no-untyped-def]
-    """Return a hash of `bits` and of origin and direction of a ray; ray (12 * n,) uint32."""
+def _hash_ray(bits, ray, n, lane):
+    """Return a hash of `bits` and of origin and direction of the ray in a lane; ray : (12 * n,) uint32."""
     for axis in range(3):
         bits = hash_u32(np.uint32(bits ^ ray[(ORG_X + axis) * n + lane]))
         bits = hash_u32(np.uint32(bits ^ ray[(DIR_X + axis) * n + lane]))
@@ -71,10 +80,11 @@ def _hash_ray(bits, ray, n, lane):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _surface_bits(surface, ray, hit, n, lane):  # type: ignore[no-untyped-def]
-    """Return bits that the triangles of a surface share at an edge which a ray crosses.
+def _surface_bits(surface, ray, hit, n, lane):
+    """Return a uint32 that is the same for all triangles of a surface at an edge that a ray crosses.
 
-    A closed surface is met from outside and then from inside: the side is part of the bits.
+    A closed surface is crossed from outside and from inside, so the side is one of the bits.
+    surface : float32, a whole number; ray, hit : (12 * n,) and (6 * n,) float32, as Embree passes them
     """
     facing = np.float32(0.0)
     for axis in range(3):
@@ -83,34 +93,38 @@ def _surface_bits(surface, ray, hit, n, lane):  # type: ignore[no-untyped-def]
 
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
-def _let_through(arguments):  # type: ignore[no-untyped-def]
-    """Clear `valid` of the hits that light passes; multiply the transmittance of shadow rays."""
-    # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit, N (of four bytes).
+def _let_through(arguments):
+    """Set `valid` to 0 for hits that light passes; multiply the transmittance of shadow rays.
+
+    arguments : address of RTCFilterFunctionNArguments
+    """
+    # View the arguments as arrays. N has four bytes. Only the context of shadow rays is followed by
+    # `BlendBuffers`.
     given = carray(arguments, (6,), np.int64)
-    n = given[5] & 0xFFFFFFFF
-    valid = carray(pointer(given[0]), (n,), np.int32)
-    data = carray(pointer(given[1]), (16,), np.int64)
-    # Only shadow rays have what lies behind the context.
-    context = carray(pointer(given[2]), (CONTEXT_WORDS,), np.float32)
-    context_words = carray(pointer(given[2]), (CONTEXT_WORDS,), np.uint32)
-    ray = carray(pointer(given[3]), (12 * n,), np.float32)
-    ray_words = carray(pointer(given[3]), (12 * n,), np.uint32)
-    hit = carray(pointer(given[4]), (6 * n,), np.float32)
-    hit_words = carray(pointer(given[4]), (6 * n,), np.uint32)
-    slot = carray(pointer(data[0]), (data[1],), np.int32)
-    row = carray(pointer(data[2]), (data[3], 16), np.float32)
+    n = given[FILTER_WIDTH] & 0xFFFFFFFF
+    valid = carray(pointer(given[FILTER_VALID]), (n,), np.int32)
+    data = carray(pointer(given[FILTER_DATA]), (16,), np.int64)
+    context = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.float32)
+    context_words = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.uint32)
+    ray = carray(pointer(given[FILTER_RAY]), (12 * n,), np.float32)
+    ray_words = carray(pointer(given[FILTER_RAY]), (12 * n,), np.uint32)
+    hit = carray(pointer(given[FILTER_HIT]), (6 * n,), np.float32)
+    hit_words = carray(pointer(given[FILTER_HIT]), (6 * n,), np.uint32)
+    slot = carray(pointer(data[_ALPHA_SLOT]), (data[_ALPHA_SLOT + 1],), np.int32)
+    row = carray(pointer(data[_ALPHA_ROW]), (data[_ALPHA_ROW + 1], ALPHA_ROW_LENGTH), np.float32)
     pack = TexturePack(
-        carray(pointer(data[4]), (data[5], 4), np.float32),
-        carray(pointer(data[6]), (data[7], MAX_LEVELS, 3), np.int64),
-        carray(pointer(data[8]), (data[9],), np.int64),
-        carray(pointer(data[10]), (data[11], 2), np.int64),
+        carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
+        carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
+        carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 2), np.int64),
     )
-    blend_slot = carray(pointer(data[12]), (data[13],), np.int32)
-    blend_row = carray(pointer(data[14]), (data[15], ROW_LENGTH), np.float32)
+    blend_slot = carray(pointer(data[_BLEND_SLOT]), (data[_BLEND_SLOT + 1],), np.int32)
+    blend_row = carray(pointer(data[_BLEND_ROW]), (data[_BLEND_ROW + 1], ROW_LENGTH), np.float32)
     rgba, rgb = _rgba(), _rgb()
     for lane in range(n):
         if valid[lane] != -1:
             continue
+        # Fully opaque: the hit counts. Fully transparent: it does not.
         prim = hit_words[_PRIM * n + lane]
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
@@ -122,6 +136,7 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
             continue
         if ray_words[ID * n + lane] == SOLID:
             continue
+        # A ray to its first hit: accept with probability alpha.
         number = np.int64(ray_words[ID * n + lane]) - 1
         if number < 0:
             bits = hash_u32(prim)
@@ -130,6 +145,7 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
             if _hash_ray(bits, ray_words, n, lane) * _INV_2_32 >= share:
                 valid[lane] = 0
             continue
+        # A shadow ray: reject, and multiply its transmittance, unless an edge was crossed before.
         valid[lane] = 0
         if number >= PACKET_WIDTH:
             continue
@@ -138,12 +154,12 @@ def _let_through(arguments):  # type: ignore[no-untyped-def]
         ):
             continue
         filter_colour_at(blend_row, np.int64(blend_slot[prim]), pack, b1, b2, rgba, rgb)
-        most = np.float32(0.0)
+        largest = np.float32(0.0)
         for c in range(3):
             kept = context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] * np.float32(
                 (1.0 - share) * rgb[c]
             )
             context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] = kept
-            most = larger(most, kept)
-        if most < _DARK:
+            largest = larger(largest, kept)
+        if largest < _DARK:
             valid[lane] = -1

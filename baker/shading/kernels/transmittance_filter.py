@@ -1,6 +1,7 @@
-"""The function that Embree tells hits of BLEND surfaces: it multiplies colours, and lets no hit count.
+# mypy: disable-error-code="no-untyped-def"
+"""The filter function of the tree of BLEND triangles: multiplies colours, and rejects every hit.
 
-It finds the ray's number in the ray (`packets.PASSES`), and what to write behind the query's context
+The ray's ID row holds its number (`packets.PASSES`); the results are written behind the query's context
 (`packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
@@ -21,6 +22,12 @@ from baker.trace.packets import (
     BLEND_STOP,
     BLEND_TRANSMITTANCE,
     CONTEXT_WORDS,
+    FILTER_CONTEXT,
+    FILTER_DATA,
+    FILTER_HIT,
+    FILTER_RAY,
+    FILTER_VALID,
+    FILTER_WIDTH,
     HIT_U,
     HIT_V,
     ID,
@@ -33,11 +40,13 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
+# The user data: address and length of each array.
+_SLOT, _ROW, _PIXELS, _LEVEL, _N_LEVELS, _WRAP = range(0, 12, 2)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
 def filter_of(table: TransmittanceTable, pack: TexturePack) -> HitFilter:
-    """Return what the ray tree has to know of the triangles that let a share of light through."""
+    """Return the filter of the tree of BLEND triangles."""
     arrays = (table.slot, table.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
     address = _multiply_colour.address or 0
@@ -45,26 +54,29 @@ def filter_of(table: TransmittanceTable, pack: TexturePack) -> HitFilter:
 
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
-def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
-    """Multiply the colour of each valid lane's ray, and clear `valid`."""
-    # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit, N (of four bytes).
+def _multiply_colour(arguments):
+    """Multiply the transmittance of each valid lane's ray, and set `valid` to 0.
+
+    arguments : address of RTCFilterFunctionNArguments
+    """
+    # View the arguments as arrays. N has four bytes.
     given = carray(arguments, (6,), np.int64)
-    n = given[5] & 0xFFFFFFFF
-    valid = carray(pointer(given[0]), (n,), np.int32)
-    data = carray(pointer(given[1]), (12,), np.int64)
-    context = carray(pointer(given[2]), (CONTEXT_WORDS,), np.float32)
-    context_words = carray(pointer(given[2]), (CONTEXT_WORDS,), np.uint32)
-    ray = carray(pointer(given[3]), (12 * n,), np.float32)
-    ray_words = carray(pointer(given[3]), (12 * n,), np.uint32)
-    hit = carray(pointer(given[4]), (6 * n,), np.float32)
-    hit_words = carray(pointer(given[4]), (6 * n,), np.uint32)
-    slot = carray(pointer(data[0]), (data[1],), np.int32)
-    row = carray(pointer(data[2]), (data[3], ROW_LENGTH), np.float32)
+    n = given[FILTER_WIDTH] & 0xFFFFFFFF
+    valid = carray(pointer(given[FILTER_VALID]), (n,), np.int32)
+    data = carray(pointer(given[FILTER_DATA]), (12,), np.int64)
+    context = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.float32)
+    context_words = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.uint32)
+    ray = carray(pointer(given[FILTER_RAY]), (12 * n,), np.float32)
+    ray_words = carray(pointer(given[FILTER_RAY]), (12 * n,), np.uint32)
+    hit = carray(pointer(given[FILTER_HIT]), (6 * n,), np.float32)
+    hit_words = carray(pointer(given[FILTER_HIT]), (6 * n,), np.uint32)
+    slot = carray(pointer(data[_SLOT]), (data[_SLOT + 1],), np.int32)
+    row = carray(pointer(data[_ROW]), (data[_ROW + 1], ROW_LENGTH), np.float32)
     pack = TexturePack(
-        carray(pointer(data[4]), (data[5], 4), np.float32),
-        carray(pointer(data[6]), (data[7], MAX_LEVELS, 3), np.int64),
-        carray(pointer(data[8]), (data[9],), np.int64),
-        carray(pointer(data[10]), (data[11], 2), np.int64),
+        carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
+        carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
+        carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 2), np.int64),
     )
     rgba, rgb = _rgba(), _rgb()
     for lane in range(n):
@@ -72,11 +84,13 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
             continue
         valid[lane] = 0
         prim = hit_words[_PRIM * n + lane]
+        # Skip the hit at the end of the ray.
         number = np.int64(ray_words[ID * n + lane]) - 1
-        whole = number >= PASSES
-        number -= PASSES if whole else 0
-        if not whole and prim == context_words[BLEND_STOP + number]:
+        full = number >= PASSES
+        number -= PASSES if full else 0
+        if not full and prim == context_words[BLEND_STOP + number]:
             continue
+        # Skip an edge that was crossed before; else multiply.
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
         if on_edge(b1, b2) and crossed_before(
@@ -84,6 +98,6 @@ def _multiply_colour(arguments):  # type: ignore[no-untyped-def]
         ):
             continue
         alpha = filter_colour_at(row, k, pack, b1, b2, rgba, rgb)
-        share = 1.0 - alpha if whole else 1.0
+        share = 1.0 - alpha if full else 1.0
         for c in range(3):
             context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] *= np.float32(share * rgb[c])

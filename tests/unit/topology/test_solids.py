@@ -40,10 +40,10 @@ SMALL = box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))
 
 def covers(*objects, **more):
     """Tell of each object whether it is a cover."""
-    return [bool(cover.all()) for _, _, _, cover in judge(*objects, **more)]
+    return [bool(cover.all()) for _, _, _, cover in classify(*objects, **more)]
 
 
-def judge(*objects, places=NOBODY, double_sided=True, glows=(), hit_filter=()):
+def classify(*objects, viewpoints=NOBODY, double_sided=True, emits=(), hit_filter=()):
     """Return (inside, room, sealed, cover) of each object's triangles."""
     count = [len(one) for one in objects]
     corner = np.concatenate(objects).reshape(-1, 3)
@@ -54,9 +54,9 @@ def judge(*objects, places=NOBODY, double_sided=True, glows=(), hit_filter=()):
         instance=owner,
         opaque=~np.isin(owner, hit_filter),
         double_sided=np.full(len(owner), double_sided),
-        glows=np.isin(owner, glows),
+        emits=np.isin(owner, emits),
     )
-    solids = find_solids(surfaces, np.array(places, float).reshape(-1, 3))
+    solids = find_solids(surfaces, np.array(viewpoints, float).reshape(-1, 3))
     columns = solids.inside, solids.room, solids.sealed, solids.cover
     return [tuple(column[owner == k] for column in columns) for k in range(len(count))]
 
@@ -68,7 +68,7 @@ def kinds(found):
 
 @pytest.mark.parametrize("double_sided", [False, True])
 def test_a_crate_on_a_floor_is_solid_and_the_floor_is_not(double_sided):
-    found = judge(FLOOR, CRATE, double_sided=double_sided)
+    found = classify(FLOOR, CRATE, double_sided=double_sided)
     assert kinds(found) == [[NOWHERE], [BEHIND]]
     assert found[1][2].all()
 
@@ -77,35 +77,35 @@ def test_crates_of_several_objects_and_several_crates_in_one_object():
     sides = [CRATE[2 * k : 2 * k + 2] for k in range(6)]
     # Their corners differ by a rounding error.
     sides[3] = sides[3] + 2e-7
-    assert kinds(judge(FLOOR, *sides)) == [[NOWHERE]] + 6 * [[BEHIND]]
+    assert kinds(classify(FLOOR, *sides)) == [[NOWHERE]] + 6 * [[BEHIND]]
     beside = np.concatenate([CRATE, shifted(CRATE, 1, 0, 0), shifted(CRATE, 0, 3, 0)])
-    inside = judge(FLOOR, beside)[1][0]
+    inside = classify(FLOOR, beside)[1][0]
     # The wall between the two that touch belongs to none.
     assert (inside == NOWHERE).sum() == 4
     assert (inside == BEHIND).sum() == 32
 
 
 def test_winding():
-    assert kinds(judge(FLOOR, CRATE[:, ::-1])) == [[NOWHERE], [BEFORE]]
+    assert kinds(classify(FLOOR, CRATE[:, ::-1])) == [[NOWHERE], [BEFORE]]
     mixed = CRATE.copy()
     mixed[[1, 4, 5]] = mixed[[1, 4, 5], ::-1]
-    inside = judge(FLOOR, mixed)[1][0]
+    inside = classify(FLOOR, mixed)[1][0]
     assert (inside[[1, 4, 5]] == BEFORE).all()
     assert (np.delete(inside, [1, 4, 5]) == BEHIND).all()
     both_ways = np.concatenate([CRATE, CRATE[:, ::-1]])
-    inside = judge(FLOOR, both_ways)[1][0]
+    inside = classify(FLOOR, both_ways)[1][0]
     assert (inside == np.repeat([BEHIND, BEFORE], 12)).all()
 
 
 def test_what_encloses_nothing():
     sheets = np.concatenate([FLOOR, FLOOR[:, ::-1]])
-    assert kinds(judge(sheets, CRATE)) == [[NOWHERE], [BEHIND]]
+    assert kinds(classify(sheets, CRATE)) == [[NOWHERE], [BEHIND]]
     no_lid = np.delete(CRATE, [6, 7], axis=0)
-    assert kinds(judge(FLOOR, no_lid)) == [[NOWHERE], [NOWHERE]]
-    assert kinds(judge(FLOOR, CRATE, hit_filter=[1])) == [[NOWHERE], [NOWHERE]]
+    assert kinds(classify(FLOOR, no_lid)) == [[NOWHERE], [NOWHERE]]
+    assert kinds(classify(FLOOR, CRATE, hit_filter=[1])) == [[NOWHERE], [NOWHERE]]
     thin = box((0, 0, 0), (1, 1, 1e-6))
-    assert kinds(judge(FLOOR, thin)) == [[NOWHERE], [NOWHERE]]
-    assert kinds(judge(FLOOR, box((0, 0, 0), (4, 3, 0.001)))) == [[NOWHERE], [BEHIND]]
+    assert kinds(classify(FLOOR, thin)) == [[NOWHERE], [NOWHERE]]
+    assert kinds(classify(FLOOR, box((0, 0, 0), (4, 3, 0.001)))) == [[NOWHERE], [BEHIND]]
 
 
 def test_a_crate_without_a_bottom_covers_what_it_stands_on():
@@ -114,7 +114,7 @@ def test_a_crate_without_a_bottom_covers_what_it_stands_on():
     assert covers(FLOOR, bottomless, double_sided=False) == [False, False]
     assert covers(FLOOR, bottomless[:, ::-1]) == [False, False]
     # A hut with a lamp, and one with furniture.
-    assert covers(FLOOR, bottomless, places=[(0.5, 0.5, 0.5)]) == [False, False]
+    assert covers(FLOOR, bottomless, viewpoints=[(0.5, 0.5, 0.5)]) == [False, False]
     assert covers(FLOOR, bottomless, shifted(SMALL, 0, -0.4, 0)) == [False, False, False]
     two_holes = np.delete(CRATE, [4, 5, 6, 7], axis=0)
     assert covers(FLOOR, two_holes) == [False, False]
@@ -124,57 +124,57 @@ def test_a_crate_without_a_bottom_covers_what_it_stands_on():
 
 def test_small_holes_do_no_harm():
     holed = np.delete(ball(1.0, level=3), 7, axis=0)
-    (_, (inside, _, sealed, _)) = judge(FLOOR, holed)
+    (_, (inside, _, sealed, _)) = classify(FLOOR, holed)
     assert (inside == BEHIND).all()
     assert not sealed.any()
     # Something stands in it: one looks in.
-    assert kinds(judge(FLOOR, holed, 0.2 * SMALL))[1] == [NOWHERE]
+    assert kinds(classify(FLOOR, holed, 0.2 * SMALL))[1] == [NOWHERE]
     # An edge that meets two half as long: a slit without width.
     split = np.concatenate([CRATE[:1], CRATE[2:]])
     a, b, c = CRATE[1]
     middle = 0.5 * (b + c)
     split = np.concatenate([split, [[a, b, middle], [a, middle, c]]])
-    assert judge(FLOOR, split)[1][2].all()
+    assert classify(FLOOR, split)[1][2].all()
 
 
 def test_rooms_are_told_from_crates_by_what_is_in_them():
     lamp = (0.5, 0.9, 0.5)
     out = (3.0, 0.9, 0.5)
-    assert kinds(judge(FLOOR, CRATE, SMALL, places=[out])) == [[NOWHERE], [BEHIND], [BEHIND]]
-    inside, room, *_ = judge(FLOOR, CRATE, SMALL, places=[out, lamp])[1]
+    assert kinds(classify(FLOOR, CRATE, SMALL, viewpoints=[out])) == [[NOWHERE], [BEHIND], [BEHIND]]
+    inside, room, *_ = classify(FLOOR, CRATE, SMALL, viewpoints=[out, lamp])[1]
     assert (inside == NOWHERE).all()
     assert room.all()
-    assert kinds(judge(FLOOR, CRATE, SMALL, glows=[2]))[1:] == [[NOWHERE], [BEHIND]]
+    assert kinds(classify(FLOOR, CRATE, SMALL, emits=[2]))[1:] == [[NOWHERE], [BEHIND]]
     # A lamp that sticks in the ceiling, and one that hangs on the wall outside.
-    assert kinds(judge(FLOOR, CRATE, shifted(SMALL, 0, 0.45, 0), glows=[2]))[1] == [NOWHERE]
-    assert kinds(judge(FLOOR, CRATE, shifted(SMALL, 0, 0, 0.55), glows=[2]))[1] == [BEHIND]
+    assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0.45, 0), emits=[2]))[1] == [NOWHERE]
+    assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0, 0.55), emits=[2]))[1] == [BEHIND]
 
 
 def test_rooms_that_look_inwards():
     room = box((-3, 0, -3), (3, 3, 3), inward=True)
-    assert kinds(judge(room)) == [[NOWHERE]]
-    assert kinds(judge(room, CRATE)) == [[NOWHERE], [BEHIND]]
+    assert kinds(classify(room)) == [[NOWHERE]]
+    assert kinds(classify(room, CRATE)) == [[NOWHERE], [BEHIND]]
     # Furniture that stands a little in the floor.
-    assert kinds(judge(room, CRATE - [0, 0.1, 0], FLOOR - [0, 1, 0])) == [[NOWHERE], [BEHIND], [NOWHERE]]
+    assert kinds(classify(room, CRATE - [0, 0.1, 0], FLOOR - [0, 1, 0])) == [[NOWHERE], [BEHIND], [NOWHERE]]
     # Thick walls: the solid is what lies between.
     house = box((-3.3, -0.3, -3.3), (3.3, 3.3, 3.3))
     for objects in ((house, room), (np.concatenate([house, room]),)):
-        found = judge(*objects, CRATE, places=[(0, 2, 0)])
+        found = classify(*objects, CRATE, viewpoints=[(0, 2, 0)])
         assert kinds(found) == [[BEHIND]] * len(found)
         assert all(sealed.all() for _, _, sealed, _ in found)
 
 
 @pytest.mark.parametrize("inward", [False, True])
-@pytest.mark.parametrize("glows", [(), (0,)])
-def test_a_sky_sphere_is_no_solid(inward, glows):
+@pytest.mark.parametrize("emits", [(), (0,)])
+def test_a_sky_sphere_is_no_solid(inward, emits):
     sky = ball(50.0, inward)
-    found = judge(sky, FLOOR, CRATE, shifted(CRATE, 2, 0.5, 0.5), glows=glows)
+    found = classify(sky, FLOOR, CRATE, shifted(CRATE, 2, 0.5, 0.5), emits=emits)
     assert kinds(found) == [[NOWHERE], [NOWHERE], [BEHIND], [BEHIND]]
     assert found[0][1].all()
 
 
 def test_nothing_comes_of_nothing():
-    assert kinds(judge(np.zeros((0, 3, 3)))) == [[]]
+    assert kinds(classify(np.zeros((0, 3, 3)))) == [[]]
 
 
 def test_winding_numbers_along_a_line_are_those_of_solid_angles():
