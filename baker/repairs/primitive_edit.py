@@ -11,7 +11,7 @@ from baker.core.source_mesh import SourcePrimitive
 from baker.io.gltf.edited_primitive import EditedPrimitive
 from baker.repairs.normals import NormalChoice
 from baker.topology.triangle_check import face_normal
-from baker.topology.unique_rows import compact, first_equal
+from baker.topology.unique_rows import first_equal, unique_rows
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def apply_edit(edit: PrimitiveEdit, uv: NDArray[np.float32] | None = None) -> Ed
     normal = None if edit.normal is None else edit.normal.reshape(-1, 3) + np.float32(0.0)
     own += [] if normal is None else [normal]
     own += [] if uv is None else [uv.reshape(-1, 2)]
-    corner, number = compact(first_equal(own, len(row)))
+    corner, number = unique_rows(own, len(row))
     # Sort the new vertices by their old ones, to keep the file's order.
     order = np.argsort(row[corner], kind="stable")
     rank = np.zeros(len(order), np.int64)

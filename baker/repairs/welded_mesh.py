@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from baker.repairs import meshlab
 from baker.repairs.primitive_edit import EditablePrimitive
 from baker.topology.triangle_check import usable_vertices, zero_area
-from baker.topology.unique_rows import compact, first_equal
+from baker.topology.unique_rows import first_equal, unique_rows
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def weld_primitives(primitives: Sequence[EditablePrimitive]) -> WeldedMesh:
     vertex = row + start[owner][:, None]
     drawn = np.asarray(usable_vertices(position)[vertex].all(axis=1))
     drawn[drawn] = ~zero_area(position, vertex[drawn])
-    kept, number = compact(first_equal([position + np.float32(0.0)], len(position)))
+    kept, number = unique_rows([position + np.float32(0.0)], len(position))
     return WeldedMesh(position[kept], number[vertex[drawn]], owner[drawn], row[drawn])
 
 

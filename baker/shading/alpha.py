@@ -24,7 +24,7 @@ from baker.kernels.alpha import (
 from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack
 from baker.kernels.transmittance import TransmittanceTable
-from baker.topology.unique_rows import compact, first_equal
+from baker.topology.unique_rows import first_equal, unique_rows
 from baker.trace.embree import HitFilter
 
 
@@ -139,7 +139,7 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     # Adding 0 makes -0 equal to 0.
     position = geometry.position[corner] + np.float32(0.0)
     instance = np.repeat(geometry.instance[triangle], 3)[:, None]
-    kept, vertex = compact(first_equal([position, instance], len(corner)))
+    kept, vertex = unique_rows([position, instance], len(corner))
     vertex = np.sort(vertex.reshape(-1, 3), axis=1)
     link = np.concatenate([vertex[:, :2], vertex[:, 1:]])
     graph = coo_array((np.ones(len(link), bool), (link[:, 0], link[:, 1])), shape=(len(kept), len(kept)))
@@ -150,7 +150,7 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     layer = np.zeros(len(same), np.int64)
     layer[order] = np.arange(len(same)) - np.repeat(begins, np.diff(begins, append=len(same)))
     # float32 holds whole numbers up to 2^24.
-    return compact(first_equal([part[:, None], layer[:, None]], len(part)))[1] % (1 << 24)
+    return unique_rows([part[:, None], layer[:, None]], len(part))[1] % (1 << 24)
 
 
 def _lowest_alpha(pack: TexturePack, k: int) -> float:

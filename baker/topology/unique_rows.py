@@ -44,23 +44,27 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
     return index[inverse.ravel()].astype(np.int64)
 
 
-def compact(first: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def unique_rows(
+    column: Sequence[NDArray[np.generic]], n_rows: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the distinct rows, and for each row its number among them.
 
     Parameters
     ----------
-    first : (N,) int64
-        Result of `first_equal`.
+    column : sequence of (N, any) arrays
+        Rows are equal if they are so in every array, bit for bit.
+    n_rows : int
+        N, needed if there are no columns: then all rows are equal.
 
     Returns
     -------
-    kept : (K,) int64
-        The first row of each kind, ascending.
+    first : (K,) int64
+        The first row of each value, ascending.
     inverse : (N,) int64
-        first = kept[inverse].
+        Row i equals row first[inverse[i]].
     """
-    kept, inverse = np.unique(first, return_inverse=True)
-    return kept.astype(np.int64), inverse.astype(np.int64)
+    first, inverse = np.unique(first_equal(column, n_rows), return_inverse=True)
+    return first.astype(np.int64), inverse.astype(np.int64)
 
 
 def _words(array: NDArray[np.generic]) -> NDArray[np.uint64]:

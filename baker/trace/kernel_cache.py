@@ -93,7 +93,7 @@ def is_stored(kernel: Any) -> bool | None:
 
 
 def allow_no_cache(folder: Path) -> None:
-    """Let kernels of this program be defined where they cannot be kept.
+    """Let kernels of this program be defined where they cannot be cached.
 
     Parameters
     ----------
@@ -102,8 +102,9 @@ def allow_no_cache(folder: Path) -> None:
 
     Notes
     -----
-    Where the package's own cache folder can be written, which is nearly always, this looks no further. Numba
-    has no setting for it: its two kinds of compiled function are told to go on.
+    Does nothing where the package's own cache folder can be written, which is nearly always. Else, since
+    Numba has no setting for it, `enable_caching` of its two classes of compiled functions is replaced for
+    this process. The replacement suppresses Numba's error for functions of `baker` only.
     """
     kept = folder / "__pycache__"
     if os.access(kept if kept.exists() else folder, os.W_OK):
@@ -113,10 +114,11 @@ def allow_no_cache(folder: Path) -> None:
 
     for kind, function in ((Dispatcher, "py_func"), (CFunc, "_pyfunc")):
         if kind.enable_caching.__module__ != __name__:
-            _go_on(kind, function)
+            _suppress_error(kind, function)
 
 
-def _go_on(kind: Any, function: str) -> None:
+def _suppress_error(kind: Any, function: str) -> None:
+    """Replace `enable_caching` of a class of Numba by one without its error for functions of `baker`."""
     keep = kind.enable_caching
 
     def enable_caching(self: Any) -> None:

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from baker.trace.jit import inner, kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def coplanar_partners(corner, low, high, first, owner, slack, partner):
     """Write for each triangle one of another owner that it overlaps in its plane.
 
@@ -42,7 +43,7 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
                     partner[j] = i
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _apart(a, b, slack):
     """Return whether a side of `a` (3, 2) separates all of `b` (3, 2) from it, up to `slack`."""
     turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from baker.trace.jit import kernel
 
 # Entries of `counts`: samples covered, samples covered again, triangles that cover samples of an earlier one,
 # pairs listed.
 COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def cover_pairs(corner, slack, owner, pairs, counts):
     """Mark the samples that each triangle covers, and list pairs of triangles that share samples.
 

@@ -9,27 +9,35 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from baker.kernels.clip import MAX_CORNERS, clip_to_square, polygon_area, polygon_point
+from baker.kernels.clip import (
+    MAX_CORNERS,
+    clip_to_square,
+    new_polygon,
+    new_triangle,
+    polygon_area,
+    polygon_point,
+)
+from baker.trace.jit import inner, kernel, larger, smaller
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _box(corner, size):
     """Return first column, last column, first row, last row of texels that a triangle (3, 2) may touch."""
-    low_x, high_x = min(corner[:, 0]), max(corner[:, 0])
-    low_y, high_y = min(corner[:, 1]), max(corner[:, 1])
+    low_x = smaller(smaller(corner[0, 0], corner[1, 0]), corner[2, 0])
+    high_x = larger(larger(corner[0, 0], corner[1, 0]), corner[2, 0])
+    low_y = smaller(smaller(corner[0, 1], corner[1, 1]), corner[2, 1])
+    high_y = larger(larger(corner[0, 1], corner[1, 1]), corner[2, 1])
     return (
         max(math.floor(low_x), 0), min(math.floor(high_x), size - 1),
         max(math.floor(low_y), 0), min(math.floor(high_y), size - 1),
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def texel_owners(uv, triangle, page, instance, size, owner, most):
     """Write to `owner` the instance that covers most of each pixel; `most` is that area, in texels."""
-    corner = np.zeros((3, 2))
-    cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
+    corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
         for j in range(3):
             corner[j, 0] = uv[triangle[t, j], 0] * size
@@ -44,11 +52,10 @@ def texel_owners(uv, triangle, page, instance, size, owner, most):
                     owner[pixel] = instance[t]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):
     """Count the pieces of triangles inside wanted texels (no `write`), or store them from `at` on."""
-    corner = np.zeros((3, 2))
-    cut, spare = np.zeros((MAX_CORNERS, 2)), np.zeros((MAX_CORNERS, 2))
+    corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
         for j in range(3):
             corner[j, 0] = uv[triangle[t, j], 0] * size
@@ -66,11 +73,12 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
                 if len(write):
                     k = at[i]
                     piece[k], corners[k], area[k] = t, n, inside
-                    polygon[k] = cut
+                    for j in range(MAX_CORNERS):
+                        polygon[k, j, 0], polygon[k, j, 1] = cut[j, 0], cut[j, 1]
                 at[i] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def spread_pieces(
     uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):

@@ -31,7 +31,7 @@ bounding_sphere, emitted_radiance, emitter_density = compiled(
 emitter_hit, mis_weighted, sample_emitter = compiled(emitter_hit, mis_weighted, sample_emitter)
 
 
-def lamps(n, seed, two_sided=0.2):
+def random_emitters(n, seed, two_sided=0.2):
     """A bumpy sheet of n triangles of very different size and radiance, some two-sided, some dark."""
     rng = np.random.default_rng(seed)
     middle = rng.uniform(-2, 2, (n, 1, 3)) * [1, 0.1, 1]
@@ -90,7 +90,7 @@ def chances(emitters, centre, radius):
 
 @pytest.mark.parametrize("n", [1, 40, 900])
 def test_the_table_holds_every_emitter_once(n):
-    geometry, shading, emitters = lamps(n, 2)
+    geometry, shading, emitters = random_emitters(n, 2)
     emits = np.flatnonzero(shading.emission[geometry.material].max(axis=1) > 0)
     np.testing.assert_array_equal(np.sort(emitters.triangle), emits)
     assert len(emitters.power) == min(len(emits), MAX_CLUSTERS)
@@ -117,7 +117,7 @@ def test_the_table_holds_every_emitter_once(n):
 
 @pytest.mark.parametrize("n", [30, 900])
 def test_triangles_and_points_are_chosen_by_their_density(n):
-    geometry, _, emitters = lamps(n, 3)
+    geometry, _, emitters = random_emitters(n, 3)
     rng = np.random.default_rng(0)
     chance_of_all = []
     for centre, radius in (((0, -2, 0), 0.3), ((1.5, 0.1, 1), 0.05), ((0, -30, 4), 1.0)):
@@ -144,7 +144,7 @@ def test_triangles_and_points_are_chosen_by_their_density(n):
 
 
 def test_extreme_numbers_choose_a_triangle_that_can_be_chosen():
-    _, _, emitters = lamps(400, 4)
+    _, _, emitters = random_emitters(400, 4)
     chance, running = chances(emitters, (0, -3, 0), 0.2)
     point = np.zeros(3, np.float32)
     ends = np.float32([0, 2**-24, 0.5, 1 - 2**-24])
@@ -161,7 +161,7 @@ def test_extreme_numbers_choose_a_triangle_that_can_be_chosen():
 
 
 def test_no_cluster_that_could_shine_is_left_out():
-    geometry, _, emitters = lamps(900, 5, two_sided=0.01)
+    geometry, _, emitters = random_emitters(900, 5, two_sided=0.01)
     rng = np.random.default_rng(1)
     zero = 0
     for _ in range(60):
@@ -186,11 +186,11 @@ def test_no_cluster_that_could_shine_is_left_out():
 
 
 def test_nothing_to_choose():
-    geometry, shading, emitters = lamps(5, 6)
+    geometry, shading, emitters = random_emitters(5, 6)
     dark = build_emitters(geometry, shading._replace(emission=np.zeros((5, 3), np.float32)))
     assert len(dark.triangle) == len(dark.power) == 0
     assert tile_emitters(dark, np.zeros((1, 16, 3), np.float32)).chance.shape == (0,)
-    # A lamp that faces down cannot be seen from above.
+    # An emitter that faces down cannot be seen from above.
     one_sided = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 0, 1), grey(0.5, 1.0))]).emitters
     assert not tile_emitters(one_sided, np.full((1, 16, 3), [0, 50, 0], np.float32)).chance.any()
     below = tile_emitters(one_sided, np.full((1, 16, 3), [0, -50, 0], np.float32))

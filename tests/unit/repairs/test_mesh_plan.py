@@ -8,7 +8,7 @@ from repair_scenes import away_from, box, bytes_of, part, soup, torus, volume
 
 from baker.repairs.mesh_plan import plan_mesh
 from baker.repairs.primitive_edit import apply_edit
-from baker.topology.unique_rows import compact, first_equal
+from baker.topology.unique_rows import first_equal, unique_rows
 
 CENTRE = (0.5, 0.5, 0.5)
 
@@ -48,8 +48,8 @@ def test_rows_that_only_share_a_hash_are_told_apart(monkeypatch):
     assert first_equal([data], 4).tolist() == [0, 1, 0, 3]
 
 
-def test_compact_numbers_the_first_rows():
-    kept, place = compact(np.array([0, 1, 0, 3, 1]))
+def test_unique_rows_numbers_the_first_rows():
+    kept, place = unique_rows([np.array([[5], [7], [5], [9], [7]])], 5)
     assert kept.tolist() == [0, 1, 3]
     assert place.tolist() == [0, 1, 0, 2, 1]
 

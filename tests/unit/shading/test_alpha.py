@@ -94,7 +94,7 @@ def test_only_triangles_that_let_light_through_are_chosen():
     assert hit_filter(nothing) is None
 
 
-def test_presence_is_factor_times_texture_times_vertex_colour():
+def test_opacity_is_factor_times_texture_times_vertex_colour():
     image = np.array([[0.2, 0.4], [0.6, 0.8]])
     quad = replace(
         sheet("BLEND", 0.5, image=image), colour=np.float32([[1, 1, 1, a] for a in (1, 0.5, 0, 0.5)])

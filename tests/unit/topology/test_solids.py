@@ -113,7 +113,7 @@ def test_a_crate_without_a_bottom_covers_what_it_stands_on():
     assert covers(FLOOR, bottomless) == [False, True]
     assert covers(FLOOR, bottomless, double_sided=False) == [False, False]
     assert covers(FLOOR, bottomless[:, ::-1]) == [False, False]
-    # A hut with a lamp, and one with furniture.
+    # A hut with a light, and one with furniture.
     assert covers(FLOOR, bottomless, viewpoints=[(0.5, 0.5, 0.5)]) == [False, False]
     assert covers(FLOOR, bottomless, shifted(SMALL, 0, -0.4, 0)) == [False, False, False]
     two_holes = np.delete(CRATE, [4, 5, 6, 7], axis=0)
@@ -138,14 +138,14 @@ def test_small_holes_do_no_harm():
 
 
 def test_rooms_are_told_from_crates_by_what_is_in_them():
-    lamp = (0.5, 0.9, 0.5)
+    light = (0.5, 0.9, 0.5)
     out = (3.0, 0.9, 0.5)
     assert kinds(classify(FLOOR, CRATE, SMALL, viewpoints=[out])) == [[NOWHERE], [BEHIND], [BEHIND]]
-    inside, room, *_ = classify(FLOOR, CRATE, SMALL, viewpoints=[out, lamp])[1]
+    inside, room, *_ = classify(FLOOR, CRATE, SMALL, viewpoints=[out, light])[1]
     assert (inside == NOWHERE).all()
     assert room.all()
     assert kinds(classify(FLOOR, CRATE, SMALL, emits=[2]))[1:] == [[NOWHERE], [BEHIND]]
-    # A lamp that sticks in the ceiling, and one that hangs on the wall outside.
+    # An emitter set into the ceiling, and one that hangs on the wall outside.
     assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0.45, 0), emits=[2]))[1] == [NOWHERE]
     assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0, 0.55), emits=[2]))[1] == [BEHIND]
 

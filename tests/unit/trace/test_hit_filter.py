@@ -1,4 +1,4 @@
-"""Triangles that a function judges: hits it refuses do not count, triangles keep their numbers."""
+"""Triangles with a hit filter: rejected hits do not count, triangles keep their numbers."""
 
 from __future__ import annotations
 
