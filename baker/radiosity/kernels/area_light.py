@@ -339,16 +339,18 @@ def light_samples(
 
 @inner
 def emitter_hit(
-    row, emitter_row, chance, cumulative, prim, m, dx, dy, dz, nx, ny, nz, distance, n_light, n_hemisphere
-):  # fmt: skip
+    row, emitter_row, chance, cumulative, prim, m, direction, normal, distance, n_light, n_hemisphere
+):
     """Return the factor from the radiance of emitter m, hit by a hemisphere ray, to its share of irradiance.
 
     row : (T, 16) float32, see `TriangleLookup`; prim : triangle hit
     emitter_row (M, 24), chance, cumulative (C,) : see `emitters.TileEmitters`
-    dx, dy, dz : unit direction of the ray; nx, ny, nz : unit normal of the texel's point
+    direction : unit direction of the ray; normal : unit normal of the texel's point; tuples of three float32
     distance : metres; n_light, n_hemisphere : samples of the balance heuristic
     0 for the back of a one-sided emitter.
     """
+    dx, dy, dz = direction
+    nx, ny, nz = normal
     front = front_facing(row, prim, dx, dy, dz)
     if not front and emitter_row[m, TWO_SIDED] == _f(0.0):
         return 0.0

@@ -161,8 +161,8 @@ def gather(
                     m = emitter_at(node, m, hit_u, hit_v)
                 if m >= 0 and (analytic[i] == 0 or apart[np.int64(emitter_row[m, CLUSTER])] != 0):
                     weight = whole * emitter_hit(
-                        row, emitter_row, chance, cumulative, prim, m, dx, dy, dz,
-                        normal[i, k, 0], normal[i, k, 1], normal[i, k, 2], rays[TFAR * PACKET_WIDTH + lane],
+                        row, emitter_row, chance, cumulative, prim, m, (dx, dy, dz),
+                        (normal[i, k, 0], normal[i, k, 1], normal[i, k, 2]), rays[TFAR * PACKET_WIDTH + lane],
                         limits[1], n_samples,
                     )  # fmt: skip
                     if weight > 0.0:
