@@ -229,8 +229,8 @@ def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:BLEND_STOP] = NO_HIT
-    # Never coherent: Embree then traverses the rays of each octant apart, but calls the filter for all of
-    # them.
+    # Never coherent: with that flag Embree traverses the rays of each octant apart, but calls the filter for
+    # all rays of the packet at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]
