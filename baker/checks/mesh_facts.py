@@ -11,7 +11,8 @@ from baker.core.scene import Material
 from baker.core.source_mesh import SourceMesh
 from baker.topology.edges import Edges, find_edges
 from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
-from baker.topology.weld import number_by_first, number_rows
+from baker.topology.unique_rows import unique_rows
+from baker.topology.weld import number_by_first
 
 
 class MeshFacts:
@@ -132,7 +133,8 @@ class MeshFacts:
     def welded(self) -> NDArray[np.int64]:
         """Return the good faces' corners as numbers of positions, (G, 3) int64: equal positions share one."""
         corner = self.triangle[self.good]
-        return number_rows(self.position)[corner]
+        # + 0 makes -0 equal to 0.
+        return unique_rows([self.position + np.float32(0.0)], len(self.position))[1][corner]
 
     @cached_property
     def single(self) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.checks.mesh_facts import MeshFacts
-from baker.topology.weld import connected_vertices, number_rows
+from baker.topology.weld import connected_vertices, weld
 from baker.uv.check import RANGE_SLACK
 
 LIGHTMAP_SET = 1
@@ -70,7 +70,7 @@ class UvFacts:
     @cached_property
     def chart(self) -> NDArray[np.int32]:
         """Return the chart of each row, (F,) int32: pieces connected both in space and in uv."""
-        label = number_rows(np.concatenate([self.facts.position, self._vertex], axis=1))
+        label = weld(self.facts.position, self._vertex)
         return connected_vertices(label[self.triangle], int(label.max(initial=-1)) + 1)
 
     @cached_property

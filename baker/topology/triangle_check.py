@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.topology.unique_rows import mix
+from baker.topology.unique_rows import mix, unique_rows
 
 # Largest coordinate that is kept; Embree's own limit for single precision is 1.8e18.
 LARGEST_COORDINATE = 1e18
@@ -140,7 +140,9 @@ def duplicates(
     candidate = _same_key(position, triangle)
     if not len(candidate):
         return repeated
-    corner = _position_number(position[triangle[candidate]].reshape(-1, 3)).reshape(-1, 3)
+    # + 0 makes -0 equal to 0.
+    used = position[triangle[candidate]].reshape(-1, 3) + np.float32(0.0)
+    corner = unique_rows([used], len(used))[1].reshape(-1, 3)
     first = corner.argmin(axis=1)
     row = np.arange(len(corner))
     a, b, c = (corner[row, (first + k) % 3] for k in range(3))
@@ -179,14 +181,3 @@ def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
     if not len(twice):
         return np.zeros(0, np.int64)
     return np.flatnonzero(np.isin(total, twice))
-
-
-def _position_number(position: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Number equal positions (N, 3) alike, (N,) int64."""
-    order = np.lexsort((position[:, 2], position[:, 1], position[:, 0]))
-    ordered = position[order]
-    step = np.zeros(len(order), np.int64)
-    step[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    number = np.zeros(len(order), np.int64)
-    number[order] = np.cumsum(step)
-    return number

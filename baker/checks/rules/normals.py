@@ -13,7 +13,7 @@ from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.core.source_mesh import SourcePrimitive
-from baker.topology.weld import number_rows
+from baker.topology.unique_rows import unique_rows
 
 # Largest deviation of a normal's length from 1 that rounding to normalized bytes causes.
 UNIT_SLACK = 0.02
@@ -139,8 +139,10 @@ def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
                 continue
             further = None if p.further is None else p.further.astype(np.float32)
             columns = [p.position, p.normal, *p.texcoord.values(), p.colour, further]
-            number = number_rows(np.concatenate([c for c in columns if c is not None], axis=1))
-            repeats = len(number) - (int(number.max()) + 1)
+            # + 0 makes -0 equal to 0.
+            rows = [c + np.float32(0.0) for c in columns if c is not None]
+            distinct, number = unique_rows(rows, len(p.position))
+            repeats = len(number) - len(distinct)
             double, total = double + repeats, total + len(number)
             if repeats and first is None:
                 first = p.index
