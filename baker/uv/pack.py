@@ -106,7 +106,7 @@ def pack(
     -------
     Packing
     """
-    from baker.uv.kernels.uv_pack import outline_spans, place_items
+    from baker.uv.kernels.uv_pack import place_items
 
     resolution, gap = page
     margin = border(gap)
@@ -118,13 +118,7 @@ def pack(
     used = np.unique(item_shape)
     if (np.maximum(n_rows, n_columns)[used] > resolution - 2 * margin).any():
         return Packing(position, scale, resolution, 0, 0.0)
-    rows = np.zeros(len(n_rows), np.int64)
-    rows[used] = n_rows[used]
-    first_row = np.concatenate([[0], np.cumsum(rows)])
-    low = np.full(int(first_row[-1]), 1 << 28, np.int32)
-    high = np.full(int(first_row[-1]), -1, np.int32)
-    outline_spans(shapes.corner, shapes.first_triangle, used, scale, first_row, low, high)
-
+    first_row, low, high = _spans(shapes, scale, n_rows, used)
     free = np.arange(resolution + 1, dtype=np.int16)
     next_free = np.tile(free, (resolution, 1))
     next_used = np.full((resolution, resolution + 1), resolution, np.int16)
@@ -146,6 +140,24 @@ def pack(
     weight = (n_rows + gap) * (n_columns + gap)
     share = weight[item_shape[done]].sum() / max(1, weight[item_shape].sum())
     return Packing(position, scale, int(top.max(initial=0)) + margin, placed, float(share))
+
+
+def _spans(
+    shapes: Shapes, scale: NDArray[np.float64], n_rows: NDArray[np.int64], used: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
+    """Return the spans of texels of the `used` shapes: first row of each shape (S + 1,), low and high (R,).
+
+    scale : (S, 2) texels per metre, n_rows : (S,) rows of each shape.
+    """
+    from baker.uv.kernels.uv_pack import outline_spans
+
+    rows = np.zeros(len(n_rows), np.int64)
+    rows[used] = n_rows[used]
+    first_row = np.concatenate([[0], np.cumsum(rows)])
+    low = np.full(int(first_row[-1]), 1 << 28, np.int32)
+    high = np.full(int(first_row[-1]), -1, np.int32)
+    outline_spans(shapes.corner, shapes.first_triangle, used, scale, first_row, low, high)
+    return first_row, low, high
 
 
 def fit_page(
