@@ -127,7 +127,7 @@ def _turn(world: PreparedScene) -> dict[str, tuple[float, int]]:
     trace_transport(world, {"ao": CHANNELS.get("ao")}, record)
     # `prepare_scene` finds points inside geometry once, outside these turns; cast its rays again.
     start = perf_counter()
-    _, cast = find_inside_geometry(world.texels, world.job, world.tells)
+    _, cast = find_inside_geometry(world.texels, world.job, world.hit_kind)
     record.timings[Stage.INSIDE_GEOMETRY] = perf_counter() - start
     record.rays[Stage.INSIDE_GEOMETRY] = cast
     return {name: (record.timings[name], cast) for name, cast in record.rays.items() if cast}

@@ -74,9 +74,9 @@ def batch(
 def _on_cluster(address: str, threads: int | None) -> Bakery:
     from baker.core.parallel import thread_count
     from baker.distributed.connection import Cluster as Connection
-    from baker.distributed.job_executor import ClusterBakery
+    from baker.distributed.job_executor import DistributedJobExecutor
 
-    return ClusterBakery(Connection(address, threads=thread_count(threads)))
+    return DistributedJobExecutor(Connection(address, threads=thread_count(threads)))
 
 
 def write_table(outcomes: Sequence[Outcome], stream: TextIO, *, dry_run: bool) -> None:

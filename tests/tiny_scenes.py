@@ -62,8 +62,8 @@ class World:
         return EmitterSampling(self.emitters, self.shading, n_light, n_gather)
 
     @property
-    def tells(self):
-        """What triangles tell rays that come from inside of something."""
+    def hit_kind(self):
+        """What triangles prove of rays that come from inside something."""
         solids = scene_solids(self.scene, self.geometry, self.shading)
         return hit_kinds(self.geometry, self.shading, solids)
 

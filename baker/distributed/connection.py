@@ -1,7 +1,6 @@
-"""Connects to a dask.distributed cluster; the only file that knows it.
+"""Connects to a dask.distributed cluster; the only file that imports it.
 
-The scheduler moves what tasks need to each worker once, and has others do again what a lost worker had not
-handed over.
+The scheduler sends the data of tasks to each worker once, and reruns the tasks of a lost worker on others.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ from baker.core.stage import Stage
 from baker.distributed.tile_worker import Result, Span, TileWorker
 from baker.io.bake.manifest import library_versions
 
-# Seconds to find a scheduler; seconds without any worker after which the work is given up.
+# Seconds to find a scheduler, and seconds without any worker before the work is cancelled.
 _CONNECT = 10
 _ALONE = 30.0
-# Seconds between two looks at the workers.
-_LOOK = 1.0
+# Seconds between two checks of the workers.
+_POLL = 1.0
 
 
 class Cluster:
@@ -55,7 +54,7 @@ class Cluster:
             message = "a cluster needs dask.distributed; install it with: pip install distributed"
             raise ResourceError(message) from None
         dask: Any = distributed  # its functions carry no types
-        # What happens to workers is told here, in sentences.
+        # Failures of workers are reported by this file, as sentences.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._local: Any = None
         if kind == "local":
@@ -91,26 +90,26 @@ class Cluster:
         return found
 
     def send(self, value: Any) -> Any:
-        """Give a value to all workers and return what stands for it in `submit`."""
+        """Send a value to all workers and return the handle that `submit` takes."""
         return self._client.scatter([value], broadcast=True, hash=False)[0]
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Have `work(*arguments)` done by some worker."""
+        """Run `work(*arguments)` in some worker and return the task."""
         return self._client.submit(_checked, library_versions(), work, *arguments, pure=False)
 
     def finished(self, tasks: Sequence[Any]) -> list[Any]:
-        """Return those tasks that came to an end."""
+        """Return the tasks that have ended."""
         return [task for task in tasks if task.status != "pending"]
 
     def result(self, task: Any) -> Any:
-        """Return what a finished task gave.
+        """Return the result of a finished task.
 
         Raises
         ------
         BakerError
-            What it raised, or that its workers died.
+            If the task raised one, or its workers died.
         KeyError
-            If what it needs was lost with the worker that held it: send and submit again.
+            If its data were lost with the worker that held them: send and submit again.
         """
         try:
             if task.status == "finished":
@@ -128,14 +127,14 @@ class Cluster:
         raise error
 
     def alive(self) -> bool:
-        """Tell whether any worker is there."""
+        """Return whether the cluster has a worker."""
         return bool(self._client.scheduler_info()["workers"])
 
     def close(self) -> None:
-        """Leave the cluster; workers of "local:N" end."""
+        """Disconnect; workers of "local:N" end."""
         for part in (getattr(self, "_client", None), self._local):
             if part is not None:
-                # A worker that does not answer is killed by the cluster's own helpers.
+                # The cluster itself kills a worker that does not answer.
                 with contextlib.suppress(TimeoutError, OSError):
                     part.close(timeout=_CONNECT)
 
@@ -156,22 +155,22 @@ def _compare(address: str, here: Mapping[str, Any], there: Mapping[str, Any]) ->
 
 
 def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any) -> Any:
-    """Run in a worker: refuse if it has other versions (it may have joined later)."""
+    """Run in a worker: refuse if its versions differ (it may have joined later)."""
     from distributed import get_worker
 
     _compare(get_worker().address, versions, library_versions())
     return work(*arguments)
 
 
-class Waiting:
-    """Notices that a cluster has had no worker for too long."""
+class WorkerWatch:
+    """Raises an error when a cluster has had no worker for too long."""
 
     def __init__(self, cluster: Cluster) -> None:
         self.cluster = cluster
-        self.seen = self.looked = time.monotonic()
+        self.seen = self.checked = time.monotonic()
 
     def check(self) -> None:
-        """Look, now and then.
+        """Check for workers, at most once a second.
 
         Raises
         ------
@@ -179,9 +178,9 @@ class Waiting:
             After half a minute without any worker.
         """
         now = time.monotonic()
-        if now - self.looked < _LOOK:
+        if now - self.checked < _POLL:
             return
-        self.looked = now
+        self.checked = now
         if self.cluster.alive():
             self.seen = now
         elif now - self.seen > _ALONE:
@@ -189,7 +188,7 @@ class Waiting:
 
 
 def held_bakes() -> dict[str, TileWorker]:
-    """Run in a worker: return the bakes that it works for."""
+    """Run in a worker: return its bakes, by hash."""
     from distributed import get_worker
 
     held: dict[str, TileWorker] = vars(get_worker()).setdefault("baker_bakes", {})
@@ -197,7 +196,7 @@ def held_bakes() -> dict[str, TileWorker]:
 
 
 def worker_threads() -> int:
-    """Run in a worker: return how many threads it has."""
+    """Run in a worker: return the number of its threads."""
     from distributed import get_worker
 
     return int(get_worker().state.nthreads)
@@ -210,11 +209,11 @@ def work_on_tiles(
     arrays: Mapping[str, NDArray[Any]],
     spans: list[Span],
 ) -> Result:
-    """Run in a worker: work on tiles of the bake with this hash."""
+    """Run in a worker: return the results of tiles of the bake with this hash."""
     held = held_bakes()
     if key not in held:
         scene, atlas, settings = parts
-        # One bake at a time: the last one's ray tree is of no use any more.
+        # One bake at a time: free the ray tree of the last one.
         held.clear()
         threads = {"threads": worker_threads()}
         held.setdefault(key, TileWorker(scene, atlas, settings.model_copy(update=threads)))

@@ -1,4 +1,4 @@
-"""Whole bakes on a cluster: the scene goes there, the finished pages come back and are written here."""
+"""Runs whole bakes on a cluster: sends the scene, receives the finished pages, and writes them here."""
 
 from __future__ import annotations
 
@@ -10,32 +10,33 @@ from baker.core.lightmap import BakeResult
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
-from baker.distributed.connection import Cluster, Waiting, worker_threads
+from baker.distributed.connection import Cluster, WorkerWatch, worker_threads
+from baker.io.bake.write_bake import check_out, write_bake
+from baker.io.load import load_for_bake
 from baker.jobs.executor import Event
 from baker.jobs.jobs_file import Job
 from baker.jobs.worker import describe
+from baker.pipeline.bake import bake
 
 
-class ClusterBakery:
-    """Is a `batch.executor.Bakery` of many machines, one bake for each worker at a time.
+class DistributedJobExecutor:
+    """Runs whole bakes on the workers of a cluster, one at a time on each; an executor of `jobs.executor`.
 
     Parameters
     ----------
     cluster : Cluster
+        Connected.
     """
 
     def __init__(self, cluster: Cluster) -> None:
         self.cluster = cluster
         self.slots = max(len(cluster.workers()), 1)
-        self._waiting = Waiting(cluster)
+        self._watch = WorkerWatch(cluster)
         self._tasks: dict[Any, tuple[int, Job, Scene, bool]] = {}
         self._failed: list[Event] = []
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
         """Read the scene and send it; a worker uses all its threads."""
-        from baker.io.bake.write_bake import check_out
-        from baker.io.load import load_for_bake
-
         assert job.out is not None
         try:
             check_out(job.out, force=force, scene_path=job.scene)
@@ -45,31 +46,29 @@ class ClusterBakery:
             self._failed.append(Event(ticket, ended=True, error=describe(error)))
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait for a bake to come back, and write it."""
+        """Wait until a bake has ended, and write it."""
         end = time.monotonic() + timeout
         while not self._failed:
             for task in self.cluster.finished(list(self._tasks)):
                 return self._take(task)
-            self._waiting.check()
+            self._watch.check()
             if time.monotonic() >= end:
                 return None
             time.sleep(0.02)
         return self._failed.pop(0)
 
     def close(self) -> None:
-        """Forget what still runs: it is not written."""
+        """Disconnect; running bakes are not written."""
         self._tasks.clear()
         self.cluster.close()
 
     def _send(self, ticket: int, job: Job, scene: Scene, force: bool) -> None:
-        # What only the writer needs stays here.
+        # Source file and path are needed for writing only.
         light = replace(scene, source=None, path=None)
         task = self.cluster.submit(bake_scene, light, job.settings)
         self._tasks[task] = (ticket, job, scene, force)
 
     def _take(self, task: Any) -> Event:
-        from baker.io.bake.write_bake import write_bake
-
         ticket, job, scene, force = self._tasks.pop(task)
         assert job.out is not None
         try:
@@ -85,8 +84,6 @@ class ClusterBakery:
 
 
 def bake_scene(scene: Scene, settings: BakeSettings) -> BakeResult:
-    """Run in a worker: bake, and return all but the scene."""
-    from baker.pipeline.bake import bake
-
+    """Run in a worker: bake, and return the result without the scene."""
     result = bake(scene, settings=settings.model_copy(update={"threads": worker_threads()}))
     return replace(result, scene=replace(scene, meshes=(), materials=(), instances=()))

@@ -1,4 +1,4 @@
-"""Spreads the tiles of one bake over a cluster."""
+"""Distributes the tiles of one bake over a cluster."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from baker.core.progress import Progress, report
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
-from baker.distributed.connection import Cluster, Waiting, work_on_tiles
+from baker.distributed.connection import Cluster, WorkerWatch, work_on_tiles
 from baker.distributed.tile_worker import Span
 
-# Tasks for each thread of a stage: few enough to cost little, enough that all end at the same time.
+# Tasks per thread and stage: few, since each has a cost, but enough for all threads to end together.
 _TASKS_PER_THREAD = 8
-# Most tiles in a task: what a lost worker costs.
-_MOST_TILES = 64
-_LOOK = 0.02
+# Largest number of tiles in a task: a lost worker loses one task per thread.
+_MAX_TILES = 64
+_POLL = 0.02
 
 
 class DistributedTileExecutor:
-    """Is a `core.executor.TileExecutor` of many machines.
+    """Runs tiles on the workers of a cluster; a `core.executor.TileExecutor`.
 
     Parameters
     ----------
     cluster : Cluster
+        Connected.
     """
 
     def __init__(self, cluster: Cluster) -> None:
@@ -43,13 +44,13 @@ class DistributedTileExecutor:
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Send scene, atlas and settings to each worker, once."""
-        # What only the writer needs stays here.
+        # Source file and path are needed for writing only.
         self._parts = (replace(scene, source=None, path=None), atlas, settings)
         self._key = hashlib.sha256(pickle.dumps(self._parts, 5)).hexdigest()
         self._sent = self.cluster.send(self._parts)
 
     def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
-        """Return what has the tiles of a stage worked on by the cluster."""
+        """Return a runner that sends the tiles of a stage to the cluster."""
 
         def run(
             n: int,
@@ -71,7 +72,7 @@ class DistributedTileExecutor:
         return run
 
     def close(self) -> None:
-        """Let the workers forget the scene."""
+        """Release the scene; workers keep it until the next bake."""
         self._parts = self._sent = None
 
     def _submitter(self, stage: Stage, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:
@@ -80,7 +81,7 @@ class DistributedTileExecutor:
         def submit(spans: list[Span], again: bool) -> Any:
             nonlocal sent
             if again:
-                # The worker that held them is lost, and nobody else had them.
+                # The data were lost with the only worker that held them.
                 self._sent, sent = self.cluster.send(self._parts), self.cluster.send(arrays)
             return self.cluster.submit(work_on_tiles, self._key, self._sent, stage, sent, spans)
 
@@ -104,10 +105,10 @@ class _Stage:
         rays_per_item: float,
     ) -> None:
         slots = max(sum(self.cluster.workers().values()), 1)
-        size = max(min(-(-len(spans) // (_TASKS_PER_THREAD * slots)), _MOST_TILES), 1)
+        size = max(min(-(-len(spans) // (_TASKS_PER_THREAD * slots)), _MAX_TILES), 1)
         tasks = [(spans[k : k + size]) for k in range(0, len(spans), size)]
         pending = {self.submit(task, False): task for task in tasks}
-        waiting, start, done = Waiting(self.cluster), time.perf_counter(), 0
+        watch, start, done = WorkerWatch(self.cluster), time.perf_counter(), 0
         while pending:
             for task in self.cluster.finished(list(pending)):
                 part_of = pending.pop(task)
@@ -122,5 +123,5 @@ class _Stage:
             elapsed = max(time.perf_counter() - start, 1e-9)
             rate = f"{done * rays_per_item / elapsed / 1e6:.1f} Mrays/s" if rays_per_item else ""
             report(progress, stage, done / max(n, 1), rate)
-            waiting.check()
-            time.sleep(_LOOK)
+            watch.check()
+            time.sleep(_POLL)

@@ -49,7 +49,7 @@ class PreparedScene:
         Ray tree; whoever prepared the scene closes it.
     emitters : Emitters
         Emissive triangles in clusters.
-    tells : (T,) uint8
+    hit_kind : (T,) uint8
         Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
     outside : (n_uncut,) uint16
         Bit k is set where point k is outside geometry, of the entries before texels were split into sides.
@@ -66,7 +66,7 @@ class PreparedScene:
     texels: TexelBuffer
     rays: RayScene
     emitters: Emitters
-    tells: NDArray[np.uint8]
+    hit_kind: NDArray[np.uint8]
     outside: NDArray[np.uint16]
     sides: Sides
     job: TraceJob
@@ -110,7 +110,7 @@ def prepare_scene(
     with record.stage(Stage.TEXELS):
         geometry = world_geometry(scene, atlas)
         shading = resolve_materials(scene, geometry)
-        geometry, tells = hide_backs(scene, geometry, shading)
+        geometry, hit_kind = hide_backs(scene, geometry, shading)
         texels, surface = build_texels(
             geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
         )
@@ -122,27 +122,19 @@ def prepare_scene(
     job = TraceJob(surface, every, lookup, rays.tracer, settings.seed, threads, record.progress)
     if outside is None:
         with record.stage(Stage.INSIDE_GEOMETRY):
-            outside, cast = find_inside_geometry(texels, job, tells)
+            outside, cast = find_inside_geometry(texels, job, hit_kind)
             record.rays[Stage.INSIDE_GEOMETRY] = cast
     with record.stage(Stage.TEXEL_SIDES):
         sides = split_texels(texels, replace(job, valid_points=outside))
         record.rays[Stage.TEXEL_SIDES] = sides.rays
+    texels = sides.texels
+    job = replace(
+        job,
+        surface=sides.surface,
+        valid_points=sides.valid_points,
+        chart=texels.chart,
+        point_cache=new_point_cache(texels.n),
+    )
     return PreparedScene(
-        scene=scene,
-        settings=settings,
-        geometry=geometry,
-        shading=shading,
-        texels=sides.texels,
-        rays=rays,
-        emitters=emitters,
-        tells=tells,
-        outside=outside,
-        sides=sides,
-        job=replace(
-            job,
-            surface=sides.surface,
-            valid_points=sides.valid_points,
-            chart=sides.texels.chart,
-            point_cache=new_point_cache(sides.texels.n),
-        ),
+        scene, settings, geometry, shading, texels, rays, emitters, hit_kind, outside, sides, job
     )

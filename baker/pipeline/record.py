@@ -15,7 +15,21 @@ from baker.core.stage import Stage
 
 @dataclass
 class Record:
-    """Collects what a bake tells about itself while it runs."""
+    """Collects what the result and the manifest contain about the run of a bake.
+
+    Attributes
+    ----------
+    progress : Progress
+        Called at the start of each stage.
+    timings : dict of str to float
+        Seconds of each stage.
+    rays : dict of str to int
+        Rays that each stage cast.
+    solve : dict
+        Figures of the radiosity solve.
+    warnings : list of SceneWarning
+        In the order in which they were found.
+    """
 
     progress: Progress
     timings: dict[str, float] = field(default_factory=dict)
@@ -25,7 +39,18 @@ class Record:
 
     @contextmanager
     def stage(self, name: Stage) -> Iterator[None]:
-        """Time a stage; several visits add up."""
+        """Time a stage; the times of several visits are added.
+
+        Parameters
+        ----------
+        name : Stage
+            Key of `timings`.
+
+        Yields
+        ------
+        None
+            Nothing; the stage runs in the body.
+        """
         report(self.progress, name, 0.0)
         start = time.perf_counter()
         yield

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from baker.core.parallel import Part
 from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.radiosity.direct import TILE, batch_variance
-from baker.radiosity.emitter_choice import EmitterSampling
+from baker.radiosity.emitter_choice import Choice, EmitterSampling
 from baker.radiosity.kernels.gather import (
     DIRECT,
     INDIRECT,
@@ -27,14 +28,20 @@ from baker.radiosity.trace_job import TraceJob
 
 @dataclass(frozen=True)
 class Gathered:
-    """What the gather rays of front texels brought.
+    """Light and ambient occlusion that the gather rays of front texels found.
 
     Attributes
     ----------
-    indirect, direct : (n_front, 3) float32, lx; `direct` is sky and the gather's half of emitters
-    open : (n_front,) float32, AO within the distance asked
-    variance : (n_front,) float32, lx2, of the mean of RGB of indirect + direct
+    indirect : (n_front, 3) float32, lx
+        Light that surfaces reflect.
+    direct : (n_front, 3) float32, lx
+        Light of the sky, and of emitters with the weight that gather rays have in MIS.
+    open : (n_front,) float32
+        Ambient occlusion within the distance asked for.
+    variance : (n_front,) float32, lx2
+        Of the mean of RGB of indirect + direct.
     rays : int
+        Number of rays cast.
     """
 
     indirect: NDArray[np.float32]
@@ -42,6 +49,13 @@ class Gathered:
     open: NDArray[np.float32]
     variance: NDArray[np.float32]
     rays: int
+
+    @classmethod
+    def zeros(cls, n_front: int, rays_per_texel: int) -> Gathered:
+        """Return the result before any ray is cast."""
+        indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
+        opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
+        return cls(indirect, direct, opened, variance, n_front * rays_per_texel)
 
 
 def final_gather(
@@ -78,12 +92,10 @@ def final_gather(
     Gathered
         Light and ambient occlusion of the front texels.
     """
-    indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
-    opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
+    gathered = Gathered.zeros(n_front, sampling.n_gather)
     n_rays = sampling.n_gather
     sobol_points, shared = sobol_reversed(n_rays, job.seed, 6), shared_bits_mask(n_rays)
-    limits = np.array([ao_distance, sampling.n_light], np.float64)
-    radiance = np.array(sky, np.float32)
+    limits, radiance = np.array([ao_distance, sampling.n_light], np.float64), np.array(sky, np.float32)
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
 
     def work(begin: int, end: int) -> Part:
@@ -91,10 +103,7 @@ def final_gather(
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)
-        for choice in chooser.choose(begin, origin, normal, buffers):
-            part = slice(choice.part.start, min(choice.part.stop, end - begin))
-            if part.start >= part.stop:
-                break
+        for choice, part in _fronts(chooser.choose(begin, origin, normal, buffers), end - begin):
             gather(
                 origin[part], normal[part], job.lookup, seen, choice.found, shading, buffers,
                 begin + part.start, sobol_points, shared, radiance, limits, analytic[begin:end][part],
@@ -104,10 +113,18 @@ def final_gather(
         return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread
 
     def keep(begin: int, end: int, part: Part) -> None:
-        indirect[begin:end], direct[begin:end], opened[begin:end], variance[begin:end] = part
+        gathered.indirect[begin:end], gathered.direct[begin:end] = part[:2]
+        gathered.open[begin:end], gathered.variance[begin:end] = part[2:]
 
     job.run(Stage.FINAL_GATHER, n_front, TILE, work, keep, rays_per_item=n_rays)
-    return Gathered(indirect, direct, opened, variance, n_front * n_rays)
+    return gathered
+
+
+def _fronts(choices: list[Choice], m: int) -> Iterator[tuple[Choice, slice]]:
+    """Yield the choices that concern the first m entries of a tile, with the part of these."""
+    for choice in choices:
+        if choice.part.start < m:
+            yield choice, slice(choice.part.start, min(choice.part.stop, m))
 
 
 def ambient_occlusion(job: TraceJob, n_front: int, *, n_samples: int, distance: float) -> NDArray[np.float32]:

@@ -131,7 +131,7 @@ def build_form_factors(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_r
 
 
 def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int) -> dict[int, Part]:
-    """Cast the rays of `build_form_factors`, which has the same parameters.
+    """Cast the rays of `build_form_factors`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
     seen : SeenPatch
         Patches that hits lie on.
     job : TraceJob
-        Where rays start and what works on tiles of patches.
+        Where rays start.
     n_rays : int
         Rays from each patch.
 
@@ -152,9 +152,8 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
         light, also (k, 3) and (m, 3) float32: transmittance summed over the rays of each entry, and over
         those that left.
     """
-    n = patches.n
     sobol_points, shared = sobol_reversed(n_rays, job.seed, 5), shared_bits_mask(n_rays)
-    tally = np.zeros((n, 2), np.int32)
+    tally = np.zeros((patches.n, 2), np.int32)
     starts_of = _starts_of(patches, n_rays)
     shuffle = np.random.Generator(np.random.PCG64(job.seed)).permuted(
         np.resize(np.arange(N_POINTS, dtype=np.uint8), (64, n_rays)), axis=1
@@ -189,7 +188,7 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
     def keep(begin: int, end: int, part: Part) -> None:
         rows[begin] = part
 
-    job.run(Stage.FORM_FACTORS, n, _TILE, work, keep, rays_per_item=n_rays)
+    job.run(Stage.FORM_FACTORS, patches.n, _TILE, work, keep, rays_per_item=n_rays)
     return rows
 
 

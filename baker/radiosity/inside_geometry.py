@@ -1,11 +1,11 @@
-"""Which points of which texels lie inside other geometry.
+"""Finds the points of texels that lie inside geometry.
 
-A point is buried if it lies inside a solid (`topology.solids`), or if all that it sees is black: backs of
-one-sided surfaces all around. The first surface that a ray from the inside of a solid meets is that solid's
-own, from behind, or another one that lies in there, too; no ray from outside ever meets the back of a closed
-surface first. So two such rays prove a point to be inside, however much else is in there. A few rays from
-every texel find suspects; suspects and their neighbours are then examined point by point, so that a texel
-half under a box keeps its free half.
+A point is inside if it lies in a solid (`topology.solids`), or if all that its rays meet is black: backs of
+one-sided surfaces. The first surface that a ray from inside a solid meets is the solid's own, from behind, or
+another one inside it; a ray from outside never meets the back of a closed surface first. So two rays that
+meet such backs prove a point to be inside, whatever else is in there. A few rays from every texel find
+candidates; candidates and their neighbours are then tested point by point, so a texel half under a box keeps
+the other half.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _RAYS_PER_POINT = 8
 
 
 def find_inside_geometry(
-    texels: TexelBuffer, job: TraceJob, tells: NDArray[np.uint8]
+    texels: TexelBuffer, job: TraceJob, hit_kind: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint16], int]:
     """Find the valid points of texels: those that do not lie inside geometry.
 
@@ -40,7 +40,7 @@ def find_inside_geometry(
         The n entries of the job.
     job : TraceJob
         Its `valid_points` are not read: all points are tested.
-    tells : (T,) uint8
+    hit_kind : (T,) uint8
         Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
 
     Returns
@@ -52,15 +52,15 @@ def find_inside_geometry(
     """
     n = texels.n
     valid = np.full(n, 0xFFFF, np.uint16)
-    if not n or not tells.any():
+    if not n or not hit_kind.any():
         return valid, 0
 
     # Without solids a point is invalid only if all its rays meet black backs.
-    proof = PROOF if (tells > BLACK_BACK).any() else ELSEWHERE
-    first, rays = _test_points(job, tells, np.arange(n), _Pass(1, _STRIDE, 3, 1))
+    proof = PROOF if (hit_kind > BLACK_BACK).any() else ELSEWHERE
+    first, rays = _test_points(job, hit_kind, np.arange(n), _Pass(1, _STRIDE, 3, 1))
     suspect: NDArray[np.bool_] = np.any(first, axis=1)
     chosen = np.flatnonzero(_with_neighbours(texels, suspect))
-    inside, more = _test_points(job, tells, chosen, _Pass(_RAYS_PER_POINT, 1, 4, proof))
+    inside, more = _test_points(job, hit_kind, chosen, _Pass(_RAYS_PER_POINT, 1, 4, proof))
     bits = (~inside).astype(np.uint32) << np.arange(N_POINTS, dtype=np.uint32)
     valid[chosen] = bits.sum(axis=1).astype(np.uint16)
     return valid, rays + more
@@ -82,7 +82,7 @@ class _Pass(NamedTuple):
 
 
 def _test_points(
-    job: TraceJob, tells: NDArray[np.uint8], chosen: NDArray[np.int64], test: _Pass
+    job: TraceJob, hit_kind: NDArray[np.uint8], chosen: NDArray[np.int64], test: _Pass
 ) -> tuple[NDArray[np.bool_], int]:
     """Return (m, w) bool, whether points of the chosen entries (m,) lie inside, and the rays cast."""
     every = np.full(job.n, 0xFFFF, np.uint16)
@@ -95,7 +95,7 @@ def _test_points(
     def work(begin: int, end: int) -> None:
         points = points_of(job.surface, every, chosen[begin:end], wanted)
         rays[begin // _TILE] = inside_hits(
-            *points, job.lookup, tells, job.occlusion_buffers(), begin, sobol_points, shared,
+            *points, job.lookup, hit_kind, job.occlusion_buffers(), begin, sobol_points, shared,
             test.rays_per_point, test.proof, hits,
         )  # fmt: skip
 

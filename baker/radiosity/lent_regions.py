@@ -1,9 +1,9 @@
-"""Gives texels inside geometry, which are filled from their neighbours, the region that will look them up.
+"""Assigns regions to invalid texels, which are filled from their neighbours later.
 
-The strip of a ceiling over a wall lies between a dark room and a bright outside. An engine interpolates
-between texel centres: what a lookup from the room takes of a buried texel is lit like the room, or the room
-glows along its ceiling. So each buried texel belongs to the region whose visible points lie within a texel of
-its centre; where no region does, to the nearest.
+The strip of a ceiling above a wall lies between a dark room and a bright outside. Engines interpolate between
+texel centres, so lookups in the room read these texels: filled with light from outside, they would draw a
+bright line along the ceiling. So each invalid texel belongs to the region whose visible points have the
+largest bilinear weight at it, or to the nearest region if no region has any.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ _RING = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c]
 
 
 def lend_regions(
-    texels: TexelBuffer, surface: Surface, region: NDArray[np.int32], mask: NDArray[np.uint16]
+    texels: TexelBuffer, surface: Surface, region: NDArray[np.int32], valid_points: NDArray[np.uint16]
 ) -> None:
-    """Number the regions of texels inside geometry.
+    """Assign regions to invalid texels.
 
     Parameters
     ----------
     texels : TexelBuffer
+        Fronts and backs.
     surface : Surface
+        The same entries.
     region : (n_front,) int32
-        Changed in place where `mask` is 0.
-    mask : (n_front,) uint16
-        Visible points of each texel.
+        Region of each texel; changed in row_of where `valid_points` is 0.
+    valid_points : (n_front,) uint16
+        Bit k is set where point k of the texel is valid.
     """
-    valid = mask != 0
+    valid = valid_points != 0
     pixels = texels.resolution**2
     page_of = texels.pixel[: texels.n_front] // pixels
     for page in np.unique(page_of[~valid]):
@@ -41,39 +43,41 @@ def lend_regions(
         chart = texels.page_image(texels.chart[: texels.n_front], fill=-1, page=int(page))
         image = texels.page_image(np.where(valid, region, -1), fill=-1, page=int(page))
         number = texels.page_image(np.arange(texels.n_front), fill=-1, page=int(page))
-        buried = np.argwhere((chart >= 0) & (image < 0))
-        key, weight = _lookups(buried, chart, image, _visible_points(texels, surface, mask, buried, number))
-        _choose(buried, image, key, weight)
+        invalid = np.argwhere((chart >= 0) & (image < 0))
+        key, weight = _lookups(
+            invalid, chart, image, _visible_points(texels, surface, valid_points, invalid, number)
+        )
+        _choose(invalid, image, key, weight)
         flood_regions(chart, image, np.zeros(pixels, np.int64))
         grown = image.reshape(-1)[texels.pixel[: texels.n_front][own] - page * pixels]
         region[own] = np.where(grown >= 0, grown, region[own])
 
 
-def _ring_of(buried: NDArray[np.int64], turn: tuple[int, int], size: int) -> tuple[NDArray[np.int64], ...]:
+def _ring_of(invalid: NDArray[np.int64], turn: tuple[int, int], size: int) -> tuple[NDArray[np.int64], ...]:
     """Return row and column of a neighbour of each texel, clipped to the page."""
-    row, column = (np.clip(buried[:, k] + turn[k], 0, size - 1) for k in (0, 1))
+    row, column = (np.clip(invalid[:, k] + turn[k], 0, size - 1) for k in (0, 1))
     return row, column
 
 
 def _visible_points(
     texels: TexelBuffer,
     surface: Surface,
-    mask: NDArray[np.uint16],
-    buried: NDArray[np.int64],
+    valid_points: NDArray[np.uint16],
+    invalid: NDArray[np.int64],
     number: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return for the neighbours of buried texels where their points lie.
+    """Return the points of the m valid neighbours of invalid texels.
 
     Returns
     -------
-    place : (H, W) int64, row of a texel in what follows, -1 for others
-    point : (m, 16, 2) float64, column and row of its points from its centre, texels
-    seen : (m, 16) bool, visible ones
+    row_of : (H, W) int64, row of a texel in the other arrays, -1 for others
+    point : (m, 16, 2) float64, column and row of its points relative to its centre, texels
+    seen : (m, 16) bool, whether a point is valid
     """
-    near = [number[_ring_of(buried, turn, texels.resolution)] for turn in _RING]
+    near = [number[_ring_of(invalid, turn, texels.resolution)] for turn in _RING]
     chosen = np.unique(np.concatenate(near))
     chosen = chosen[chosen >= 0]
-    chosen = chosen[mask[chosen] != 0]
+    chosen = chosen[valid_points[chosen] != 0]
     shape = (len(chosen), N_POINTS)
     point, normal = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
     triangle, bary = np.zeros(shape, np.int32), np.zeros((*shape, 2), np.float32)
@@ -83,29 +87,29 @@ def _visible_points(
     uv = surface.uv[surface.triangle[triangle]].astype(np.float64)
     where = (weight[..., None] * uv).sum(axis=2) * texels.resolution
     row, column = np.divmod(texels.pixel[chosen] % texels.resolution**2, texels.resolution)
-    place = np.full(number.shape, -1, np.int64)
-    place[row, column] = np.arange(len(chosen))
-    seen = (mask[chosen, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(bool)
-    return place, where - np.stack([column, row], axis=1)[:, None] - 0.5, seen
+    row_of = np.full(number.shape, -1, np.int64)
+    row_of[row, column] = np.arange(len(chosen))
+    seen = (valid_points[chosen, None] >> np.arange(N_POINTS, dtype=np.uint16) & 1).astype(bool)
+    return row_of, where - np.stack([column, row], axis=1)[:, None] - 0.5, seen
 
 
 def _lookups(
-    buried: NDArray[np.int64],
+    invalid: NDArray[np.int64],
     chart: NDArray[np.int32],
     image: NDArray[np.int32],
     visible: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return (buried texel, region) pairs and how much lookups from the region's points take of the texel."""
-    place, point, seen = visible
+    """Return pairs (invalid texel, region) (k, 2), and bilinear weights (k,) of texels at their points."""
+    row_of, point, seen = visible
     n_regions = int(image.max(initial=0)) + 1
     keys, weights = [np.zeros(0, np.int64)], [np.zeros(0)]
     for turn in _RING:
-        row, column = _ring_of(buried, turn, len(chart))
-        beside = place[row, column]
-        same = chart[row, column] == chart[buried[:, 0], buried[:, 1]]
+        row, column = _ring_of(invalid, turn, len(chart))
+        beside = row_of[row, column]
+        same = chart[row, column] == chart[invalid[:, 0], invalid[:, 1]]
         use = np.flatnonzero((beside >= 0) & same)
         away = np.abs(point[beside[use]] + np.array([turn[1], turn[0]]))
-        # What bilinear interpolation takes of a texel at this distance from its centre.
+        # Bilinear weight of a texel at this distance from its centre.
         tent = np.maximum(1.0 - away, 0.0).prod(axis=2) * seen[beside[use]]
         keys.append(use * n_regions + image[row[use], column[use]])
         weights.append(tent.sum(axis=1))
@@ -116,14 +120,14 @@ def _lookups(
 
 
 def _choose(
-    buried: NDArray[np.int64],
+    invalid: NDArray[np.int64],
     image: NDArray[np.int32],
     pair: NDArray[np.int64],
     weight: NDArray[np.float64],
 ) -> None:
-    """Give each buried texel the region that looks it up most."""
+    """Assign to each invalid texel (b, 2) of `image` (H, W) the region of largest weight."""
     order = np.lexsort((pair[:, 1], -weight, pair[:, 0]))
     order = order[weight[order] > 0]
     first = np.unique(pair[order, 0], return_index=True)[1]
     best = pair[order[first]]
-    image[buried[best[:, 0], 0], buried[best[:, 0], 1]] = best[:, 1]
+    image[invalid[best[:, 0], 0], invalid[best[:, 0], 1]] = best[:, 1]

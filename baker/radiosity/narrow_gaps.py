@@ -1,7 +1,7 @@
 """Finds texels in narrow gaps: under a rug, between books, between a cupboard and the wall.
 
-Light falls off within the width of a gap at its mouth. A patch that reached from the lit floor to below the
-rug would carry the floor's light there: texels in gaps have patches of their own.
+Light falls off within the width of a gap from its opening. A patch that extended from the lit floor to below
+the rug would carry the light of the floor there: texels in gaps share no patch with others.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from baker.radiosity.trace_job import TraceJob
 
 # Sixteen neighbouring texels are outside gaps if, of the first rays of each, at most one was blocked.
 _RAYS, _EARLY_OUT = 16, 4
-# A texel lies in a gap if less than this share of its rays is free up to so many texel sides: near for gaps
-# about as wide as a texel, far for gaps about as wide as a patch.
+# A texel lies in a gap if less than _OPEN of its rays are free up to a number of texel sides: _NEAR for gaps
+# about as wide as a texel, _FAR for gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 

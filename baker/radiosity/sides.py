@@ -1,14 +1,14 @@
-"""Cuts texels that lie on both sides of a surface passing through them, and groups texels into regions.
+"""Splits texels that lie on both sides of a surface passing through them, and groups texels into regions.
 
-A floor that runs on under a wall, a ceiling over walls, a beam through a wall: a texel there has points on
-both sides of the other surface. Left as one, it would average the light of both sides and carry it from one
-to the other. Its points are grouped by mutual visibility (`radiosity.kernels.sides`); each group becomes an
-entry of its own: the entry of the page keeps the side with the largest free area; the others stand behind
-fronts and backs, take part in light transport, and are stored in no map.
+A floor that continues under a wall, a ceiling above walls, a beam through a wall: a texel there has points on
+both sides of the other surface. One value for both would average the light of both sides and carry it from
+one to the other. Its points are grouped by mutual visibility (`radiosity.kernels.sides`), and each group
+becomes an entry. The texel's own entry keeps the side with the largest valid area and is stored in the page;
+the other sides follow fronts and backs, take part in light transport, and are stored in no page.
 
 Neighbouring texels are linked if some of their points see each other. The connected parts of a chart are its
-regions: values are not mixed across their borders (denoising, borders, dilation). No patch spans texels of a
-block that are not linked within it.
+regions: finishing mixes no values across their borders. Texels of a block that are not linked within it
+belong to different patches.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from baker.trace.packets import PacketBuffers
 
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Pairs of neighbours are examined with one point of each, then with all.
+# Pairs of neighbours are tested with one point of each, then with all.
 _ONE = np.zeros((1, 1), np.uint8)
-# A side is the outside of one-sided geometry if more than this share of its rays meet backs; then each of its
-# points counts as much less.
+# A side is the outside of one-sided geometry if more than _MANY_BACKS of its rays meet backs; its points then
+# count with the weight _OUTSIDE.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -52,13 +52,14 @@ _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
 
 @dataclass(frozen=True)
 class Sides:
-    """Texel entries after the cut; see the module.
+    """Texel entries after the split; see the module.
 
     Attributes
     ----------
     texels : TexelBuffer
-        With `region`.
+        All n entries; `region` of each front texel.
     surface : Surface
+        The same entries.
     valid_points : (n,) uint16
         Bit k is set where point k of an entry is outside geometry and on the entry's side.
     owner : (S,) int32
@@ -66,10 +67,11 @@ class Sides:
     member : (K,) int32
         Entries of all sides of these, in the order that `SideTable.member` counts.
     table : SideTable
+        Points of split texels, which choose the side of a hit.
     link : (m, 2) int32
-        Neighbouring entries that see each other, in all charts that are cut anywhere.
+        Neighbouring entries that see each other, in all charts with a border between regions.
     rays : int
-        Rays cast.
+        Number of rays cast.
     """
 
     texels: TexelBuffer
@@ -82,20 +84,26 @@ class Sides:
     rays: int
 
     def seen_light(self, exitance: NDArray[np.float32]) -> SeenLight:
-        """Return what gather rays find, for light (n, 4) float32, lx, that entries reflect; sets column 3."""
+        """Return the light that gather rays find.
+
+        Parameters
+        ----------
+        exitance : (n, 4) float32, lx
+            Light that entries reflect; column 3 is set in place: the number of a split texel from 1, else 0.
+        """
         exitance[:, 3] = 0
         exitance[self.owner, 3] = np.arange(1, len(self.owner) + 1)
         return SeenLight(self.texels.hit_image(exitance), exitance[self.member], self.table)
 
     def seen_patches(self, patch: NDArray[np.int32]) -> SeenPatch:
-        """Return what form-factor rays find, for the patch of each entry (n,) int32."""
+        """Return the patches that form-factor rays find; `patch` (n,) int32 is that of each entry."""
         marked = np.array(patch)
         marked[self.owner] = SPLIT - np.arange(len(self.owner), dtype=np.int32)
         return SeenPatch(self.texels.hit_image(marked, fill=-1), patch[self.member], self.table)
 
 
 class _Entries(NamedTuple):
-    """All entries after the cut; side (n,) float32, metres, of the whole texel."""
+    """All entries after the split; side (n,) float32, metres, of the whole texel."""
 
     texels: TexelBuffer
     surface: Surface
@@ -105,14 +113,14 @@ class _Entries(NamedTuple):
 
 @dataclass(frozen=True)
 class _Groups:
-    """Entries whose points form several groups, or see not all corners of their surface.
+    """Entries whose points form several groups, or do not see all corners of their surface.
 
     Attributes
     ----------
     owner : (S,) int32, the entries, rising
     label : (S, 16) int8, group of each point, from 0; -1 inside geometry
     point, normal : (S, 16, 3) float32; height : (S, 16) float32, see `SideTable`
-    n : int, entries before the cut
+    n : int, entries before the split
     """
 
     owner: NDArray[np.int32]
@@ -129,14 +137,14 @@ class _Groups:
         return count
 
     def entry(self, row: NDArray[np.int64], group: NDArray[np.int64] | np.int64) -> NDArray[np.int64]:
-        """Return the entry of a group of the entry in a row: the first group keeps it."""
+        """Return the entry of each group of the texel in a row: group 0 keeps the texel's own entry."""
         before = np.concatenate([[0], np.cumsum(self.count - 1)])[:-1]
         entry = np.where(group == 0, self.owner[row], self.n + before[row] + group - 1)
         return np.asarray(entry, np.int64)
 
 
 def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
-    """Cut the texels that some surface passes through.
+    """Split the texels that some surface passes through.
 
     Parameters
     ----------
@@ -148,7 +156,7 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
     Returns
     -------
     Sides
-        The entries after the cut.
+        The entries after the split.
     """
     surface, valid = job.surface, job.valid_points
     n = texels.n
@@ -165,7 +173,7 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
     rays += int(cast.sum())
     entries = _cut(texels, surface, valid, side, groups)
     pair = _of_sides(neighbours(texels, crossed != 0), groups)
-    # A surface between two whole texels is met from both.
+    # A surface between two whole texels crosses both.
     doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
     doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
     connected: NDArray[np.bool_] = np.logical_not(doubtful)
@@ -182,7 +190,7 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
 
 
 def _group(job: TraceJob, chosen: NDArray[np.int64], side: NDArray[np.float32]) -> tuple[_Groups, int]:
-    """Group the points of the chosen entries (m,); return those with several groups, and the rays cast.
+    """Group the points of the chosen entries (m,); return those to split, and the number of rays cast.
 
     side : (n,) float32, metres, of each entry's texel
     """
@@ -241,7 +249,7 @@ def _cut(
     side: NDArray[np.float32],
     groups: _Groups,
 ) -> _Entries:
-    """Give each group of points an entry: the first one that of its texel, the others new ones behind all."""
+    """Give each group of points an entry: group 0 that of its texel, the others new ones at the end."""
     extra = np.repeat(groups.owner, groups.count - 1)
     row, label = np.nonzero(groups.label >= 0)
     entry = groups.entry(row, groups.label[row, label].astype(np.int64))
@@ -280,7 +288,7 @@ def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = F
 
 
 def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
-    """Return pairs of entries after the cut: each side of one texel with each side of the other."""
+    """Return pairs (q, 2) after the split: each side of one texel with each side of the other."""
     if not len(groups.owner):
         return pair
     row = np.searchsorted(groups.owner, pair)
@@ -300,7 +308,7 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool: which pairs of entries have points that see each other, and the rays cast."""
+    """Return (m,) bool, whether points of a pair of entries see each other, and the number of rays cast."""
     connected = np.zeros(len(pair), np.uint8)
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
@@ -331,7 +339,7 @@ def _keep_largest(
     backs: NDArray[np.float64],
     rays: int,
 ) -> Sides:
-    """Give the page's entry of each split texel its largest side, and number the regions.
+    """Give the own entry of each split texel its largest side, and number the regions.
 
     link : (m, 2) int32, neighbouring entries that see each other, in the charts `cut`
     backs : (S, groups) float64, see `_back_share`
@@ -339,7 +347,7 @@ def _keep_largest(
     root = np.arange(len(entries.valid_points), dtype=np.int32)
     join_linked(link, root)
     member, table, order = _order_sides(entries, groups, root, backs)
-    # The entry in place k is the one that had number order[k] before.
+    # Entry k was entry order[k] before.
     texels, surface, valid_points, _ = entries
     rank = np.zeros_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
@@ -357,7 +365,7 @@ def _keep_largest(
 
 
 def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDArray[np.float64], int]:
-    """Return the share (S, groups) of rays of each side that meet backs of one-sided surfaces; rays cast."""
+    """Return the share (S, groups) of rays of each side that meet black backs, and the number of rays."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
     sobol_points = sobol_reversed(N_POINTS, job.seed, 9)
     cast = 0
@@ -379,17 +387,17 @@ def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDAr
 def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
-    """Choose the side that a split texel's first entry gets: the one with most points.
+    """Choose the side that gets the own entry of a split texel: the one with most points.
 
-    Points of a side that looks at backs of one-sided surfaces count less: it is the outside of a room whose
-    walls have no outside, or the underside of a floor that has none. A side whose region holds no texel that
-    is whole loses: the strip of a wall below the floor that is narrower than a texel.
+    Points of a side whose rays meet backs of one-sided surfaces count less: it is the outside of a room whose
+    walls have no outside, or the underside of a floor that has none. A side whose region contains no whole
+    texel loses: for example the strip of a wall below the floor that is narrower than a texel.
 
     Returns
     -------
     member : (K,) int32, entries of all sides in their new order
     table : SideTable
-    order : (n,) int32, old number of the entry in each place
+    order : (n,) int32, old number of each entry
     """
     order = np.arange(len(root), dtype=np.int32)
     if not len(groups.owner):
@@ -418,7 +426,7 @@ def _order_sides(
 def _measure(
     texels: TexelBuffer, surface: Surface, valid_points: NDArray[np.uint16], member: NDArray[np.int32]
 ) -> TexelBuffer:
-    """Return the texels with area, position, normal and centroid of each side of those that are split."""
+    """Return the texels with area, position, normal and centroid of each side of split texels."""
     area, position, normal = (np.array(v) for v in (texels.area, texels.position, texels.normal))
     centroid = np.array(texels.centroid)
     shape = (len(member), N_POINTS)
@@ -434,9 +442,9 @@ def _measure(
     normal[member] = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
     uv = surface.uv[surface.triangle[triangle]].astype(np.float64)
     weight = np.stack([1.0 - bary.sum(axis=2), bary[..., 0], bary[..., 1]], axis=2)
-    place = (weight[..., None] * uv).sum(axis=2) * texels.resolution
+    texel_uv = (weight[..., None] * uv).sum(axis=2) * texels.resolution
     row, column = np.divmod(texels.pixel[member] % texels.resolution**2, texels.resolution)
-    offset = (share[..., None] * place).sum(axis=1) - np.stack([column, row], axis=1) - 0.5
+    offset = (share[..., None] * texel_uv).sum(axis=1) - np.stack([column, row], axis=1) - 0.5
     front = member < texels.n_front
     centroid[member[front]] = offset[front]
     return replace(texels, area=area, position=position, normal=normal, centroid=centroid)

@@ -1,6 +1,8 @@
-"""From charts to texels: coverage, points, area, normal and albedo of every texel."""
+"""Texels of the atlas: coverage, points, area, normal and albedo of each."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,87 +25,148 @@ _TILE = 4096
 def build_texels(
     geometry: Geometry, shading: Shading, atlas: Atlas, *, seed: int, threads: int, progress: Progress
 ) -> tuple[TexelBuffer, Surface]:
-    """Find the texels of all pages and what lies in them.
+    """Find the texels of all pages: coverage, and the mean of what covers each.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Triangles with lightmap uv.
+    shading : Shading
+        Materials of the same triangles.
+    atlas : Atlas
+        Number and size of pages.
+    seed : int
+        Start of the random sequence of points in texels.
+    threads : int
+        Threads of this process.
+    progress : Progress
+        Called between tiles.
 
     Returns
     -------
     TexelBuffer
         Fronts first, then the backs of texels on double-sided surfaces.
     Surface
-        The same for kernels that start rays.
+        The same entries, for kernels that start rays.
     """
-    size = atlas.resolution
-    pixel, first, entry, entry_area, chart = _overlaps(geometry, size, atlas.n_pages)
-    n_front = len(pixel)
-    two_sided = np.zeros(n_front, bool)
-    if geometry.double_sided.any():
-        owner = np.repeat(np.arange(n_front), np.diff(first))
-        two_sided[owner[geometry.double_sided[entry]]] = True
-    front = np.concatenate([np.arange(n_front), np.flatnonzero(two_sided)]).astype(np.int32)
-    back = np.arange(len(front)) >= n_front
-    surface = Surface(
+    found = _overlaps(geometry, atlas.resolution, atlas.n_pages)
+    n_front = len(found.pixel)
+    front = np.concatenate([np.arange(n_front), _two_sided(geometry, found)]).astype(np.int32)
+    surface = _surface(geometry, atlas, found, front, seed)
+    back = surface.back
+    mean = _means(geometry, shading, surface, n_front, threads, progress)
+    back_entry = np.full(n_front, -1, np.int32)
+    back_entry[front[n_front:]] = np.arange(n_front, len(front), dtype=np.int32)
+    main = geometry.instance[found.entry[found.first[:-1]]] if n_front else np.zeros(0, np.int32)
+    texels = TexelBuffer(
+        resolution=atlas.resolution,
+        n_pages=atlas.n_pages,
+        n_front=n_front,
+        pixel=surface.pixel,
+        back=back,
+        first=found.first,
+        entry=found.entry,
+        entry_area=found.area,
+        chart=found.chart[front],
+        instance=main[front],
+        area=_with_backs(mean.area, front, back),
+        centroid=mean.centroid,
+        position=_with_backs(mean.position, front, back),
+        normal=_with_backs(mean.normal, front, back, -1.0),
+        albedo=_with_backs(mean.albedo, front, back),
+        lookup=_lookup(found.pixel, atlas.resolution, atlas.n_pages),
+        back_entry=back_entry,
+        region=found.chart,
+    )
+    return texels, surface
+
+
+class _Overlaps(NamedTuple):
+    """Triangles that cover texels, in Morton order of the n texels.
+
+    pixel : (n,) int64, flat pixel of each texel in all pages
+    first : (n + 1,) int64, texel i has the rows first[i] to first[i + 1] of `entry` and `area`
+    entry : (m,) int32, triangle; area : (m,) float32, of the texel's square that it covers
+    chart : (n,) int32, the chart that covers most of a texel
+    """
+
+    pixel: NDArray[np.int64]
+    first: NDArray[np.int64]
+    entry: NDArray[np.int32]
+    area: NDArray[np.float32]
+    chart: NDArray[np.int32]
+
+
+class _Means(NamedTuple):
+    """Area-weighted means over each of the n_front texels; all float32.
+
+    area : (n_front,), m2; centroid : (n_front, 2), texels from the texel centre
+    position, normal : (n_front, 3), world; albedo : (n_front, 3)
+    """
+
+    area: NDArray[np.float32]
+    centroid: NDArray[np.float32]
+    position: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+
+
+def _surface(
+    geometry: Geometry, atlas: Atlas, found: _Overlaps, front: NDArray[np.int32], seed: int
+) -> Surface:
+    """Return what kernels read of the entries; `front` (n,) is the front entry of each."""
+    return Surface(
         position=geometry.position,
         normal=geometry.normal,
         uv=geometry.uv,
         triangle=geometry.triangle,
         face_normal=geometry.face_normal,
-        size=size,
-        pixel=pixel[front],
+        size=atlas.resolution,
+        pixel=found.pixel[front],
         front=front,
-        back=back,
-        first=first,
-        entry=entry,
-        entry_area=entry_area,
+        back=np.arange(len(front)) >= len(found.pixel),
+        first=found.first,
+        entry=found.entry,
+        entry_area=found.area,
         sobol_points=sobol_reversed(N_POINTS, seed, 7),
         min_offset_scale=np.float32(0.05 * geometry.diagonal),
     )
-    area = np.zeros(n_front, np.float32)
-    centroid = np.zeros((n_front, 2), np.float32)
-    position = np.zeros((n_front, 3), np.float32)
-    normal = np.zeros((n_front, 3), np.float32)
-    albedo = np.zeros((n_front, 3), np.float32)
-    scale = _metres2_per_texel(geometry, size)
-    free = np.full(len(pixel), 0xFFFF, np.uint16)
+
+
+def _two_sided(geometry: Geometry, found: _Overlaps) -> NDArray[np.int64]:
+    """Return the texels that a double-sided triangle covers, rising."""
+    two_sided = np.zeros(len(found.pixel), bool)
+    if geometry.double_sided.any():
+        owner = np.repeat(np.arange(len(found.pixel)), np.diff(found.first))
+        two_sided[owner[geometry.double_sided[found.entry]]] = True
+    return np.flatnonzero(two_sided)
+
+
+def _means(
+    geometry: Geometry, shading: Shading, surface: Surface, n_front: int, threads: int, progress: Progress
+) -> _Means:
+    """Compute the means over all front texels."""
+    area, centroid = np.zeros(n_front, np.float32), np.zeros((n_front, 2), np.float32)
+    position, normal = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
+    scale = _metres2_per_texel(geometry, surface.size)
+    every = np.full(n_front, 0xFFFF, np.uint16)
     varied = len(shading.colour) > 1 or (shading.base_texture >= 0).any() or len(shading.alpha.row) > 0
-    if not varied:
-        albedo = _plain_albedo(shading, first, entry, entry_area)
+    if varied:
+        albedo = np.zeros((n_front, 3), np.float32)
+    else:
+        albedo = _untextured_albedo(shading, surface.first, surface.entry, surface.entry_area)
 
     def work(begin: int, end: int) -> None:
         texel_geometry(surface, scale, begin, end, area, centroid, position, normal)
         if varied:
-            texel_albedo(surface, shading, free, begin, end, albedo, area)
+            texel_albedo(surface, shading, every, begin, end, albedo, area)
 
     run_tiles(n_front, _TILE, work, threads=threads, stage=Stage.TEXELS, progress=progress)
-    back_entry = np.full(n_front, -1, np.int32)
-    back_entry[front[n_front:]] = np.arange(n_front, len(front), dtype=np.int32)
-    main = geometry.instance[entry[first[:-1]]] if n_front else np.zeros(0, np.int32)
-    texels = TexelBuffer(
-        resolution=size,
-        n_pages=atlas.n_pages,
-        n_front=n_front,
-        pixel=surface.pixel,
-        back=back,
-        first=first,
-        entry=entry,
-        entry_area=entry_area,
-        chart=chart[front],
-        instance=main[front],
-        area=_with_backs(area, front, back),
-        centroid=centroid,
-        position=_with_backs(position, front, back),
-        normal=_with_backs(normal, front, back, -1.0),
-        albedo=_with_backs(albedo, front, back),
-        lookup=_lookup(pixel, size, atlas.n_pages),
-        back_entry=back_entry,
-        region=chart,
-    )
-    return texels, surface
+    return _Means(area, centroid, position, normal, albedo)
 
 
-def _overlaps(
-    geometry: Geometry, size: int, n_pages: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
-    """Return pixel (n,), first (n + 1,), entry and area (m,), chart (n,) of texels in Morton order."""
+def _overlaps(geometry: Geometry, size: int, n_pages: int) -> _Overlaps:
+    """List the texels that triangles cover in pages of `size` x `size` texels."""
     at = np.zeros(n_pages * size * size, np.int64)
     nothing = np.zeros(0, np.int32), np.zeros(0, np.float32)
     list_overlaps(geometry.uv, geometry.triangle, geometry.page, size, at, *nothing)
@@ -120,13 +183,13 @@ def _overlaps(
     keep_main_chart(first, entry, area, geometry.chart, chart, kept)
     before = np.zeros(len(kept) + 1, np.int64)
     np.cumsum(kept, out=before[1:])
-    return pixel, before[first], entry[kept], area[kept], chart
+    return _Overlaps(pixel, before[first], entry[kept], area[kept], chart)
 
 
-def _plain_albedo(
+def _untextured_albedo(
     shading: Shading, first: NDArray[np.int64], entry: NDArray[np.int32], entry_area: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return (n_front, 3) float32: area-weighted base colours, where nothing is textured."""
+    """Return (n_front, 3) float32: area-weighted base colours of materials without textures."""
     owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
     weight = np.maximum(entry_area, 1e-9)
     total = np.bincount(owner, weight, len(first) - 1)
@@ -138,14 +201,14 @@ def _plain_albedo(
 def _with_backs(
     value: NDArray[np.float32], front: NDArray[np.int32], back: NDArray[np.bool_], factor: float = 1.0
 ) -> NDArray[np.float32]:
-    """Return per-front values with those of the backs, times `factor`, behind them; no copy without backs."""
+    """Append the values of backs, times `factor`, to those of fronts; returns `value` without backs."""
     if not back.any():
         return value
     return np.concatenate([value, np.float32(factor) * value[front[back]]])
 
 
 def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
-    """Return the entry of each pixel, grown by one texel around charts (edge neighbours before corners)."""
+    """Return the entry of each pixel, dilated by one texel: edge neighbours before corners; -1 for none."""
     pages = np.full((n_pages, size + 2, size + 2), -1, np.int32)
     inner = pages[:, 1:-1, 1:-1]
     page, rest = np.divmod(pixel, size * size)

@@ -11,7 +11,7 @@ from baker.radiosity.point_cache import points_of
 
 
 def find(world, threads=1):
-    return find_inside_geometry(world.texels, world.job(threads=threads), world.tells)
+    return find_inside_geometry(world.texels, world.job(threads=threads), world.hit_kind)
 
 
 def sunk_crate(double_sided=False, inward=False):
