@@ -48,7 +48,7 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     Parameters
     ----------
     path : str or Path
-        .glb, .gltf, .obj, .ply, .stl or .off.
+        A file of a format in `baker.io.importers`; `baker bake --help` lists the suffixes.
     up, scale : str, float
         Up axis and metres per unit of formats other than glTF.
 

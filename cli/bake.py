@@ -10,11 +10,12 @@ import typer
 
 from baker.cli.command import Cluster, Run, command
 from baker.core.settings import BakeSettings
+from baker.io.formats import scene_file_help
 
 if TYPE_CHECKING:
     from baker.core.executor import TileExecutor
 
-Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="glb, gltf, obj, ply, stl or off file.")]
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())]
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace OUT even if baker did not write it.")]
 

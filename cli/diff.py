@@ -48,7 +48,7 @@ def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:
     columns = ("texels", "bias", "median", "p95", "p99", "max", "nrmse", "flip")
     stream.write(f"{'':12}" + "".join(f"{name:>11}" for name in columns) + "\n")
     for name, check in found.channels.items():
-        stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>11}" for c in columns) + "\n")
+        stream.write(f"{name:12}" + "".join(f"{_words(check.metrics[c], c):>11}" for c in columns) + "\n")
     most = None if verbose else _SHOWN
     for apart, name, entry in _furthest(found)[:most]:
         bias = entry["channels"][name]["bias"]

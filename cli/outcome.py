@@ -45,7 +45,7 @@ def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
     for verdict in verdicts:
         limit = verdict.limit
         value = "none" if verdict.value is None else f"{verdict.value:.3g}"
-        entry = f"{limit.figure} {value} ({limit.sign} {limit.number:g})"
+        entry = f"{limit.metric} {value} ({limit.operator} {limit.number:g})"
         by_channel.setdefault(limit.channel, []).append(entry)
     for channel, words in by_channel.items():
         text = f"limits of {channel}, which fail beyond what is in brackets: {', '.join(words)}"

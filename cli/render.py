@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from baker.cli.command import Run, command
+from baker.io.formats import scene_file_help
 from baker.rendering.settings import RenderSettings
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 @command("render", RenderSettings)
 def render(
     ctx: typer.Context,
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="glb, gltf, obj, ply, stl or off file.")],
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="IMAGE", help="EXR or PNG file to write.")],
 ) -> None:
     """Render, and report what was written."""

@@ -51,8 +51,8 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
     )  # fmt: skip
     stream.write(f"{'':12}" + "".join(f"{name:>14}" for name in columns) + "\n")
     for name, check in found.channels.items():
-        stream.write(f"{name:12}" + "".join(f"{_words(check.figures[c], c):>14}" for c in columns) + "\n")
-        ratio, error = check.figures["energy_ratio"], check.figures["energy_ratio_se"]
+        stream.write(f"{name:12}" + "".join(f"{_words(check.metrics[c], c):>14}" for c in columns) + "\n")
+        ratio, error = check.metrics["energy_ratio"], check.metrics["energy_ratio_se"]
         if ratio is not None:
             give = "" if error is None else f" +- {error:.4f}"
             stream.write(f"  energy ratio {ratio:.4f}{give}\n")
@@ -67,7 +67,7 @@ def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
         stream.write(f"failed: {problem}\n")
     failed = sum(verdict.failed for verdict in found.verdicts)
     how = f"{failed} of {len(found.verdicts)} limits" if failed else f"{len(found.verdicts)} limits hold"
-    single = "" if any(v.limit.figure == "max" for v in found.verdicts) else "; single texels have no limit"
+    single = "" if any(v.limit.metric == "max" for v in found.verdicts) else "; single texels have no limit"
     compiling = f" and {found.compile_seconds:.0f} s of compiling" if found.compile_seconds >= 1 else ""
     verdict = "FAILED" if failed else "passed"
     stream.write(f"{verdict}: {how}{'' if failed else single} ({found.seconds:.0f} s{compiling})\n")

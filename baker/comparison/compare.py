@@ -26,14 +26,14 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
-from baker.metrics.error_metrics import FIGURES, dark_floor, figures
-from baker.metrics.limits import Verdict, judge, parse_limits
+from baker.metrics.error_metrics import METRICS, dark_floor, error_metrics
+from baker.metrics.limits import Verdict, evaluate_limits, parse_limits
 from baker.metrics.sample_texels import choose_texels
-from baker.metrics.texel_area import instance_map, texel_points
+from baker.metrics.texel_area import instance_map, one_surface_point
 from baker.metrics.worst_texels import worst_texels
 
 # A second bake has no noise that is known, so no limit can be set on it.
-LIMITED = (*(name for name in FIGURES if not name.startswith(("noise", "z_", "energy"))), "flip")
+LIMITED = (*(name for name in METRICS if not name.startswith(("noise", "z_", "energy"))), "flip")
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class ChannelDifference:
     ----------
     value, reference : (n, C) float64, a's and b's
     standard_error : (n, C) float64, 0: a bake is compared as it is
-    figures : dict, see `metrics.error_metrics`, and "flip"
+    metrics : dict, see `metrics.error_metrics`, and "flip"
     """
 
     value: NDArray[np.float64]
     reference: NDArray[np.float64]
     standard_error: NDArray[np.float64]
-    figures: dict[str, Any]
+    metrics: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def compare(
     channels = {}
     for name in names:
         value, reference = read(first, sides.a, points, name), read(second, sides.b, other, name)
-        found = {**figures(value, reference), "flip": means.channel[name]}
+        found = {**error_metrics(value, reference), "flip": means.channel[name]}
         channels[name] = ChannelDifference(value, reference, np.zeros_like(value), found)
     owner = sides.a.instance[points.triangle]
     size = first.atlas.resolution
@@ -163,7 +163,7 @@ def compare(
         only_in_a=_named(first, sides.missing_a),
         only_in_b=_named(second, sides.missing_b),
         unmatched=int(lost.sum()),
-        verdicts=judge(limits, {name: check.figures for name, check in channels.items()}),
+        verdicts=evaluate_limits(limits, {name: check.metrics for name, check in channels.items()}),
         warnings=[
             SceneWarning(w.code, f"{bake.folder}: {w.message}", w.object)
             for bake in (first, second)
@@ -187,7 +187,7 @@ def _choose(
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)
     pixel = choose_texels(owner, owner >= 0, brightness, settings.texels, settings.seed)
-    points = SurfacePoints(*texel_points(sides.a, pixel, bake.atlas.resolution, settings.seed))
+    points = SurfacePoints(*one_surface_point(sides.a, pixel, bake.atlas.resolution, settings.seed))
     other = match(sides, points)
     met = other.triangle >= 0
     lost = np.bincount(sides.a.instance[points.triangle[~met]], minlength=len(bake.scene.instances))
@@ -208,7 +208,7 @@ def _objects(
     owner: NDArray[np.int32],
     lost: NDArray[np.int64],
 ) -> list[dict[str, Any]]:
-    """Return the figures of each object that has points."""
+    """Return the metrics of each object that has points."""
     found = []
     floor = {name: dark_floor(check.reference) for name, check in channels.items()}
     for number, instance in enumerate(bake.scene.instances):
@@ -219,7 +219,7 @@ def _objects(
         entry["unmatched"] = int(lost[number])
         entry["channels"] = {
             name: {
-                **figures(check.value[mine], check.reference[mine], floor=floor[name]),
+                **error_metrics(check.value[mine], check.reference[mine], floor=floor[name]),
                 "flip": means.object.get((name, number)),
             }
             for name, check in channels.items()

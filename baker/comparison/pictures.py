@@ -13,7 +13,7 @@ from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
-from baker.metrics.texel_area import look_up_uv, texel_points
+from baker.metrics.texel_area import look_up_uv, one_surface_point
 
 # Of larger pages every second, third ... row and column is taken: FLIP takes two seconds for this many.
 _LARGEST = 512
@@ -62,7 +62,7 @@ def page_flip(
         if not len(row):
             continue
         pixel = (number * size + row * step) * size + column * step
-        points = SurfacePoints(*texel_points(sides.a, pixel.astype(np.int64), size, seed))
+        points = SurfacePoints(*one_surface_point(sides.a, pixel.astype(np.int64), size, seed))
         other = match(sides, points)
         met = other.triangle >= 0
         row, column, points, other = row[met], column[met], points[met], other[met]

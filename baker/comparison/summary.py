@@ -22,7 +22,7 @@ def difference_json(found: Difference) -> dict[str, Any]:
     """
     return {
         "passed": found.passed,
-        "channels": {name: check.figures for name, check in found.channels.items()},
+        "channels": {name: check.metrics for name, check in found.channels.items()},
         "objects": found.objects,
         "worst": found.worst,
         "differences": found.differences,

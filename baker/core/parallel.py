@@ -77,10 +77,8 @@ def run_tiles(
 
     Parameters
     ----------
-    n : int
-        Number of items.
-    tile : int
-        Items in a tile; the last tile may have fewer.
+    n, tile : int
+        Number of items; items in a tile, of which the last tile may have fewer.
     work : callable
         `work(begin, end)` returns the result of a tile.
     keep : callable or None
@@ -102,16 +100,9 @@ def run_tiles(
     report(progress, stage, 0.0)
     if n == 0:
         return
-    spans = [(begin, min(begin + tile, n)) for begin in range(0, n, tile)]
-    done = 0
-    start = time.perf_counter()
-    waiting = iter(spans)
-
-    def do(begin: int, end: int) -> None:
-        part = work(begin, end)
-        if keep is not None:
-            keep(begin, end, part)
-
+    done, start = 0, time.perf_counter()
+    waiting = iter((begin, min(begin + tile, n)) for begin in range(0, n, tile))
+    do = _work_and_keep(work, keep)
     pool = ThreadPoolExecutor(max_workers=threads)
     running: dict[Future[object], int] = {}
     try:
@@ -130,3 +121,16 @@ def run_tiles(
             report(progress, stage, done / n, rate)
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _work_and_keep(
+    work: Callable[[int, int], Any], keep: Callable[[int, int, Any], object] | None
+) -> Callable[[int, int], object]:
+    """Return a function that computes the part of a tile and stores it."""
+    if keep is None:
+        return work
+
+    def do(begin: int, end: int) -> None:
+        keep(begin, end, work(begin, end))
+
+    return do

@@ -5,9 +5,11 @@ Based on: Mitsuba 3's plugin-per-file layout.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import pkgutil
 from collections.abc import Callable, Collection
+from pathlib import Path
 from typing import Generic, TypeVar
 
 from baker.core.names import unknown_name
@@ -80,3 +82,31 @@ class Registry(Generic[T]):
             known = [other for other in self.names() if other not in hidden]
             raise unknown_name(what, name, known, object=setting)
         return plugin
+
+
+def names_in_source(package: str, registry: str) -> list[str]:
+    """Return the names that the files of a package register, from their source and without importing them.
+
+    Parameters
+    ----------
+    package : str
+        Dotted name of the package.
+    registry : str
+        Name of the registry in these files: calls `registry.register("name")` are found.
+
+    Returns
+    -------
+    list of str
+        Sorted; as `Registry.names` if all names are literals.
+    """
+    found = set()
+    for folder in importlib.import_module(package).__path__:
+        for file in Path(folder).glob("*.py"):
+            for node in ast.walk(ast.parse(file.read_bytes())):
+                if (
+                    isinstance(node, ast.Call)
+                    and ast.unparse(node.func) == f"{registry}.register"
+                    and isinstance(node.args[0], ast.Constant)
+                ):
+                    found.add(str(node.args[0].value))
+    return sorted(found)

@@ -59,8 +59,8 @@ class CommonSettings(Settings):
         "Leave out objects and lights with these names or paths of nodes, and what is below.",
         repeated=True,
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of OBJ, PLY, STL and OFF files.")
-    scale: float = setting(1.0, "Metres per unit of OBJ, PLY, STL and OFF files.", unit="m", gt=0)
+    up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")
+    scale: float = setting(1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0)
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 

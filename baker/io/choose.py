@@ -1,12 +1,12 @@
-"""Chooses the objects that take part in a bake, by patterns of their names.
+"""Selects the objects of a bake by patterns of their names.
 
-A pattern (`*`, `?`, `[abc]`, case matters) matches the name of a node, or its path from the root,
-like `House/Floor 1/*`. What is said of a node holds for all nodes below it.
+A pattern (`*`, `?`, `[abc]`, case-sensitive) matches the name of a node, or its path from the root,
+such as `House/Floor 1/*`. A match applies to all nodes below the node as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
@@ -16,15 +16,16 @@ from baker.core.source_mesh import SourceScene
 
 
 def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str]) -> Scene:
-    """Return the scene with the objects that the patterns leave.
+    """Return the scene with the objects that the patterns select.
 
     Parameters
     ----------
     scene : Scene
+        The scene; not changed.
     include : sequence of str
-        Only objects that one of these matches are kept; all if it is empty. Lights are kept.
+        Only objects that match one of these patterns are kept; all if it is empty. Lights are kept.
     exclude : sequence of str
-        Objects and lights that one of these matches are left out.
+        Objects and lights that match one of these patterns are left out.
 
     Returns
     -------
@@ -54,15 +55,9 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
     used = sorted({i.mesh for i in instances})
     number = {old: new for new, old in enumerate(used)}
-    source = scene.source_scene
-    if source is not None:
-        shown = [i for i in source.instances if kept(i.node, i.name)]
-        filled = sorted({i.mesh for i in shown})
-        at = {old: new for new, old in enumerate(filled)}
-        source = SourceScene(
-            tuple(source.meshes[k] for k in filled), tuple(replace(i, mesh=at[i.mesh]) for i in shown)
-        )
-    idle = [p for p in (*include, *exclude) if p not in names.matched]
+    # Before `unused`: patterns may match instances that only the source scene has.
+    source = None if scene.source_scene is None else _choose_source(scene.source_scene, kept)
+    unused = [p for p in (*include, *exclude) if p not in names.matched]
     return replace(
         scene,
         meshes=tuple(scene.meshes[k] for k in used),
@@ -71,13 +66,26 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
         source_scene=source,
         warnings=(
             *scene.warnings,
-            *(SceneWarning("no-match", f"the pattern '{p}' matches no object and no light", p) for p in idle),
+            *(
+                SceneWarning("no-match", f"the pattern '{p}' matches no object and no light", p)
+                for p in unused
+            ),
         ),
     )
 
 
+def _choose_source(source: SourceScene, kept: Callable[[int, str], bool]) -> SourceScene:
+    """Return the instances of a source scene whose node and name are kept, and the meshes that they show."""
+    shown = [i for i in source.instances if kept(i.node, i.name)]
+    used = sorted({i.mesh for i in shown})
+    number = {old: new for new, old in enumerate(used)}
+    return SourceScene(
+        tuple(source.meshes[k] for k in used), tuple(replace(i, mesh=number[i.mesh]) for i in shown)
+    )
+
+
 class _Names:
-    """The names and paths that patterns are held against."""
+    """The names and paths of nodes that patterns are compared with."""
 
     def __init__(self, scene: Scene) -> None:
         document = scene.source.json if scene.source is not None else {}
@@ -92,7 +100,7 @@ class _Names:
         self.matched: set[str] = set()
 
     def match(self, pattern: str, node: int, name: str) -> bool:
-        """Tell whether a pattern matches a node or one above it."""
+        """Return whether a pattern matches a node or one of its ancestors."""
         found = any(fnmatchcase(text, pattern) for text in self._texts(node, name))
         if found:
             self.matched.add(pattern)

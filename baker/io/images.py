@@ -1,4 +1,4 @@
-"""Decodes image files (PNG, JPEG, WebP and others) to RGBA; the only file that knows Pillow's reader."""
+"""Decodes image files (PNG, JPEG, WebP and others) to RGBA with Pillow."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+# Largest side of an image, texels.
 _LARGEST = 16384
 
 
@@ -38,7 +39,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
 
     try:
         with warnings.catch_warnings():
-            # Size is checked here, by side; Pillow's own warning about many pixels would only be noise.
+            # Suppress Pillow's warning about large images; the size is checked below.
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 width, height = image.size
@@ -50,7 +51,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
         raise
     except MemoryError:
         raise
-    except Exception as error:  # Pillow's decoders raise nearly anything on broken data
+    except Exception as error:  # Pillow's decoders raise many kinds of exceptions on broken data
         name = type(error).__name__
         raise InputError(
             f"the image cannot be decoded ({name}); save it again as PNG or JPEG", file=file, object=object
@@ -62,7 +63,7 @@ def _to_rgba(image: object) -> NDArray[np.uint8]:
 
     assert isinstance(image, Image.Image)
     if image.mode.startswith("I;16") or image.mode == "I":
-        # Pillow clips 16-bit grey at 255 where it should scale: (v + 128) // 257 rounds 65535 to 255.
-        grey = np.clip((np.asarray(image).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
-        return np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
+        # Scale 16-bit grey to 8 bits: (v + 128) // 257 rounds 65535 to 255. Pillow would clip it at 255.
+        level = np.clip((np.asarray(image).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
+        return np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
     return np.array(image.convert("RGBA"), np.uint8)

@@ -1,4 +1,4 @@
-"""Says what is in a scene file, a bake's folder or an EXR image, as plain JSON values."""
+"""Describes the content of a scene file, an output folder or an image, as plain JSON values."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
     Parameters
     ----------
     path : Path or str
+        A file or a folder.
 
     Returns
     -------
     dict
-        `kind` is "scene", "bake", "image" or "status" (of a `status_0.png`); the other keys depend on it.
+        `kind` is "scene", "bake", "image" or "status" (a `status_0.png`); the other keys depend on it.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
 
 
 def _bake(folder: Path) -> dict[str, Any]:
-    """Sum a manifest up and compare every file with its hash."""
+    """Summarise a manifest, and compare every file with its hash."""
     manifest = read_manifest(folder)
     files = [
         {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
@@ -79,10 +80,10 @@ def _bake(folder: Path) -> dict[str, Any]:
 
 
 def _status(path: Path) -> dict[str, Any] | None:
-    """Count the texels of each status in a `status_0.png`; None if the PNG is none."""
+    """Count the texels of each status in a `status_0.png`; None for another PNG."""
     try:
         data = path.read_bytes()
-        # The chunk that the bake writes: other pictures with palettes are none of ours.
+        # Recognise the file by the text chunk that the bake writes.
         if b"tEXtLegend\x00" not in data:
             return None
         index = decode_palette_png(data)
@@ -103,12 +104,12 @@ def _status(path: Path) -> dict[str, Any] | None:
 
 def _image(path: Path, image: Any) -> dict[str, Any]:
     height, width, _ = image.pixels.shape
-    figures = []
+    channels = []
     for index, name in enumerate(image.channels):
         plane = image.pixels[:, :, index]
         finite = plane[np.isfinite(plane)]
         empty = not finite.size
-        figures.append(
+        channels.append(
             {
                 "channel": name,
                 "min": None if empty else float(finite.min()),
@@ -123,7 +124,7 @@ def _image(path: Path, image: Any) -> dict[str, Any]:
         "width": width,
         "height": height,
         "type": image.dtype,
-        "channels": figures,
+        "channels": channels,
         "header": image.header,
     }
 

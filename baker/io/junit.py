@@ -1,4 +1,4 @@
-"""JUnit XML, which build servers show: named cases that passed or failed, with a sentence.
+"""JUnit XML, as build servers display it: named test cases that passed or failed, with a message.
 
 Based on: the junit-10.xsd of the Jenkins xUnit plugin.
 """
@@ -15,7 +15,7 @@ from baker.io.temporary import write_atomically
 
 @dataclass(frozen=True)
 class Case:
-    """One thing that was checked.
+    """A test case.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Case:
         Why it failed; empty if it passed.
     seconds : float
     error : bool
-        It could not be checked at all.
+        Whether the check itself could not run.
     """
 
     name: str
@@ -37,7 +37,20 @@ class Case:
 
 
 def junit_text(suite: str, cases: Sequence[Case]) -> str:
-    """Return a JUnit document of one suite."""
+    """Return a JUnit document with one suite.
+
+    Parameters
+    ----------
+    suite : str
+        Name of the suite.
+    cases : sequence of Case
+        Its test cases.
+
+    Returns
+    -------
+    str
+        XML.
+    """
     failed = sum(1 for case in cases if case.problem and not case.error)
     errors = sum(1 for case in cases if case.problem and case.error)
     seconds = sum(case.seconds for case in cases)
@@ -61,7 +74,14 @@ def junit_text(suite: str, cases: Sequence[Case]) -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a report so that it is either whole or not there.
+    """Write a report atomically.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its parents are created.
+    text : str
+        Its content.
 
     Raises
     ------

@@ -1,7 +1,6 @@
-"""Opens a scene file of any known format as a `Scene`.
+"""Loads a scene file of any known format as a `Scene`.
 
-An importer is one file of this package that registers a function for its suffixes. This file holds what
-they share: which file, which errors, which options.
+An importer is one file of `baker.io.importers` that registers a function for its suffixes.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from baker.io.choose import choose_objects
 
 @dataclass(frozen=True)
 class SceneFile:
-    """A scene file as its importer gets it.
+    """The argument of an importer: a scene file and options.
 
     Attributes
     ----------
@@ -30,15 +29,15 @@ class SceneFile:
     data : bytes
         The file's content, never empty.
     up : str
-        "y" or "z": the up axis of formats that do not fix one themselves.
+        "y" or "z": the up axis, for formats that do not define one.
     scale : float
-        Metres per unit of formats that do not fix one themselves.
+        Metres per unit, for formats that do not define a unit.
     scene_index : int or None
-        Which glTF scene to take; None takes the file's default.
+        Number of the glTF scene; None for the default scene of the file.
     reflections : bool
-        Also read textures that only say how mirror-like a surface is.
+        Also read metallic-roughness textures.
     lenient : bool
-        Report what a bake refuses instead of raising, and keep the triangles as the file has them.
+        Report what a bake refuses instead of raising, and keep the triangles as the file holds them.
     """
 
     path: Path
@@ -68,29 +67,29 @@ def load_scene(
     Parameters
     ----------
     path : Path or str
-        A file whose suffix one of the `IMPORTERS` knows.
+        A file with a suffix that is registered in `IMPORTERS`.
     up : str
-        "y" or "z", the up axis of OBJ, PLY, STL and OFF files. glTF is always +Y up.
+        "y" or "z", the up axis of files whose format does not define one. glTF is always +Y up.
     scale : float
-        Metres per unit of OBJ, PLY, STL and OFF files. glTF is always in metres.
+        Metres per unit of files whose format does not define a unit. glTF is always in metres.
     scene_index : int or None
-        glTF scene to load; None loads the default one.
+        Number of the glTF scene; None for the default scene of the file.
     reflections : bool
-        Also read textures that only say how mirror-like a surface is: bakes do not look at them.
+        Also read metallic-roughness textures, which bakes do not use.
     lenient : bool
-        For those who judge the file: indices out of range, negative or far too strong lights and a scene
-        without a good triangle are no errors, and `Scene.source_scene` holds the triangles of the file.
+        For checks of the file: indices out of range, negative or far too strong lights and a scene without
+        a valid triangle are no errors, and `Scene.source_scene` holds the triangles of the file.
 
     Returns
     -------
     Scene
-        With at least one triangle, unless lenient. What was left out is in `Scene.warnings`.
+        With at least one triangle, unless lenient. `Scene.warnings` lists what was left out.
 
     Raises
     ------
     InputError
-        If the file, or one it names, is missing, unreadable, malformed, needs an extension that is not
-        understood, or holds nothing to bake.
+        If the file, or one it refers to, is missing, unreadable, malformed, requires an unknown extension, or
+        holds nothing to bake.
     SettingsError
         If `up` or `scale` is out of range.
     ResourceError
@@ -102,13 +101,7 @@ def load_scene(
     if not (math.isfinite(scale) and scale > 0):
         raise SettingsError(f"scale {scale} is not a positive number of metres per unit", object="scale")
     data = read_scene_file(path)
-    importer = IMPORTERS.get(path.suffix.lower())
-    if importer is None:
-        known = ", ".join(IMPORTERS.names())
-        what = (
-            f"'{path.suffix}' is not a known scene format" if path.suffix else "the file name has no suffix"
-        )
-        raise InputError(f"{what}; known are {known}", file=str(path))
+    importer = _importer_of(path)
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
     with memory_errors(file=str(path)):
@@ -118,13 +111,43 @@ def load_scene(
     return scene
 
 
+def _importer_of(path: Path) -> Importer:
+    """Return the importer for the suffix of a file."""
+    importer = IMPORTERS.get(path.suffix.lower())
+    if importer is None:
+        known = ", ".join(IMPORTERS.names())
+        what = (
+            f"'{path.suffix}' is not a known scene format" if path.suffix else "the file name has no suffix"
+        )
+        raise InputError(f"{what}; known are {known}", file=str(path))
+    return importer
+
+
 def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = False) -> Scene:
-    """Read a scene file as the settings of a bake say: up axis, scale, and which objects take part.
+    """Read a scene file with the settings of a bake: up axis, scale, patterns of objects.
+
+    Parameters
+    ----------
+    path : Path or str
+        The scene file.
+    settings : BakeSettings
+        `up`, `scale`, `include` and `exclude` are used.
+    lenient : bool
+        As of `load_scene`.
+
+    Returns
+    -------
+    Scene
+        With the objects that the patterns select.
 
     Raises
     ------
-    InputError, SettingsError, ResourceError
+    InputError
         As `load_scene`; also if the patterns leave no object.
+    SettingsError
+        As `load_scene`.
+    ResourceError
+        As `load_scene`.
     """
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=lenient)
     return choose_objects(scene, settings.include, settings.exclude)
@@ -132,6 +155,16 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
 
 def read_scene_file(path: Path) -> bytes:
     """Return the content of a scene file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    bytes
+        Its content.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Makes PNG files in memory; the only file that knows Pillow's writer.
+"""Encodes and decodes PNG files with Pillow.
 
-No time is stored, so the same pixels give the same bytes.
+No time is stored, so that equal pixels give equal bytes.
 """
 
 from __future__ import annotations
@@ -17,13 +17,19 @@ from baker.core.errors import InputError
 
 
 def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str] | None = None) -> bytes:
-    """Return a PNG, row 0 on top.
+    """Encode an image as PNG.
 
     Parameters
     ----------
-    pixels : (H, W) grey, (H, W, 3) RGB or (H, W, 4) RGBA uint8; or (H, W) grey uint16
+    pixels : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) uint16
+        Grey, RGB or RGBA, row 0 on top.
     text : mapping of str to str, optional
         Text chunks.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
     """
     from PIL import Image
 
@@ -33,17 +39,24 @@ def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str]
 
 
 def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, str]]:
-    """Read the numbers of a PNG without a palette, as they are stored, and its text chunks.
+    """Read the values of a PNG without a palette as they are stored, and its text chunks.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
 
     Returns
     -------
-    pixels : (H, W) or (H, W, C) uint8, or (H, W) uint16, row 0 on top
+    pixels : (H, W) or (H, W, C) uint8, or (H, W) uint16
+        Row 0 on top.
     text : dict of str to str
+        Text chunks.
 
     Raises
     ------
     InputError
-        If the file is absent, or no such PNG.
+        If the file is missing, or is no such PNG.
     """
     from PIL import Image, PngImagePlugin, UnidentifiedImageError
 
@@ -77,7 +90,7 @@ def encode_palette_png(
     """
     from PIL import Image
 
-    # All 256 places, so that a texel takes eight bits and a reader of raw bytes finds the number itself.
+    # Write all 256 entries: Pillow then stores eight bits for each texel, whose value is the index itself.
     palette = np.zeros((256, 3), np.uint8)
     for number, colour in colours.items():
         palette[number] = colour
@@ -89,13 +102,35 @@ def encode_palette_png(
 
 
 def grey_levels(value: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return numbers from 0 to 1 as 0 to 255, rounded; what is outside is clamped."""
+    """Quantise values to eight bits.
+
+    Parameters
+    ----------
+    value : array of float32, any shape
+        Values; limited to 0 to 1.
+
+    Returns
+    -------
+    array of uint8, same shape
+        0 to 255, rounded to nearest.
+    """
     rounded: NDArray[np.uint8] = np.rint(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)
     return rounded
 
 
 def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return linear light from 0 to 1 as sRGB-encoded 0 to 255 (IEC 61966-2-1)."""
+    """Encode linear light as sRGB with eight bits (IEC 61966-2-1).
+
+    Parameters
+    ----------
+    linear : array of float32, any shape
+        Values; limited to 0 to 1.
+
+    Returns
+    -------
+    array of uint8, same shape
+        0 to 255.
+    """
     clipped = np.clip(linear.astype(np.float64), 0.0, 1.0)
     encoded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
     return np.rint(encoded * 255.0).astype(np.uint8)
@@ -107,7 +142,7 @@ def decode_palette_png(data: bytes) -> NDArray[np.uint8]:
     Raises
     ------
     ValueError
-        If the data is no such picture.
+        If the data is no such image.
     """
     from PIL import Image, UnidentifiedImageError
 

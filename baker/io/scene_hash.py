@@ -1,6 +1,6 @@
-"""The hash of a scene file and of all files it names, without decoding them.
+"""The hash of a scene file and of all files that it refers to, without decoding them.
 
-The same number as `Scene.sha256`: what decides whether a bake is still that of its scene.
+It equals `Scene.sha256`, from which batches decide whether a bake is up to date.
 """
 
 from __future__ import annotations
@@ -12,17 +12,22 @@ from baker.io.load import load_scene, read_scene_file
 
 
 def scene_sha256(path: Path) -> str:
-    """Return the hash over a scene file and every file it names, in order of mention.
+    """Return the hash of a scene file and of every file that it refers to, in the order of the references.
 
     Parameters
     ----------
     path : Path
         A file of any format that `load_scene` reads.
 
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal; equal to `Scene.sha256`.
+
     Raises
     ------
     InputError
-        If the file, or one it names, is missing or unreadable, or names nothing that can be read.
+        If the file, or one it refers to, is missing or unreadable, or malformed.
     """
     suffix = path.suffix.lower()
     if suffix in (".glb", ".gltf"):
@@ -35,5 +40,5 @@ def scene_sha256(path: Path) -> str:
         return obj_sha256(path, read_scene_file(path))
     if suffix in (".ply", ".stl", ".off"):
         return hashlib.sha256(read_scene_file(path)).hexdigest()
-    # The importer alone knows what other files such a format names.
+    # Other formats are loaded as a whole: only their importers can list the files that they refer to.
     return load_scene(path).sha256

@@ -1,8 +1,8 @@
-"""Temporary folders that files are written into before they are moved to their place, and their names.
+"""Temporary folders that output is written to before it is moved to its final path, and their names.
 
 The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or
 `.baker-{process}-{random hex digits}` in it where `out` is a folder that cannot be moved. What the output
-replaces waits in a folder of the same name with `-old` at its end until the new files are in place.
+replaces is kept in a folder of the same name with the suffix `-old` until the new files are in place.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Temporary:
     ----------
     path : Path
     process : int
-        Id of the process that made it.
+        Id of the process that created it.
     old : bool
-        It holds files that were about to be replaced.
+        Whether it holds the files that are being replaced.
     """
 
     path: Path
@@ -51,7 +51,18 @@ def old_path(temporary: Path) -> Path:
 
 
 def temporaries(out: Path) -> list[Temporary]:
-    """Return all temporary folders for `out`, of any process, by name; none where they cannot be listed."""
+    """List the temporary folders for an output, of any process.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder or file.
+
+    Returns
+    -------
+    list of Temporary
+        Sorted by name; empty if the parent folder cannot be listed.
+    """
     target = out.resolve()
     found = []
     for home, prefix in ((target.parent, f".{target.name}"), (target, "")):
@@ -67,19 +78,19 @@ def temporaries(out: Path) -> list[Temporary]:
 
 @contextlib.contextmanager
 def atomic_path(path: Path, what: str) -> Iterator[Path]:
-    """Yield the name of a file to write, which takes the place of `path` at the end of the `with` block.
+    """Yield the path of a file to write, which replaces `path` at the end of the `with` block.
 
     Parameters
     ----------
     path : Path
-        Its parents are made. If the block ends with an exception, a file there is as it was.
+        The file to replace; its parents are created. It is unchanged if the block ends with an exception.
     what : str
-        What the file is, for the error message: "picture".
+        Kind of file, for the error message: "picture".
 
     Yields
     ------
     Path
-        A name with the same suffix, in a temporary folder beside `path`; `path` itself if that is a device.
+        A path with the same suffix, in a temporary folder beside `path`; `path` itself if that is a device.
 
     Raises
     ------
@@ -89,7 +100,7 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     try:
         target = path.resolve()
         if target.exists() and not target.is_file():
-            # A device or a pipe is written to, not replaced.
+            # Write to a device or a pipe instead of replacing it.
             yield target
             return
         folder = temporary_path(target)
@@ -103,11 +114,21 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     except OSError as error:
         raise ResourceError(f"the {what} cannot be written ({error.strerror})", file=str(path)) from None
     except ResourceError as error:
-        # The file named by the error lay in the temporary folder, which is gone.
+        # Name the final path: the temporary file of the error is removed.
         raise ResourceError(error.message, file=str(path)) from error
 
 
 def write_atomically(path: Path, data: bytes, what: str) -> None:
-    """Write a file so that it is either whole or as it was before; see `atomic_path`."""
+    """Write a file atomically: it is either complete or unchanged; see `atomic_path`.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its parents are created.
+    data : bytes
+        Its content.
+    what : str
+        Kind of file, for the error message: "picture".
+    """
     with atomic_path(path, what) as temporary:
         temporary.write_bytes(data)

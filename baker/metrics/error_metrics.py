@@ -1,6 +1,6 @@
-"""Figures of how far one set of values is from another, with what the reference's own noise adds.
+"""Error metrics of a set of values against reference values, beside the noise of the reference.
 
-For each place the mean over colours v of the value and r of the reference:
+With v and r the means over colours of value and reference at each point:
 
     relative error   |v - r| / max(r, floor)          floor = max(0.1 median(r), 0.01 mean(r))
     bias             mean(v - r) / mean(r)
@@ -9,21 +9,21 @@ For each place the mean over colours v of the value and r of the reference:
     relmse           mean (v - r)^2 / (r^2 + 0.01 mean(r)^2)
     z                (v_c - r_c) / standard error of r_c
     colour error     |v_c - r_c| / max(r_c, 0.1 r, floor)
-    energy ratio     R = sum w v / sum w r            w: the surface, m2, that a place stands for
+    energy ratio     R = sum w v / sum w r            w: surface area, m2, that a point represents
     its error        sqrt(sum w^2 (v - R r)^2) / sum w r
 
-`median`, `p95`, `p99`, `max` are of the relative error, whose floor keeps places in the dark from deciding:
-an error there counts against a tenth of the median light, or a hundredth of the mean, if that is more.
-`colour_median` and `colour_p95` are of the colour error, each in the colour where it is largest: a mean over
-colours does not see that red and blue are swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the
-colour where that is furthest from 0 (over a tenth of mean(r), if that is more).
+`median`, `p95`, `p99`, `max` are of the relative error. Its floor prevents that dark points dominate: an
+error there is relative to a tenth of the median light or a hundredth of the mean, whichever is more.
+`colour_median` and `colour_p95` are of the colour error, each of the colour where it is largest: a mean over
+colours would not detect that red and blue are swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the
+colour where that is furthest from 0; the denominator is at least a tenth of mean(r).
 `noise_floor` is the median relative error that the reference alone would show, `noise_p95` its 95th
-percentile: two independent halves of it are compared, and their difference is halved, since the mean of both
-halves is nearer to the truth than either by that much.
-`energy_ratio` tells, as a furnace does, whether light is gained or lost on the whole: all that the maps hold
-over all that the reference finds. `bias` weighs places alike, and small objects have more of them than their
-area would give. `energy_ratio_se` is the standard error of such a ratio: it holds the reference's noise and
-which places were picked, since both move v - R r.
+percentile. Both are of half the difference of two independent halves of the reference: the error of their
+mean has that size.
+`energy_ratio`, the light of the maps over the light of the reference, detects gain or loss of energy as a
+furnace test does. `bias` gives all points the same weight, and small objects have more points than their area
+would give. `energy_ratio_se` is the standard error of a ratio estimator: it includes the noise of the
+reference and the random choice of points, since both change v - R r.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
 2011 (relMSE); Cochran, Sampling Techniques, 1977, chapter 6 (ratios).
@@ -36,35 +36,61 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-FIGURES = (
+# Names of the metrics, in the order of reports.
+METRICS = (
     "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "noise_p95",
     "z_rms", "energy_ratio", "energy_ratio_se", "colour_bias", "colour_median", "colour_p95",
 )  # fmt: skip
-# Values below this share of the median, or of the mean, count as dark.
+# Shares of the median and of the mean, of which the larger is the level below which values count as dark.
 _DARK_MEDIAN, _DARK_MEAN = 0.1, 0.01
+# Share of mean(r)^2 in the denominator of relmse.
 _EPSILON = 0.01
-# A colour is held against at least this share of the colours' mean: one that is hardly there tells nothing.
-_LEAST_COLOUR = 0.1
+# Smallest value that the error of a colour is relative to, as a share of the mean over colours.
+_MIN_COLOUR = 0.1
 
 
 def relative_error(
     value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> NDArray[np.float64]:
-    """Return |v - r| / max(r, floor) of colour means (n,); value, reference : (n, C)."""
+    """Return |v - r| / max(r, floor) of means over colours.
+
+    Parameters
+    ----------
+    value, reference : (n, C) float64
+        Values and reference values.
+    floor : float
+        Smallest light that errors are relative to, usually `dark_floor`.
+
+    Returns
+    -------
+    (n,) float64
+        Relative errors.
+    """
     v, r = value.mean(axis=1), reference.mean(axis=1)
     error: NDArray[np.float64] = np.abs(v - r) / np.maximum(r, max(floor, 1e-12))
     return error
 
 
 def dark_floor(reference: NDArray[np.float64]) -> float:
-    """Return what values of (n, C) below which count as dark; 0 if all are black."""
+    """Return the level below which a colour mean counts as dark: max(0.1 median, 0.01 mean).
+
+    Parameters
+    ----------
+    reference : (n, C) float64
+        Reference values.
+
+    Returns
+    -------
+    float
+        In the unit of the channel; 0 if all are black.
+    """
     mean = reference.mean(axis=1)
     if not len(mean):
         return 0.0
     return max(_DARK_MEDIAN * float(np.median(mean)), _DARK_MEAN * float(mean.mean()))
 
 
-def figures(
+def error_metrics(
     value: NDArray[np.float64],
     reference: NDArray[np.float64],
     *,
@@ -73,26 +99,27 @@ def figures(
     floor: float | None = None,
     weight: NDArray[np.float64] | None = None,
 ) -> dict[str, float | int | None]:
-    """Return the figures of this file's head by name.
+    """Compute the metrics that the head of this file defines.
 
     Parameters
     ----------
-    value, reference : (n, C)
-    standard_error : (n, C), optional
+    value, reference : (n, C) float64
+        Values and reference values.
+    standard_error : (n, C) float64, optional
         Of the reference; without it `z_rms` is None.
-    halves : two (n, C), optional
-        Independent halves of the reference; without them its noise is None.
+    halves : two (n, C) float64, optional
+        Independent halves of the reference; without them `noise_floor` and `noise_p95` are None.
     floor : float, optional
-        See above; by default `dark_floor` of the reference.
-    weight : (n,), m2, optional
-        Surface that each place stands for; without it the energy ratio is None.
+        Smallest light that errors are relative to; by default `dark_floor` of the reference.
+    weight : (n,) float64, m2, optional
+        Surface area that each point represents; without it the energy ratio is None.
 
     Returns
     -------
-    dict
-        Keys are `FIGURES`; without any place only `texels`, 0, is a number.
+    dict of str to number or None
+        Keys are `METRICS`. Without points `texels` is 0 and all others are None.
     """
-    found: dict[str, float | int | None] = dict.fromkeys(FIGURES)
+    found: dict[str, float | int | None] = dict.fromkeys(METRICS)
     found["texels"] = len(value)
     if not len(value):
         return found
@@ -108,7 +135,7 @@ def figures(
     found["median"] = float(np.median(error))
     found["p95"], found["p99"] = (float(np.percentile(error, q)) for q in (95, 99))
     found["max"] = float(error.max())
-    found.update(_colour_figures(value, reference, floor))
+    found.update(_colour_metrics(value, reference, floor))
     if halves is not None:
         apart = 0.5 * np.abs((halves[0] - halves[1]).mean(axis=1)) / np.maximum(r, max(floor, 1e-12))
         found["noise_floor"], found["noise_p95"] = (float(np.percentile(apart, q)) for q in (50, 95))
@@ -120,13 +147,13 @@ def figures(
     return found
 
 
-def _colour_figures(
+def _colour_metrics(
     value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> dict[str, float]:
     mean = reference.mean(axis=1, keepdims=True)
-    scale = np.maximum(np.maximum(reference, _LEAST_COLOUR * mean), max(floor, 1e-12))
+    scale = np.maximum(np.maximum(reference, _MIN_COLOUR * mean), max(floor, 1e-12))
     error = np.abs(value - reference) / scale
-    whole = np.maximum(np.maximum(reference.mean(axis=0), _LEAST_COLOUR * mean.mean()), 1e-12)
+    whole = np.maximum(np.maximum(reference.mean(axis=0), _MIN_COLOUR * mean.mean()), 1e-12)
     bias = (value - reference).mean(axis=0) / whole
     return {
         "colour_bias": float(bias[np.argmax(np.abs(bias))]),
@@ -136,16 +163,29 @@ def _colour_figures(
 
 
 def beyond_noise(error: float, noise: float) -> float:
-    """Return what an error holds beside independent noise: sqrt(error^2 - noise^2), at least 0."""
+    """Subtract independent noise from an error: sqrt(max(error^2 - noise^2, 0)).
+
+    Parameters
+    ----------
+    error : float
+        Error that includes the noise.
+    noise : float
+        Size of the noise, in the same unit.
+
+    Returns
+    -------
+    float
+        Error without the noise.
+    """
     return math.sqrt(max(error**2 - noise**2, 0.0))
 
 
 def energy_ratio(
     value: NDArray[np.float64], reference: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[float | None, float | None]:
-    """Return the ratio of this file's head for colour means (n,), and its standard error.
+    """Return the energy ratio of colour means (n,) with weights (n,) in m2, and its standard error.
 
-    Both are None where the reference holds no light; the error also for a single place.
+    Both are None if the reference is black; the standard error also for a single point.
     """
     total = float((weight * reference).sum())
     if not total > 0:
@@ -159,6 +199,17 @@ def energy_ratio(
 def z_scores(
     value: NDArray[np.float64], reference: NDArray[np.float64], standard_error: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the errors (m,) in standard errors of the reference, where that saw any light."""
+    """Return errors in standard errors of the reference.
+
+    Parameters
+    ----------
+    value, reference, standard_error : (n, C) float64
+        Values, reference values and the standard errors of these.
+
+    Returns
+    -------
+    (m,) float64
+        Of all components where the reference is above 0 and its standard error is finite and above 0.
+    """
     known = np.isfinite(standard_error) & (standard_error > 0) & (reference > 0)
     return np.asarray((value - reference)[known] / standard_error[known], np.float64)

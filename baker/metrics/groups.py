@@ -1,26 +1,26 @@
-"""Is a group of places wrong on the whole? Ratios of sums, with their standard errors.
+"""Deviations of a group of points as a whole: ratios of sums, with their standard errors.
 
-For the places of a group with values v_c and reference r_c (v, r: means over colours c), n of them:
+For the n points of a group with values v_c and reference r_c (v, r: means over colours c):
 
     bias       B = sum v / sum r - 1
     colour     S_c = (V_c / V - R_c / R) / max(R_c / R, 0.3)     V, R: sums of v, r; V_c, R_c: of one colour
-    own error  b of `spread`: the spread of the values about the truth, relative, beside the reference's noise
-    typical    median of |v - r| / max(r, floor), floor of the group (`error_metrics`); beside it what two
-               halves of the reference, compared, show of it
+    own error  b of `spread`: relative spread of the values about the truth, without the reference's noise
+    typical    median of |v - r| / max(r, floor), floor of the group (`error_metrics`), and the same of half
+               the difference of two halves of the reference
 
-A single place is known to some percent; a mean over a hundred of them to a tenth of that. So a deviation
-of a whole object, colour or room is seen far below the noise of its texels. How much of it is sure is what is
-left when `z_needed(m)` standard errors are taken off: a deviation is never reported larger than it is by
-chance. m is the number of places that bring the light, (sum w)^2 / sum w^2 with w = v + r; where it is below
-`LEAST` nothing is sure. The error is the largest of three: that of the jackknife (how the figure changes if
-one place is left out: it holds the noise of the bake and of the reference, and where one bright place decides
-it is large), that of the reference alone, and half the difference between the figures of two halves of the
-reference. A group whose reference is off by more than `_UNKNOWN` of its mean light (rms over its places) has
-no own error that is sure: light that rare paths bring is missing at most of its places, and too much at some.
-A shift of colour is nearly free of noise where a path's colours rise and fall together.
+The value of one point is known to some percent, the mean of a hundred points ten times better. So deviations
+of a whole object, colour or room are detected far below the noise of its texels. A deviation is reported
+after `z_needed(m)` of its standard errors are subtracted from its absolute value. m is the effective number
+of points, (sum w)^2 / sum w^2 with w = v + r; below `MIN_POINTS` no deviation is significant. The standard
+error is the largest of three: that of the jackknife (the change if one point is left out, which contains the
+noise of bake and reference and is large where one bright point dominates), that of the reference alone, and
+half the difference of the results of two halves of the reference. If the rms noise of a group's reference
+exceeds `_UNRELIABLE` of its mean light, its own error has the lower bound 0: light of rare paths is missing
+at most points and too strong at some. The noise of colour shifts is small, because the colours of a path are
+correlated.
 
-Where the reference finds no light (less than three of its standard errors) differences are held against
-a thousandth of the scene's bright light, and the error counts one unseen path that brings that light.
+Where the reference is below three of its standard errors, differences are relative to a thousandth of the
+scene's bright light, and the standard error includes one missed path that carries that light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.
@@ -38,24 +38,38 @@ from numpy.typing import NDArray
 from baker.metrics.error_metrics import dark_floor
 from baker.metrics.spread import Spread, own_error
 
-# Fewer places are not judged as a group.
-LEAST = 8
-_Z, _FEW = 3.0, 32.0
-_LEAST_SHARE = 0.3
-# Light of which this share may be found where there is none, before it is an error of its own size.
+# Fewest (effective) points of a group whose deviations are significant.
+MIN_POINTS = 8
+# Standard errors needed: a constant part and a part for 1 / n.
+_Z, _Z_FEW = 3.0, 32.0
+# Smallest share of a colour in the light that its shift is relative to.
+_MIN_COLOUR_SHARE = 0.3
+# Smallest light that differences are relative to where the reference is black, as a share of the bright
+# light.
 _BLACK = 1.0e-3
+# The reference is black if it is below this many of its standard errors.
 _LIT = 3.0
-_UNKNOWN = 0.4
-# Own errors are relative to at least these shares of a group's mean light and of the scene's bright light.
+# Relative rms noise of the reference above which own errors have the lower bound 0.
+_UNRELIABLE = 0.4
+# Smallest light that own errors are relative to, as shares of the mean light of the group and of the bright
+# light of the scene.
 _FAINT, _FAINTEST = 0.01, 1.0e-4
 
 
-class Compared(NamedTuple):
-    """Values (n, C) beside a reference.
+class ComparedPoints(NamedTuple):
+    """Values at n points with C components beside reference values.
 
-    value, reference : (n, C); standard_error : (n, C), of the reference, with what it may not have seen;
-    halves : two (n, C), independent halves of it; samples : (n,); spread : (n, C), standard error that its
-    passes show.
+    Attributes
+    ----------
+    value, reference : (n, C) float64
+    standard_error : (n, C) float64
+        Of the reference, including light that it may have missed.
+    halves : two (n, C) float64
+        Independent halves of the reference.
+    samples : (n,) int64
+        Samples of the reference.
+    spread : (n, C) float64
+        Standard error of the reference as its passes show it.
     """
 
     value: NDArray[np.float64]
@@ -65,31 +79,35 @@ class Compared(NamedTuple):
     samples: NDArray[np.int64]
     spread: NDArray[np.float64]
 
-    def of(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Compared:
-        """Return some of the places."""
+    def of(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> ComparedPoints:
+        """Return some of the points, by mask (n,) or by index (m,)."""
         halves = self.halves[0][which], self.halves[1][which]
-        return Compared(
+        return ComparedPoints(
             self.value[which], self.reference[which], self.standard_error[which], halves,
             self.samples[which], self.spread[which],
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class GroupFigures:
-    """What this file's head defines.
+class GroupMetrics:
+    """Metrics of a group as the head of this file defines them.
 
     Attributes
     ----------
     texels : int
+        Number of points.
     effective : float
-        How many places bring the light.
+        Effective number of points, m.
     light : float
         Mean of the reference.
     bias, bias_se : float
+        Relative; standard error.
     colour, colour_se : (C,) float64
+        Relative shift of each colour; standard errors.
     typical, typical_noise : float
+        Median relative error, and that of half the difference of the reference's halves.
     spread : Spread
-        Own error, and its bounds `z_needed(n)` standard errors from it.
+        Own error, with bounds `z_needed(n)` standard errors from it.
     """
 
     texels: int
@@ -105,29 +123,29 @@ class GroupFigures:
 
     @property
     def sure_bias(self) -> float:
-        """Return by how much the group is off at least, 0 if that may be chance."""
+        """Return the bias less its uncertainty, 0 if it is not significant."""
         return float(self._sure(np.array(self.bias), np.array(self.bias_se)))
 
     @property
     def sure_colour(self) -> float:
-        """Return by how much a colour is shifted at least, of the colour where that is most."""
+        """Return the largest colour shift less its uncertainty, with its sign."""
         sure = self._sure(self.colour, self.colour_se)
         return float(sure[np.argmax(np.abs(sure))])
 
     @property
     def sure_noise(self) -> float:
-        """Return the own error that the group has at least."""
-        return self.spread.least
+        """Return the lower bound of the own error."""
+        return self.spread.lower
 
-    def _sure(self, figure: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return figures with what may be chance taken off their size."""
-        if self.effective < LEAST:
-            return np.zeros_like(figure)
-        left = np.maximum(np.abs(figure) - z_needed(self.effective) * error, 0.0)
-        return np.asarray(np.sign(figure) * left, np.float64)
+    def _sure(self, deviation: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return deviations whose absolute values are reduced by `z_needed` standard errors, at least 0."""
+        if self.effective < MIN_POINTS:
+            return np.zeros_like(deviation)
+        left = np.maximum(np.abs(deviation) - z_needed(self.effective) * error, 0.0)
+        return np.asarray(np.sign(deviation) * left, np.float64)
 
     def as_json(self) -> dict[str, float | int | list[float]]:
-        """Return plain values."""
+        """Return the metrics as plain values."""
         return {
             "texels": self.texels,
             "effective": self.effective,
@@ -139,52 +157,71 @@ class GroupFigures:
             "typical": self.typical,
             "typical_noise": self.typical_noise,
             "own_error": self.spread.own,
-            "own_error_least": self.spread.least,
-            "own_error_most": self.spread.most,
+            "own_error_least": self.spread.lower,
+            "own_error_most": self.spread.upper,
         }
 
 
 def z_needed(n: float) -> float:
-    """Return how many standard errors a figure may be off: more where few places tell the error itself."""
-    return _Z + _FEW / max(n, 1)
+    """Return the standard errors that a significant deviation exceeds: more for small n, where the
+    standard error itself is uncertain.
+    """
+    return _Z + _Z_FEW / max(n, 1)
 
 
 def bright_light(reference: NDArray[np.float64]) -> float:
-    """Return what counts as the bright light of a scene: the 95th percentile of (n, C)."""
-    return float(np.percentile(reference.mean(axis=1), 95)) if len(reference) else 0.0
-
-
-def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupFigures:
-    """Return the figures of a group of at least two places.
+    """Return the bright light of a scene: the 95th percentile of its colour means.
 
     Parameters
     ----------
-    places : Compared
-    bright : float
-        Of `bright_light`.
-    least : float
-        Differences are held against at least this mean light.
+    reference : (n, C) float64
+        Reference values.
+
+    Returns
+    -------
+    float
+        In the unit of the channel; 0 without points.
     """
-    n = len(places.value)
-    v, r = places.value.mean(axis=1), places.reference.mean(axis=1)
-    noise = np.where(np.isfinite(places.standard_error), places.standard_error, 0.0).mean(axis=1)
+    return float(np.percentile(reference.mean(axis=1), 95)) if len(reference) else 0.0
+
+
+def compare_group(points: ComparedPoints, bright: float, min_light: float = 0.0) -> GroupMetrics:
+    """Compute the metrics of a group of at least two points.
+
+    Parameters
+    ----------
+    points : ComparedPoints
+        The points of the group.
+    bright : float
+        From `bright_light`.
+    min_light : float
+        Smallest mean light that differences are relative to.
+
+    Returns
+    -------
+    GroupMetrics
+        Deviations with standard errors.
+    """
+    n = len(points.value)
+    v, r = points.value.mean(axis=1), points.reference.mean(axis=1)
+    noise = np.where(np.isfinite(points.standard_error), points.standard_error, 0.0).mean(axis=1)
     own = math.sqrt(float((noise**2).sum()))
     total = float(r.sum())
     if not total > _LIT * own:
         total = max(total, _BLACK * bright * n, 1e-30)
-        own = math.hypot(own, n * bright / max(float(places.samples.sum()), 1.0))
-    total = max(total, least * n)
+        own = math.hypot(own, n * bright / max(float(points.samples.sum()), 1.0))
+    total = max(total, min_light * n)
     bias = float(v.sum() - r.sum()) / total
     spread = _jackknife((v.sum() - v - (r.sum() - r))[:, None] / np.maximum(total - r, total / n)[:, None])[0]
-    colour, colour_se = _colour_shift(places)
-    lowest = max(dark_floor(places.reference), least)
+    colour, colour_se = _colour_shift(points)
+    lowest = max(dark_floor(points.reference), min_light)
     scale = np.maximum(r, lowest) if lowest > 0 else np.full(n, total / n)
-    apart = 0.5 * (places.halves[0] - places.halves[1]).mean(axis=1)
-    shown = np.where(np.isfinite(places.spread), places.spread, 0.0).mean(axis=1)
+    apart = 0.5 * (points.halves[0] - points.halves[1]).mean(axis=1)
+    shown = np.where(np.isfinite(points.spread), points.spread, 0.0).mean(axis=1)
     known = own_error(v, r, shown, apart, max(lowest, total / n * _FAINT, bright * _FAINTEST), z_needed(n))
-    if math.sqrt(float((shown**2).mean())) * n > _UNKNOWN * total:
-        known = known._replace(least=0.0)
-    return GroupFigures(
+    if math.sqrt(float((shown**2).mean())) * n > _UNRELIABLE * total:
+        known = known._replace(lower=0.0)
+    return GroupMetrics(
         texels=n,
         effective=float((v + r).sum()) ** 2 / max(float(((v + r) ** 2).sum()), 1e-30),
         light=float(r.mean()),
@@ -198,24 +235,24 @@ def compare_group(places: Compared, bright: float, least: float = 0.0) -> GroupF
     )
 
 
-def _colour_shift(places: Compared) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how far each colour's share of the light is off, (C,), and the standard errors."""
-    v, r = places.value.mean(axis=1), places.reference.mean(axis=1)
-    all_sums = [a.sum(axis=0) for a in (places.value, places.reference, *places.halves)]
-    if places.value.shape[1] == 1 or not all(a.mean() > 0 for a in all_sums):
-        return np.zeros(places.value.shape[1]), np.zeros(places.value.shape[1])
+def _colour_shift(points: ComparedPoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the relative shift of each colour's share of the light, (C,), and the standard errors (C,)."""
+    v, r = points.value.mean(axis=1), points.reference.mean(axis=1)
+    all_sums = [a.sum(axis=0) for a in (points.value, points.reference, *points.halves)]
+    if points.value.shape[1] == 1 or not all(a.mean() > 0 for a in all_sums):
+        return np.zeros(points.value.shape[1]), np.zeros(points.value.shape[1])
     share_v, share_r, one, other = (a / a.mean() for a in all_sums)
-    scale = np.maximum(share_r, _LEAST_SHARE)
+    scale = np.maximum(share_r, _MIN_COLOUR_SHARE)
     left = [
         (total - each) / np.maximum(total.mean() - mean, 1e-9 * total.mean())[:, None]
-        for total, each, mean in zip(all_sums[:2], (places.value, places.reference), (v, r), strict=True)
+        for total, each, mean in zip(all_sums[:2], (points.value, points.reference), (v, r), strict=True)
     ]
     error = np.maximum(_jackknife((left[0] - left[1]) / scale), 0.5 * np.abs(one - other) / scale)
     return (share_v - share_r) / scale, error
 
 
 def _jackknife(left_out: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard errors (m,) of figures whose values without each of n places are (n, m)."""
+    """Return the standard errors (m,) of m statistics from (n, m), their values without each of n points."""
     n = len(left_out)
     error: NDArray[np.float64] = np.sqrt((n - 1) / n * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
     return error

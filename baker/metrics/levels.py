@@ -1,49 +1,82 @@
-"""Tells if a map was rounded to few levels, or cut off at some value."""
+"""Detects maps that were quantised to few levels, or clamped at a maximum."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.metrics.groups import Compared
+from baker.metrics.groups import ComparedPoints
 
-# Levels that must be there before their spacing says anything, and texels for each of them.
-_LEVELS, _EACH = 16, 8
-# Distances between levels of a rounded map change little from one to the next (logarithm, usually); those of
-# other maps are those of random numbers, whose usual change is 1.1.
+# Fewest distinct levels whose spacing is evaluated, and fewest texels for each level.
+_MIN_LEVELS, _TEXELS_PER_LEVEL = 16, 8
+# Median |log| ratio of neighbouring level distances below which levels are evenly spaced. Random values have
+# about 1.1.
 _EVEN = 0.2
-# A rounded map's levels are coarser than half floats by this factor.
+# Quantised levels are coarser than the spacing of half floats by at least this factor.
 _COARSE = 4.0
-_HALF = 2.0**-10
-# Texels at the very largest value that say that it was a limit.
-_AT_TOP = 8
+_HALF_SPACING = 2.0**-10
+# Fewest texels at exactly the largest value that indicate clamping.
+_MIN_CLAMPED = 8
 
 
 def few_levels(maps: NDArray[np.float32], covered: NDArray[np.bool_]) -> bool:
-    """Tell if any colour of a map (P, H, W, C) holds few, evenly spaced levels where most of it lies."""
-    return any(_rounded(maps[..., c][covered]) for c in range(maps.shape[3]))
+    """Return whether any component of a map has few, evenly spaced levels (quantiles 10 % to 90 %).
+
+    Parameters
+    ----------
+    maps : (P, H, W, C) float32
+        Pages of a channel.
+    covered : (P, H, W) bool
+        Texels with a measured value.
+
+    Returns
+    -------
+    bool
+        True if the map was quantised.
+    """
+    return any(_quantised(maps[..., c][covered]) for c in range(maps.shape[3]))
 
 
-def _rounded(value: NDArray[np.float32]) -> bool:
+def _quantised(value: NDArray[np.float32]) -> bool:
     low, high = np.percentile(value, (10, 90)) if len(value) else (0.0, 0.0)
     middle = value[(value >= low) & (value <= high)]
     level = np.unique(middle).astype(np.float64)
-    if len(level) < _LEVELS or len(middle) < _EACH * len(level):
+    if len(level) < _MIN_LEVELS or len(middle) < _TEXELS_PER_LEVEL * len(level):
         return False
     gap = np.diff(level)
-    coarse = float(np.median(gap / np.maximum(np.abs(level[1:]), 1e-30))) > _COARSE * _HALF
+    coarse = float(np.median(gap / np.maximum(np.abs(level[1:]), 1e-30))) > _COARSE * _HALF_SPACING
     return coarse and float(np.median(np.abs(np.diff(np.log(gap))))) < _EVEN
 
 
 def cut_off(
-    maps: NDArray[np.float32], covered: NDArray[np.bool_], places: Compared, pixel: NDArray[np.int64]
+    maps: NDArray[np.float32],
+    covered: NDArray[np.bool_],
+    compared: ComparedPoints,
+    pixel: NDArray[np.int64],
 ) -> float:
-    """Return by what share the reference lies above texels that hold the map's largest value; 0 if few do."""
+    """Return how far the reference exceeds the map's largest value at texels that hold it, relative to it.
+
+    Parameters
+    ----------
+    maps : (P, H, W, C) float32
+        Pages of a channel.
+    covered : (P, H, W) bool
+        Texels with a measured value.
+    compared : ComparedPoints
+        Reference values of n texels.
+    pixel : (n,) int64
+        (page * H + row) * W + column of these texels.
+
+    Returns
+    -------
+    float
+        Largest of the components; 0 if fewer than eight texels hold the largest value.
+    """
     worst = 0.0
     for c in range(maps.shape[3]):
         flat = maps[..., c].reshape(-1)
         top = float(flat[covered.reshape(-1)].max())
         at_top = flat[pixel] >= top
-        if top > 0 and at_top.sum() >= _AT_TOP:
-            worst = max(worst, float(places.reference[at_top, c].mean()) / top - 1.0)
+        if top > 0 and at_top.sum() >= _MIN_CLAMPED:
+            worst = max(worst, float(compared.reference[at_top, c].mean()) / top - 1.0)
     return worst

@@ -1,7 +1,7 @@
-"""Limits on figures, as `fail_if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+"""Limits on metrics, as `fail_if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
-A limit names what must not be: it fails where its comparison is true. `bias` and the like are compared by
-their size, so that a bake too dark fails like one too bright.
+A limit is a condition for failure: it fails where its comparison is true. Signed metrics such as `bias` are
+compared by their absolute value, so that a bake that is too dark fails like one that is too bright.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
 _LIMIT = re.compile(r"\s*([A-Za-z_]\w*)\s*\.\s*([A-Za-z_]\w*)\s*(>=|<=|>|<)\s*([^\s,]+)\s*")
-_SIZED = (
+# Metrics compared by their absolute value.
+_SIGNED = (
     "bias", "colour_bias", "region_bias", "region_colour", "object_bias", "object_colour", "chart_bias",
     "chart_colour", "whole_bias", "whole_colour", "edge_bias", "edge_colour",
     "exponent_error",
@@ -32,31 +33,31 @@ class Limit:
 
     Attributes
     ----------
-    channel, figure : str
-    sign : str
+    channel, metric : str
+    operator : str
         ">", ">=", "<" or "<=".
     number : float
     """
 
     channel: str
-    figure: str
-    sign: str
+    metric: str
+    operator: str
     number: float
 
     def __str__(self) -> str:
-        """Return the limit as it is written."""
-        return f"{self.channel}.{self.figure} {self.sign} {self.number:g}"
+        """Return the limit as `--fail-if` takes it."""
+        return f"{self.channel}.{self.metric} {self.operator} {self.number:g}"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A limit held against a figure.
+    """The result of evaluating a limit.
 
     Attributes
     ----------
     limit : Limit
     value : float or None
-        None if there is no such figure (no texels): that fails.
+        Value of the metric; None if it could not be computed (no texels).
     failed : bool
     """
 
@@ -65,30 +66,38 @@ class Verdict:
     failed: bool
 
 
-def parse_limits(text: str, channels: Iterable[str], figures: Iterable[str]) -> list[Limit]:
-    """Read an expression.
+def parse_limits(text: str, channels: Iterable[str], metrics: Iterable[str]) -> list[Limit]:
+    """Parse an expression of limits.
 
     Parameters
     ----------
     text : str
-        Comparisons `channel.figure OP number`, separated by commas.
-    channels, figures : names that may be used
+        Comparisons `channel.metric OP number`, separated by commas.
+    channels : iterable of str
+        Valid names of channels.
+    metrics : iterable of str
+        Valid names of metrics.
+
+    Returns
+    -------
+    list of Limit
+        In the order of the expression.
 
     Raises
     ------
     SettingsError
-        If it cannot be read, or names what does not exist.
+        If the expression is malformed, or has an unknown name.
     """
     limits = []
-    channels, figures = list(channels), list(figures)
+    channels, metrics = list(channels), list(metrics)
     for part in text.split(","):
         match = _LIMIT.fullmatch(part)
         if match is None:
             raise SettingsError(
                 f"'{part.strip()}' is not of the form channel.figure > number", object="fail_if"
             )
-        channel, figure, sign, number = match.groups()
-        for what, name, known in (("channel", channel, channels), ("figure", figure, figures)):
+        channel, metric, sign, number = match.groups()
+        for what, name, known in (("channel", channel, channels), ("figure", metric, metrics)):
             if name not in known:
                 raise unknown_name(what, name, known, object="fail_if")
         try:
@@ -97,27 +106,35 @@ def parse_limits(text: str, channels: Iterable[str], figures: Iterable[str]) -> 
             raise SettingsError(f"'{number}' is not a number", object="fail_if") from None
         if value != value:
             raise SettingsError("a limit of nan is never reached", object="fail_if")
-        limits.append(Limit(channel, figure, sign, value))
+        limits.append(Limit(channel, metric, sign, value))
     return limits
 
 
-def judge(
+def evaluate_limits(
     limits: Iterable[Limit], channels: Mapping[str, Mapping[str, Any]], *, missing_fails: bool = True
 ) -> list[Verdict]:
-    """Hold limits against figures.
+    """Compare metrics with limits.
 
     Parameters
     ----------
-    channels : mapping of channel to mapping of figure to number or None
+    limits : iterable of Limit
+        The limits.
+    channels : mapping of str to mapping of str to number or None
+        Metrics by channel and name.
     missing_fails : bool
-        A limit on a figure that is None fails.
+        Whether a limit on a metric that is None fails.
+
+    Returns
+    -------
+    list of Verdict
+        One for each limit, in order.
     """
     verdicts = []
     for limit in limits:
-        value = channels[limit.channel].get(limit.figure)
+        value = channels[limit.channel].get(limit.metric)
         if value is None:
             verdicts.append(Verdict(limit, None, missing_fails))
             continue
-        size = abs(value) if limit.figure in _SIZED and limit.number >= 0 else value
-        verdicts.append(Verdict(limit, value, _OPERATORS[limit.sign](size, limit.number)))
+        size = abs(value) if limit.metric in _SIGNED and limit.number >= 0 else value
+        verdicts.append(Verdict(limit, value, _OPERATORS[limit.operator](size, limit.number)))
     return verdicts

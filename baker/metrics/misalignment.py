@@ -1,7 +1,7 @@
-"""Tells if a map is shifted or turned against its surface, blurred, or bent by a curve.
+"""Detects maps that are shifted against their surface, blurred, or changed by a gamma curve.
 
-A map that fits better one texel further is shifted, however small its error is in smooth places. A map whose
-values follow a power of the truth other than 1 went through a gamma curve.
+A map is shifted if it fits the reference better one texel further, however small its error is in smooth
+areas. A map whose values follow a power of the reference other than 1 went through a gamma curve.
 """
 
 from __future__ import annotations
@@ -9,20 +9,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+# Shifts (rows, columns) that are tried.
 _STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
-# Texels over which curvature is measured; its share of the error that says blur.
-_WIDE, _BLUR = 2, 0.2
-# A shifted map must fit this much better before it is believed, and so many texels must tell.
+# Distance in texels over which curvature is measured.
+_CURVATURE_STEP = 2
+# Smallest coefficient of the curvature in the error that indicates blur.
+_BLUR = 0.2
+# Largest ratio of the misfits with and without a shift that indicates a shift.
 _BETTER = 0.9
-# By so many standard errors, too.
-_SURE = 4.0
-_ENOUGH = 32
-# What a sound map may be off, relative; errors are told in this and the noise of the truth, their squares up
-# to a limit: a few texels of large error must not decide, nor those of large noise.
-_OFF, _CLIP = 0.03, 9.0
-# Powers that are tried, 1 in the middle; a texel further from all is no further than this (log scale).
+# Standard errors that a difference must exceed.
+_Z = 4.0
+# Fewest texels of a decision.
+_MIN_TEXELS = 32
+# Relative error of a correct map. Squared errors are in variances of this and the noise of the reference, and
+# clipped, so that few texels with a large error or much noise do not decide.
+_TOLERANCE, _CLIP = 0.03, 9.0
+# Exponents that are tried, 1 in the middle.
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
-_FAR = 0.1
+# Largest residual of a texel, natural logarithm.
+_MAX_RESIDUAL = 0.1
 
 
 def best_shift(
@@ -33,19 +38,27 @@ def best_shift(
     noise: NDArray[np.float64] | None = None,
     better: float = _BETTER,
 ) -> tuple[int, int]:
-    """Return the shift (rows, columns) by which the map would fit the truth better, (0, 0) if none does.
+    """Return the shift by which the map would fit the reference better.
 
     Parameters
     ----------
-    page : (P, H, W) float64, colour means of the map
+    page : (P, H, W) float64
+        Colour means of the map.
     covered : (P, H, W) bool
-        Only texels whose four neighbours are covered, too, take part.
-    pixel : (n,) int64, texels judged
-    truth : (n,) float64, their path-traced values
+        Texels with a measured value. Only texels whose four neighbours are covered are used.
+    pixel : (n,) int64
+        (page * H + row) * W + column of the compared texels.
+    truth : (n,) float64
+        Path-traced values of these texels.
     noise : (n,) float64, optional
-        Standard errors of these: what they add to the misfit says nothing about a shift.
+        Standard errors of the path-traced values; their part of the misfit is subtracted.
     better : float
-        A shifted map is believed if its misfit is less than this share of what it is without.
+        Largest ratio of the misfits with and without a shift that indicates a shift.
+
+    Returns
+    -------
+    rows, columns : int
+        (0, 0) if no shift fits better.
     """
     misfit = _misfits(page, covered, pixel, truth, noise)
     if misfit is None:
@@ -53,9 +66,9 @@ def best_shift(
     error, excess = misfit
     best = int(np.argmin(excess))
     gain = error[0] - error[best]
-    # Where a map is even every shift fits alike but for noise.
-    sure = gain.mean() > _SURE * gain.std() / np.sqrt(len(gain))
-    return _STEPS[best] if excess[best] < better * excess[0] and sure else (0, 0)
+    # Require a significant gain: where a map is constant all shifts fit alike and noise selects one.
+    significant = gain.mean() > _Z * gain.std() / np.sqrt(len(gain))
+    return _STEPS[best] if excess[best] < better * excess[0] and significant else (0, 0)
 
 
 def is_blurred(
@@ -64,9 +77,26 @@ def is_blurred(
     pixel: NDArray[np.int64],
     truth: NDArray[np.float64],
 ) -> bool:
-    """Tell whether the map's error follows its curvature, as a blur's does; parameters of `best_shift`.
+    """Return whether the map is blurred: its error is proportional to its curvature.
 
-    A Gaussian blur of s texels adds s^2 / 2 times the Laplacian; noise of the map makes the slope negative.
+    A Gaussian blur of s texels adds s^2 / 2 times the Laplacian; noise of the map makes the coefficient
+    negative.
+
+    Parameters
+    ----------
+    page : (P, H, W) float64
+        Colour means of the map.
+    covered : (P, H, W) bool
+        Texels with a measured value.
+    pixel : (n,) int64
+        (page * H + row) * W + column of the compared texels.
+    truth : (n,) float64
+        Path-traced values of these texels.
+
+    Returns
+    -------
+    bool
+        False if fewer than 32 texels can be used.
     """
     height, width = page.shape[1:]
     number, rest = np.divmod(pixel, height * width)
@@ -74,12 +104,12 @@ def is_blurred(
     inside = np.ones(len(pixel), bool)
     around = np.zeros(len(pixel))
     for down, right in _STEPS:
-        y, x = row + _WIDE * down, column + _WIDE * right
+        y, x = row + _CURVATURE_STEP * down, column + _CURVATURE_STEP * right
         within = (y >= 0) & (y < height) & (x >= 0) & (x < width)
         at = (number, np.clip(y, 0, height - 1), np.clip(x, 0, width - 1))
         inside &= within & covered[at]
         around += page[at]
-    if inside.sum() < _ENOUGH:
+    if inside.sum() < _MIN_TEXELS:
         return False
     value = page[number, row, column]
     scale = np.maximum(np.maximum(truth, value), 0.1 * np.median(truth)) + 1e-12
@@ -88,9 +118,9 @@ def is_blurred(
     square = float((curvature**2).sum())
     if not square > 0:
         return False
-    slope = float((curvature * error).sum()) / square
-    spread = float(np.sqrt((curvature**2 * (error - slope * curvature) ** 2).sum())) / square
-    return slope > _BLUR and slope > _SURE * spread
+    coefficient = float((curvature * error).sum()) / square
+    spread = float(np.sqrt((curvature**2 * (error - coefficient * curvature) ** 2).sum())) / square
+    return coefficient > _BLUR and coefficient > _Z * spread
 
 
 def _misfits(
@@ -100,9 +130,9 @@ def _misfits(
     truth: NDArray[np.float64],
     noise: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return squared errors (k, m) of the map shifted by each of `_STEPS`, in variances, and their means.
+    """Return squared errors (k, m) of the map shifted by `_STEPS`, in variances, and their means (k,).
 
-    From the means (k,) the reference's noise is taken off. None if too few texels tell.
+    The noise of the reference is subtracted from the means. None if too few texels can be used.
     """
     height, width = page.shape[1:]
     number, rest = np.divmod(pixel, height * width)
@@ -111,33 +141,44 @@ def _misfits(
     for down, right in _STEPS:
         at = (number, np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1))
         inside &= covered[at]
-    if inside.sum() < _ENOUGH:
+    if inside.sum() < _MIN_TEXELS:
         return None
     number, row, column, truth = number[inside], row[inside], column[inside], truth[inside]
     scale = np.maximum(truth, 0.1 * np.median(truth)) + 1e-12
     found = [page[number, row + down, column + right] for down, right in _STEPS]
     own = np.zeros(len(truth)) if noise is None else (noise[inside] / scale) ** 2
-    variance = own + _OFF**2
+    variance = own + _TOLERANCE**2
     error = np.array([np.minimum(((value - truth) / scale) ** 2 / variance, _CLIP) for value in found])
     return error, error.mean(axis=1) - (own / variance).mean()
 
 
 def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:
-    """Return the power of the truth that values follow, 1 if they are true; None if too few texels tell.
+    """Fit values by a power of the truth.
 
-    Another power than 1 is believed if values lie nearer to it by half: a few wrong texels say nothing.
+    Parameters
+    ----------
+    value : (n,) float64
+        Colour means of the map.
+    truth : (n,) float64
+        Path-traced values.
+
+    Returns
+    -------
+    float or None
+        The exponent; 1 unless another one halves the mean residual. None if fewer than 32 texels can be used
+        or the truth hardly varies.
     """
-    # In the dark small errors are large ratios.
+    # Leave dark texels out: small errors there are large ratios.
     lit = (value > 0) & (truth > 0.1 * np.median(truth))
-    if lit.sum() < _ENOUGH:
+    if lit.sum() < _MIN_TEXELS:
         return None
     x, y = np.log(truth[lit]), np.log(value[lit])
     if np.ptp(x) < 0.5:
         return None
-    left = []
+    residual = []
     for power in _POWERS:
         rest = y - power * x
-        left.append(float(np.minimum(np.abs(rest - np.median(rest)), _FAR).mean()))
-    best = int(np.argmin(left))
-    true = len(_POWERS) // 2
-    return float(_POWERS[best]) if left[best] < 0.5 * left[true] else 1.0
+        residual.append(float(np.minimum(np.abs(rest - np.median(rest)), _MAX_RESIDUAL).mean()))
+    best = int(np.argmin(residual))
+    one = len(_POWERS) // 2
+    return float(_POWERS[best]) if residual[best] < 0.5 * residual[one] else 1.0

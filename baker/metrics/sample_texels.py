@@ -1,35 +1,48 @@
-"""Which texels are judged: all objects and brightnesses, evenly by area; more where a light level has few."""
+"""Random choice of the texels that are compared: stratified by object, area and brightness."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Every object gets this many texels, as long as that leaves three quarters of them to be shared out by area.
-_LEAST = 8
-# Light levels for each factor of ten.
+# Texels that every object gets, as long as three quarters of all texels are distributed by area.
+_MIN_PER_OBJECT = 8
+# Light levels in each factor of ten.
 LEVELS = 2
 
 
 def choose_texels(
-    owner: NDArray[np.int32], judged: NDArray[np.bool_], brightness: NDArray[np.float64], n: int, seed: int
+    owner: NDArray[np.int32],
+    eligible: NDArray[np.bool_],
+    brightness: NDArray[np.float64],
+    n: int,
+    seed: int,
 ) -> NDArray[np.int64]:
-    """Return texel numbers, rising: about n of those that may be judged.
+    """Choose about n texels at random, stratified by object and brightness.
 
     Parameters
     ----------
     owner : (N,) int32
         Object of each texel, -1 for none.
-    judged : (N,) bool
+    eligible : (N,) bool
         Texels that may be chosen.
     brightness : (N,) float64
-        Each object's texels are taken evenly over their order by this.
+        Each object's texels are sorted by this and divided into strata of equal size, one chosen in each.
+    n : int
+        Number of texels, approximately.
+    seed : int
+        Seed of the random choice.
+
+    Returns
+    -------
+    (m,) int64, ascending
+        Indices of the chosen texels.
     """
-    candidate = np.flatnonzero(judged & (owner >= 0))
+    candidate = np.flatnonzero(eligible & (owner >= 0))
     if len(candidate) <= n:
         return candidate
     objects, count = np.unique(owner[candidate], return_counts=True)
-    floor = np.minimum(count, min(_LEAST, max(n // (4 * len(objects)), 1)))
+    floor = np.minimum(count, min(_MIN_PER_OBJECT, max(n // (4 * len(objects)), 1)))
     left = count - floor
     share = floor + np.floor(max(n - floor.sum(), 0) * left / max(left.sum(), 1)).astype(np.int64)
     random = np.random.Generator(np.random.PCG64([seed, 6]))
@@ -38,33 +51,58 @@ def choose_texels(
     chosen = []
     for first, size, wanted in zip(begin, count, np.minimum(share, count), strict=True):
         edge = np.linspace(0, size, wanted + 1)
-        # One texel from each of `wanted` equal parts of the object's order.
+        # Choose one texel in each of `wanted` strata of equal size.
         at = np.floor(edge[:-1] + random.random(wanted) * np.diff(edge)).astype(np.int64)
         chosen.append(order[first + np.unique(np.minimum(at, size - 1))])
     return np.sort(np.concatenate(chosen))
 
 
 def light_level(light: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the level of each light (n,): half a power of ten; all that is nearly black is one."""
-    lit = light[light > 0]
-    least = 1e-7 * float(lit.max()) if len(lit) else 1.0
-    return np.asarray(np.floor(LEVELS * np.log10(np.maximum(light, least))), np.int64)
-
-
-def scarce_texels(
-    judged: NDArray[np.bool_], brightness: NDArray[np.float64], chosen: NDArray[np.int64], n: int, seed: int
-) -> NDArray[np.int64]:
-    """Return texel numbers, rising, that bring each light level to n, as far as it has texels.
+    """Return the light level of values: floor(2 log10 light).
 
     Parameters
     ----------
-    judged : (N,) bool
+    light : (n,) float64
+        Light values; below 1e-7 of the largest they count as that.
+
+    Returns
+    -------
+    (n,) int64
+        Number of the level, negative below 1.
+    """
+    lit = light[light > 0]
+    darkest = 1e-7 * float(lit.max()) if len(lit) else 1.0
+    return np.asarray(np.floor(LEVELS * np.log10(np.maximum(light, darkest))), np.int64)
+
+
+def scarce_texels(
+    eligible: NDArray[np.bool_],
+    brightness: NDArray[np.float64],
+    chosen: NDArray[np.int64],
+    n: int,
+    seed: int,
+) -> NDArray[np.int64]:
+    """Choose further texels so that each light level has n, or all that there are.
+
+    Parameters
+    ----------
+    eligible : (N,) bool
         Texels that may be chosen.
     brightness : (N,) float64
+        Determines the light level; texels that are 0 are not chosen.
     chosen : (m,) int64
-        Texels that are judged already.
+        Texels that are chosen already.
+    n : int
+        Texels of each light level, with those that are chosen already.
+    seed : int
+        Seed of the random choice.
+
+    Returns
+    -------
+    (k,) int64, ascending
+        Indices of the further texels.
     """
-    candidate = np.flatnonzero(judged & (brightness > 0))
+    candidate = np.flatnonzero(eligible & (brightness > 0))
     level = light_level(brightness[candidate])
     new = ~np.isin(candidate, chosen)
     random = np.random.Generator(np.random.PCG64([seed, 15]))

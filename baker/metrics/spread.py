@@ -1,22 +1,22 @@
-"""The error that values have of their own, beside the known noise of the reference they are held against.
+"""The own error of values: their spread about the truth, without the known noise of the reference.
 
-For a group of n places with values v, reference r and its standard error s let c = max((v + r) / 2, floor),
-and a the median of (v - r) / c, weighed by 1 / max(s / c, 0.02). The own error b, relative, solves
+For a group of n points with values v, reference r and its standard error s let c = max((v + r) / 2, floor),
+and a the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own error b, relative, solves
 
     mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
 
-so that b^2 is the variance of the values about the truth if both errors are normal: places of much noise
-count less than those of little, and a few places that are far off (shadow edges, mouths of gaps) count as
-being two standard deviations off. b is 0 where the noise of the reference explains all.
+so that b^2 is the variance of the values about the truth if both errors are normal. Points with much noise
+weigh less than those with little, and points that are far off (shadow edges, entrances of gaps) count as two
+standard deviations off. b is 0 where the noise of the reference explains all differences.
 
-A shift a that all places have in common is not part of b. It is judged as bias; and in a group that light
-reaches by rare paths the places that saw none of them are all off by what these bring, in one direction.
+A shift a that all points have in common is bias and not part of b. In a group that light reaches by rare
+paths, the points that no such path reached are all off by the light of these paths, in one direction.
 
-s is what passes show, times f: two independent halves of the reference, compared, tell how far that is from
-what their difference shows, by the same equation with b = 0. It is at least 1.
+s is the standard error that passes show. The factor f, at least 1, corrects it: f solves the same equation
+with b = 0 for half the difference of two independent halves of the reference.
 
-psi is bounded, so its mean over n places is known to a standard error whatever the distribution of the errors
-is, and b is between the solutions for E psi + and - that many standard errors.
+psi is bounded, so the mean over n points has a known standard error for any distribution of the errors. The
+bounds of b solve the equation for E psi plus and minus z of these standard errors.
 
 Based on: Huber and Ronchetti, Robust Statistics, 2009, chapter 5 (M-estimators of scale).
 """
@@ -29,26 +29,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Squares of errors, in variances, count up to this; what they then are on average for normal errors.
-_MOST = 4.0
+# Bound of psi, and E psi(z^2) for normal z.
+_PSI_BOUND = 4.0
 _EXPECTED = (
-    math.erf(math.sqrt(_MOST / 2))
-    - math.sqrt(2 * _MOST / math.pi) * math.exp(-_MOST / 2)
-    + _MOST * math.erfc(math.sqrt(_MOST / 2))
+    math.erf(math.sqrt(_PSI_BOUND / 2))
+    - math.sqrt(2 * _PSI_BOUND / math.pi) * math.exp(-_PSI_BOUND / 2)
+    + _PSI_BOUND * math.erfc(math.sqrt(_PSI_BOUND / 2))
 )
-_HALVINGS = 40
-# Places known better than this weigh alike in the median.
+_BISECTIONS = 40
+# Points with less relative noise have equal weights in the median.
 _SHARP = 0.02
-# No error is taken to be larger; a reference without noise is taken to have this much.
+# Largest own error, and smallest relative noise of a reference.
 _LARGEST, _SMALLEST = 4.0, 1.0e-6
 
 
 class Spread(NamedTuple):
-    """An own error, relative; and between which values it lies."""
+    """An own error, relative, with its lower and upper bound."""
 
     own: float
-    least: float
-    most: float
+    lower: float
+    upper: float
 
 
 def own_error(
@@ -59,19 +59,25 @@ def own_error(
     floor: float,
     z: float,
 ) -> Spread:
-    """Return the own error of a group of places.
+    """Return the own error of a group of points.
 
     Parameters
     ----------
-    value, reference : (n,)
-    noise : (n,)
+    value, reference : (n,) float64
+        Values and reference values.
+    noise : (n,) float64
         Standard errors of the reference, as its passes show them.
-    apart : (n,)
-        Half of the difference of two halves of the reference: an error like that of their mean.
+    apart : (n,) float64
+        Half the difference of two halves of the reference: an error like that of their mean.
     floor : float
-        Errors are relative to at least this light.
+        Smallest light that errors are relative to.
     z : float
         Half the width of the bounds, in standard errors.
+
+    Returns
+    -------
+    Spread
+        The own error b and its bounds.
     """
     scale = np.maximum(0.5 * (value + reference), max(floor, 1e-30))
     error = (value - reference) / scale
@@ -82,27 +88,28 @@ def own_error(
 
 
 def _median(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    """Return the weighted median of (n,)."""
     order = np.argsort(value, kind="stable")
     below = np.cumsum(weight[order])
     return float(value[order[np.searchsorted(below, 0.5 * below[-1])]])
 
 
 def _root(error: NDArray[np.float64], known: NDArray[np.float64], z: float, *, factor: bool = False) -> float:
-    """Return for which b the mean of psi is as expected, z standard errors of it less.
+    """Return the b at which the mean of psi less z of its standard errors equals its expectation.
 
-    With `factor` b multiplies the known errors (n,), else its square is added to theirs.
+    With `factor` b multiplies the known errors (n,), otherwise b^2 is added to their squares.
     """
     low, high = 0.0, _LARGEST
 
     def beyond(b: float) -> bool:
         variance = (b * known) ** 2 + 1e-30 if factor else b * b + known**2
-        psi = np.minimum(error**2 / variance, _MOST)
+        psi = np.minimum(error**2 / variance, _PSI_BOUND)
         spread = float(psi.std()) / math.sqrt(len(psi))
         return float(psi.mean()) - z * spread > _EXPECTED
 
     if not beyond(low):
         return 0.0
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if beyond(middle) else (low, middle)
     return low

@@ -1,7 +1,7 @@
-"""Which object lies under each texel, and places spread over a texel's own area.
+"""The object that each texel lies on, and random points on the surface inside texels.
 
-The bake finds the same things on its way; this is written apart from it, from `scene.glb`'s uv alone, so
-that a mistake there is not made twice.
+This is independent of the rasteriser of the bake and uses the uv of `scene.glb` only, so that a fault there
+is not repeated here.
 """
 
 from __future__ import annotations
@@ -16,29 +16,32 @@ from baker.kernels.clip import MAX_CORNERS
 from baker.kernels.surface import ROUNDING
 from baker.metrics.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 
-# Less of a texel's square than this is no surface to be judged.
-_LEAST = 1.0e-3
+# Smallest share of a texel's square that counts as surface.
+_MIN_AREA = 1.0e-3
+# Share of a texel's square from which it counts as covered as a whole.
 _WHOLE = 0.98
-# A vertex whose normal leans further from the face than this (cosine) belongs to a hard edge: no lift.
-_HARD = 0.7
+# No lift from vertices whose normal deviates from the face normal by more than this (cosine): a hard edge,
+# not a smooth surface.
+_HARD_EDGE = 0.7
 
 
 @dataclass(frozen=True)
-class TexelPlaces:
-    """Points on the surface inside texels.
+class SurfacePoints:
+    """k points on the surface inside each of n texels.
 
     Attributes
     ----------
-    position, normal, face_normal : (n, k, 3) float64
-        World; `normal` is the shading normal, both on the triangle's front. Places lie on the curved surface
-        that the shading normals suggest, as those of the bake do: on a facet itself, half of what a curved
-        surface sees would be behind the next facet.
+    position : (n, k, 3) float64, metres, world, relative to the geometry's origin
+        On the curved surface that the shading normals describe, as the points of the bake are. From points
+        on the facet itself neighbouring facets would hide a part of the view.
+    normal, face_normal : (n, k, 3) float64, unit, world
+        Shading normal and normal of the triangle, both on its front.
     area : (n,) float64
         Share of the texel's square that surface covers.
-    surface : (n,) float64
-        That surface's size in the world, m2.
-    middle : (n, 2) float64
-        Mean of the places from the texel's centre, (column, row), texels; 0 where all of it is covered.
+    surface : (n,) float64, m2
+        World area of that surface.
+    offset : (n, 2) float64, texels
+        Mean of the points relative to the texel's centre, (column, row); 0 for texels covered as a whole.
     """
 
     position: NDArray[np.float64]
@@ -46,34 +49,58 @@ class TexelPlaces:
     face_normal: NDArray[np.float64]
     area: NDArray[np.float64]
     surface: NDArray[np.float64]
-    middle: NDArray[np.float64]
+    offset: NDArray[np.float64]
 
 
 def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[np.int32]:
-    """Return (P, H, W) int32: the instance that covers most of each texel, -1 where none lies."""
+    """Return the instance that covers most of each texel.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        With the lightmap uv of the bake.
+    n_pages : int
+        Number of pages, P.
+    resolution : int, texels
+        Width and height of a page.
+
+    Returns
+    -------
+    (P, H, W) int32
+        Index of the instance, -1 for none.
+    """
     owner = np.full(n_pages * resolution * resolution, -1, np.int32)
-    most = np.full(len(owner), _LEAST, np.float32)
+    most = np.full(len(owner), _MIN_AREA, np.float32)
     texel_owners(geometry.uv, geometry.triangle, geometry.page, geometry.instance, resolution, owner, most)
     return owner.reshape(n_pages, resolution, resolution)
 
 
-def texel_places(
-    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_places: int, seed: int
-) -> TexelPlaces:
-    """Spread places over the surface inside texels, uniform in the area it takes of their squares.
+def surface_points(
+    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_points: int, seed: int
+) -> SurfacePoints:
+    """Choose random points on the surface inside texels, uniformly in the area of the texels' squares.
 
     Parameters
     ----------
     geometry : Geometry
         With the lightmap uv of the bake.
     pixel : (n,) int64
-        (page * resolution + row) * resolution + column; each once.
-    n_places : int
-        Places of each texel.
+        (page * resolution + row) * resolution + column, without duplicates.
+    resolution : int, texels
+        Width and height of a page.
+    n_points : int
+        Points in each texel.
+    seed : int
+        Seed of the random choice.
+
+    Returns
+    -------
+    SurfacePoints
+        n x `n_points` points.
     """
-    found, weight, covered, middle = _spread(geometry, pixel, resolution, n_places, seed)
-    # A whole texel's places lie around its centre but for their own scatter.
-    middle = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
+    found, weight, covered, middle = _spread(geometry, pixel, resolution, n_points, seed)
+    # The points of a texel that is covered as a whole represent its centre.
+    offset = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
     corner = geometry.triangle[found]
     position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
     normal = (geometry.normal[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
@@ -81,12 +108,12 @@ def texel_places(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    # Off large triangles by some of their float32 steps: whoever starts rays here does not know their size.
+    # Offset the points by some float32 spacings of their triangle's size, which callers do not have.
     edge = geometry.position[corner[..., 1:]].astype(np.float64) - geometry.position[corner[..., :1]]
     position += lift(geometry, corner, weight, position, face)
     position += ROUNDING * np.abs(edge).max(axis=(2, 3))[..., None] * face
     surface = covered * square_metres(geometry, found, resolution).mean(axis=1)
-    return TexelPlaces(position, normal, face, covered, surface, middle)
+    return SurfacePoints(position, normal, face, covered, surface, offset)
 
 
 def lift(
@@ -96,26 +123,55 @@ def lift(
     position: NDArray[np.float64],
     face: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return by what vectors (n, k, 3) places lie below the curved surface that the shading normals suggest.
+    """Return the vectors (n, k, 3) from points to the curved surface that the shading normals describe.
 
-    That surface is the weighted mean of a place's projections onto the tangent planes of the three corners,
-    of those planes that it lies below.
+    The vector is the sum, weighted by barycentric coordinates, of the vectors to the tangent planes of the
+    three corners, without those planes that the point is above.
 
     Parameters
     ----------
-    corner : (n, k, 3), vertices; weight : (n, k, 3), of these; position, face : (n, k, 3)
+    geometry : Geometry
+        The triangles.
+    corner : (n, k, 3) int32
+        Vertices of each point's triangle.
+    weight : (n, k, 3) float64
+        Barycentric coordinates.
+    position : (n, k, 3) float64, metres, world, relative to the geometry's origin
+        The points on the facets.
+    face : (n, k, 3) float64, unit
+        Normals of the triangles.
+
+    Returns
+    -------
+    (n, k, 3) float64, metres
+        Vectors to add to the positions.
     """
     result = np.zeros_like(position)
     for i in range(3):
         normal = geometry.normal[corner[..., i]].astype(np.float64)
         below = ((position - geometry.position[corner[..., i]]) * normal).sum(axis=2)
-        soft = (normal * face).sum(axis=2) > _HARD
+        soft = (normal * face).sum(axis=2) > _HARD_EDGE
         result += (weight[..., i] * np.where(soft, np.maximum(-below, 0.0), 0.0))[..., None] * normal
     return result
 
 
 def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:
-    """Return how many m2 of the world one texel's square is on triangles (n, k)."""
+    """Return the world area of one texel's square on triangles.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        With the lightmap uv of the bake.
+    triangle : (n, k) int64
+        Triangles that cover some of a page.
+    resolution : int, texels
+        Width and height of a page.
+
+    Returns
+    -------
+    (n, k) float64, m2
+        Areas.
+    """
     corner = geometry.triangle[triangle]
     one, two = (
         geometry.position[corner[..., k]].astype(np.float64) - geometry.position[corner[..., 0]]
@@ -124,28 +180,41 @@ def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: i
     u, v = ((geometry.uv[corner[..., k]].astype(np.float64) - geometry.uv[corner[..., 0]]) for k in (1, 2))
     texels = np.abs(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]) * resolution**2
     world = np.linalg.norm(np.cross(one, two), axis=-1)
-    # Places lie where a triangle takes some of the page, so its uv area is not zero.
+    # The uv area is above 0, since points are chosen in proportion to it.
     return np.asarray(world / np.maximum(texels, 1e-12), np.float64)
 
 
-def texel_points(
+def one_surface_point(
     geometry: Geometry, pixel: NDArray[np.int64], resolution: int, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return one point on the surface inside each texel: its triangle (n,) and the corners' weights (n, 3).
+    """Choose one random point on the surface inside each texel.
 
     Parameters
     ----------
-    geometry, pixel, resolution, seed
-        As of `texel_places`; each texel must hold some surface.
+    geometry : Geometry
+        With the lightmap uv of the bake.
+    pixel : (n,) int64
+        (page * resolution + row) * resolution + column; each must lie on some surface.
+    resolution : int, texels
+        Width and height of a page.
+    seed : int
+        Seed of the random choice.
+
+    Returns
+    -------
+    triangle : (n,) int64
+        Triangle of each point.
+    weight : (n, 3) float64
+        Barycentric coordinates.
     """
     found, weight, _, _ = _spread(geometry, pixel, resolution, 1, seed)
     return found[:, 0], weight[:, 0]
 
 
 def _spread(
-    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_places: int, seed: int
+    geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_points: int, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return triangles (n, k), weights (n, k, 3), area in all (n,), mean place in the texel (n, 2)."""
+    """Return triangles (n, k), weights (n, k, 3), total area (n,) and mean point in the texel (n, 2)."""
     wanted = np.full((int(geometry.page.max(initial=0)) + 1) * resolution * resolution, -1, np.int32)
     wanted[pixel] = np.arange(len(pixel), dtype=np.int32)
     count = np.zeros(len(pixel), np.int64)
@@ -158,12 +227,12 @@ def _spread(
     triangle, corners = np.zeros(total, np.int64), np.zeros(total, np.int64)
     polygon, area = np.zeros((total, MAX_CORNERS, 2)), np.zeros(total)
     texel_pieces(*arrays, start[:-1].copy(), triangle, corners, polygon, np.zeros(1, np.int64), area)
-    random = np.random.Generator(np.random.PCG64([seed, 7])).random((len(pixel), n_places, 3))
-    # Even shares of the area, in random order, so that few passes already see all of a texel.
-    random[..., 0] = (np.arange(n_places) + random[..., 0]) / n_places
+    random = np.random.Generator(np.random.PCG64([seed, 7])).random((len(pixel), n_points, 3))
+    # Stratify by area, in random order, so that few passes already sample all parts of a texel.
+    random[..., 0] = (np.arange(n_points) + random[..., 0]) / n_points
     random[..., 0] = np.random.Generator(np.random.PCG64([seed, 8])).permuted(random[..., 0], axis=1)
-    found = np.zeros((len(pixel), n_places), np.int64)
-    weight = np.zeros((len(pixel), n_places, 3))
+    found = np.zeros((len(pixel), n_points), np.int64)
+    weight = np.zeros((len(pixel), n_points, 3))
     covered, middle = np.zeros(len(pixel)), np.zeros((len(pixel), 2))
     spread_pieces(
         geometry.uv, geometry.triangle, resolution, pixel, start, triangle, corners, polygon, area,
@@ -173,28 +242,31 @@ def _spread(
 
 
 def look_up(
-    pages: NDArray[np.float32], pixel: NDArray[np.int64], middle: NDArray[np.float64]
+    pages: NDArray[np.float32], pixel: NDArray[np.int64], offset: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Read maps bilinearly, as engines do, beside the centres of texels.
+    """Look maps up bilinearly, as engines do, at offsets from the centres of texels.
 
     Parameters
     ----------
     pages : (P, H, W, C) float32
+        Pages of a channel.
     pixel : (n,) int64
-    middle : (n, 2) float64
-        Where in relation to the texel's centre, (column, row), texels, -0.5 to 0.5.
+        (page * H + row) * W + column.
+    offset : (n, 2) float64, texels, -0.5 to 0.5
+        (column, row), relative to the texel's centre.
 
     Returns
     -------
     value : (n, C) float64
+        Interpolated values.
     """
     height, width = pages.shape[1:3]
     page, rest = np.divmod(pixel, height * width)
     row, column = np.divmod(rest, width)
-    # The neighbours that the place leans towards, and how far.
-    down, right = np.where(middle[:, 1] < 0, -1, 1), np.where(middle[:, 0] < 0, -1, 1)
+    # Find the neighbours on the side of the offset, and their weights.
+    down, right = np.where(offset[:, 1] < 0, -1, 1), np.where(offset[:, 0] < 0, -1, 1)
     lower, beside = np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1)
-    y, x = np.abs(middle[:, 1])[:, None], np.abs(middle[:, 0])[:, None]
+    y, x = np.abs(offset[:, 1])[:, None], np.abs(offset[:, 0])[:, None]
     above = (1 - x) * pages[page, row, column] + x * pages[page, row, beside]
     below = (1 - x) * pages[page, lower, column] + x * pages[page, lower, beside]
     return np.asarray((1 - y) * above + y * below, np.float64)
@@ -203,7 +275,22 @@ def look_up(
 def look_up_uv(
     pages: NDArray[np.float32], page: NDArray[np.int32], uv: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Read maps (P, H, W, C) bilinearly at lightmap uv (n, 2) of pages (n,); return (n, C)."""
+    """Look maps up bilinearly at lightmap uv.
+
+    Parameters
+    ----------
+    pages : (P, H, W, C) float32
+        Pages of a channel.
+    page : (n,) int32
+        Page of each point.
+    uv : (n, 2) float64, 0 to 1
+        Lightmap uv of each point.
+
+    Returns
+    -------
+    value : (n, C) float64
+        Interpolated values.
+    """
     height, width = pages.shape[1:3]
     at = uv * (width, height)
     texel = np.clip(np.floor(at), 0, (width - 1, height - 1))

@@ -1,4 +1,4 @@
-"""The texels at which a bake is furthest from its reference."""
+"""The texels with the largest significant errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from baker.core.scene import Instance
 from baker.metrics.error_metrics import dark_floor, relative_error
 
-_WORST = 10
+# Largest number of texels returned.
+_COUNT = 10
 
 
 def worst_texels(
@@ -22,20 +23,27 @@ def worst_texels(
     position: NDArray[np.float64],
     channels: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
-    """Return the texels of the largest error, beyond three standard errors of the reference, worst first.
+    """Return the ten texels whose relative error less three standard errors of the reference is largest.
 
     Parameters
     ----------
     instances : sequence of Instance
-    size : int
+        Instances of the scene.
+    size : int, texels
         Width and height of a page.
     pixel : (n,) int64
         (page * size + row) * size + column.
     owner : (n,) int32
         Instance of each texel.
-    position : (n, 3) float64
-        World.
-    channels : mapping of name to an object with `value`, `reference`, `standard_error`, (n, C) each
+    position : (n, 3) float64, metres, world
+        Position of each texel.
+    channels : mapping of str to object
+        By name of channel, objects with `value`, `reference`, `standard_error`, (n, C) float64 each.
+
+    Returns
+    -------
+    list of dict
+        As in the JSON of `verify`, worst first.
     """
     found = []
     for name, check in channels.items():
@@ -43,7 +51,7 @@ def worst_texels(
         error = relative_error(check.value, check.reference, floor)
         noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
         sure = error - 3.0 * noise / np.maximum(check.reference.mean(axis=1), max(floor, 1e-12))
-        for i in np.argsort(-sure, kind="stable")[:_WORST]:
+        for i in np.argsort(-sure, kind="stable")[:_COUNT]:
             page, rest = divmod(int(pixel[i]), size * size)
             instance = instances[int(owner[i])]
             found.append(
@@ -66,4 +74,4 @@ def worst_texels(
     for entry in found:
         entry["standard_error"], entry["error"] = float(entry["standard_error"]), float(entry["error"])
         del entry["sure"]
-    return found[:_WORST]
+    return found[:_COUNT]

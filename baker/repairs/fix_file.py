@@ -17,7 +17,7 @@ from baker.core.stage import Stage
 from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
-from baker.io.gltf.write_fixed import write_mended
+from baker.io.gltf.write_fixed import write_fixed
 from baker.io.gltf.write_source import source_glb
 from baker.io.load import IMPORTERS, SceneFile, load_scene
 from baker.repairs.inside_out import faces_to_flip
@@ -188,7 +188,7 @@ def _fix(
         left += [LeftAlone(name, node, reason) for reason in plan.left]
     report(progress, Stage.FIX, 1.0)
     if edited or data is None:
-        data = write_mended(source, edited)
+        data = write_fixed(source, edited)
     return FixResult(data, tuple(fixed), tuple(left))
 
 
@@ -208,7 +208,7 @@ def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
         fixed += [Fix(name, node, change) for change in repair.changes]
         left += [LeftAlone(name, node, reason) for reason in repair.left]
     report(progress, Stage.REPAIR, 1.0)
-    return FixResult(write_mended(source, made) if made else first.data, tuple(fixed), tuple(left))
+    return FixResult(write_fixed(source, made) if made else first.data, tuple(fixed), tuple(left))
 
 
 def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:

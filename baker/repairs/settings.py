@@ -21,6 +21,6 @@ class RepairSettings(Settings):
     resolution: int = setting(
         1024, "Page width for which lightmap uv are tested and made.", unit="texels", ge=16, le=16384
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of OBJ, PLY, STL and OFF files.")
-    scale: float = setting(1.0, "Metres per unit of OBJ, PLY, STL and OFF files.", unit="m", gt=0)
+    up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")
+    scale: float = setting(1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0)
     threads: int | None = threads_setting()

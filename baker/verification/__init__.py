@@ -1,1 +1,1 @@
-"""Judges a finished bake against the path tracer."""
+"""Compares a finished bake with path-traced reference values."""

@@ -1,4 +1,4 @@
-"""Small pictures of the map around its worst texels, beside the same texels path-traced, and their FLIP."""
+"""Crops of the map around its worst texels beside path-traced values of the same texels, with FLIP errors."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
-from baker.metrics.texel_area import texel_places
+from baker.metrics.texel_area import surface_points
 from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.scene import Reference
 
+# Width and height of a crop, texels.
 SIZE = 24
-_MOST = 3
-_PASSES, _PLACES = 16, 16
+_MAX_CROPS = 3
+# Passes of the path tracer, and points in each texel.
+_PASSES, _POINTS = 16, 16
 
 
 @dataclass(frozen=True)
@@ -33,11 +35,11 @@ class Crop:
     ----------
     channel : str
     page, row, column : int
-        Its first texel.
+        First texel of the window.
     stored, reference : (h, w, C) float32
-        0 where no surface is.
+        0 on texels without surface.
     error : (h, w) float32
-        FLIP.
+        FLIP error map.
     flip : float
         Mean of `error`.
     """
@@ -66,22 +68,37 @@ def trace_crops(
 
     Parameters
     ----------
+    bake : StoredBake
+        The verified bake.
+    geometry : Geometry
+        Its triangles.
+    reference : Reference
+        The scene of the path tracer.
     worst : list of dict
-        Worst first; windows that overlap an earlier one of the same channel are left out.
+        Worst texels, worst first; windows that overlap an earlier one of the same channel are left out.
     bounces : int or None
-        As of `irradiance_pass`.
+        Reflections, as of `irradiance_pass`.
+    seed : int
+        Seed of the random numbers.
     seconds : float or None
-        Time after which no further pass is begun; each crop gets one.
+        Time after which no further pass starts; each crop gets at least one.
+    progress : Progress
+        Receives reports, and may cancel.
+
+    Returns
+    -------
+    list of Crop
+        At most three.
     """
     crops: list[Crop] = []
     end = np.inf if seconds is None else time.monotonic() + seconds
     for entry in worst:
-        if len(crops) == _MOST:
+        if len(crops) == _MAX_CROPS:
             break
         corner = _corner(entry["row"], bake.atlas.resolution), _corner(entry["column"], bake.atlas.resolution)
         if any(_overlap(crop, entry, corner) for crop in crops):
             continue
-        report(progress, Stage.CROPS, len(crops) / _MOST)
+        report(progress, Stage.CROPS, len(crops) / _MAX_CROPS)
         crops.append(_trace(bake, geometry, reference, entry, corner, bounces, seed, end))
     return crops
 
@@ -110,14 +127,14 @@ def _trace(
     on = np.isin(bake.status[page][window], (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     row, column = np.nonzero(on)
     pixel = (page * size + corner[0] + row) * size + corner[1] + column
-    places = texel_places(geometry, pixel.astype(np.int64), size, _PLACES, seed)
-    where = (places.position, places.normal, places.face_normal)
+    points = surface_points(geometry, pixel.astype(np.int64), size, _POINTS, seed)
+    where = (points.position, points.normal, points.face_normal)
     stored = bake.maps[entry["channel"]][page][window] * on[..., None]
     truth = np.zeros_like(stored)
     occlusion = entry["channel"] == "ao"
     estimate = new_estimate(len(pixel), 1 if occlusion else 3)
-    reach = bake.manifest.get("settings", {}).get("ao_distance_metres")
-    distance = np.inf if reach is None else float(reach)
+    metres = bake.manifest.get("settings", {}).get("ao_distance_metres")
+    distance = np.inf if metres is None else float(metres)
     for _ in range(_PASSES):
         if occlusion:
             ambient_occlusion_pass(reference, estimate, *where, distance=distance, seed=seed)

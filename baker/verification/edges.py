@@ -1,9 +1,9 @@
-"""Points of the surface at chart borders, near walls and between texels, as an engine looks them up.
+"""Points at chart borders, next to walls and between texels, for comparison with bilinear lookups.
 
-An engine looks the map up bilinearly at any point of the surface. There the four texels around it take part:
-covered, filled or dilated, whatever they are. What such a lookup should find is the mean light of the places
-that these four stand for, weighed as the lookup weighs them: only places of the same surface that the point
-sees, or a lookup at the foot of a wall would be held against the light behind the wall.
+An engine looks the map up bilinearly at any point of the surface. The four texels around it contribute,
+whether they are covered, filled or dilated. The reference of such a lookup is the mean light at points inside
+these four texels, with the weights of the lookup. Only points of the same surface that the looked-up point
+sees are used; otherwise a lookup next to a wall would be compared with light behind the wall.
 """
 
 from __future__ import annotations
@@ -16,49 +16,60 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from baker.core.geometry import Geometry
 from baker.metrics.sample_texels import choose_texels
-from baker.metrics.texel_area import TexelPlaces, square_metres, texel_places, texel_points
+from baker.metrics.texel_area import SurfacePoints, one_surface_point, square_metres, surface_points
 from baker.pathtracer.scene import Reference
-from baker.verification.surroundings import buried_places, in_contact, lifted, seen_along
+from baker.verification.surroundings import in_contact, inside_points, lifted, seen_along
 
-# Shares of the points: at the borders of charts, near other surfaces, anywhere.
+# Shares of the points at the borders of charts and near other surfaces; the rest is anywhere.
 _BORDER, _CONTACT = 0.4, 0.5
-# How many texels are looked at for one that lies near another surface.
+# Texels tested for each wanted point near another surface.
 _POOL = 16
-_PLACES, _POOL_PLACES = 16, 8
-# A place belongs to a point's surface if it is this near, in texels, and faces the same way (cosine).
-_REACH, _SAME = 4.0, 0.5
+# Points in each texel of a footprint, and in each tested texel.
+_POINTS_PER_TEXEL, _POOL_POINTS = 16, 8
+# Points belong to the same surface if they are nearer than this, texels, and the cosine of their face normals
+# is larger than this.
+_MAX_TEXELS, _MIN_COSINE = 4.0, 0.5
 
 
 @dataclass(frozen=True)
 class EdgePoints:
-    """Points of the surface, and the places that their lookups should be the mean of.
+    """n points of the surface, with k points each whose mean light is the reference of the lookup.
 
     Attributes
     ----------
     pixel : (n,) int64
+        Texel of each point.
     owner : (n,) int32
-    places : TexelPlaces
-        `middle` is the point in relation to the texel's centre.
+        Object of each point.
+    surface : SurfacePoints
+        The k points; `offset` is the looked-up point relative to the texel's centre.
     """
 
     pixel: NDArray[np.int64]
     owner: NDArray[np.int32]
-    places: TexelPlaces
+    surface: SurfacePoints
 
 
 def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return (P, H, W): the last covered texels of charts, and those beyond them that hold some surface.
+    """Return (P, H, W): the outermost covered texels of charts, and adjoining uncovered texels with surface.
 
-    A texel is the last if a neighbour is not covered, or belongs to another object.
+    A covered texel is outermost if a neighbour is not covered or belongs to another object.
+
+    Parameters
+    ----------
+    owner : (P, H, W) int32
+        Object of each texel, -1 for none.
+    covered : (P, H, W) bool
+        Texels with a measured value.
     """
     own = np.where(covered, owner, -1)
     result = np.zeros(owner.shape, bool)
     for page in range(len(owner)):
         high = maximum_filter(own[page], 3, mode="nearest")
         low = minimum_filter(own[page], 3, mode="nearest")
-        last = covered[page] & (low != high)
+        outermost = covered[page] & (low != high)
         beyond = ~covered[page] & (high == owner[page])
-        result[page] = (owner[page] >= 0) & (last | beyond)
+        result[page] = (owner[page] >= 0) & (outermost | beyond)
     return result
 
 
@@ -68,15 +79,32 @@ def edge_points(
     owner: NDArray[np.int32],
     covered: NDArray[np.bool_],
     n: int,
-    n_places: int,
+    n_points: int,
     seed: int,
 ) -> EdgePoints:
-    """Choose about n points and find what their lookups should find.
+    """Choose about n points, and the points whose mean light is the reference of their lookups.
 
     Parameters
     ----------
-    owner, covered : (P, H, W)
-        Object of each texel, -1 for none; texels that hold a measured value.
+    reference : Reference
+        The scene of the path tracer.
+    geometry : Geometry
+        The triangles of the bake.
+    owner : (P, H, W) int32
+        Object of each texel, -1 for none.
+    covered : (P, H, W) bool
+        Texels with a measured value.
+    n : int
+        Number of points, approximately.
+    n_points : int
+        Points of each footprint, k.
+    seed : int
+        Seed of the random choice.
+
+    Returns
+    -------
+    EdgePoints
+        Points inside geometry are left out.
     """
     size = owner.shape[1]
     flat, usable = owner.reshape(-1), covered.reshape(-1)
@@ -85,24 +113,32 @@ def edge_points(
     pool = choose_texels(flat, usable, even, int(n * _CONTACT * _POOL), seed + 2)
     contact = np.zeros(0, np.int64)
     if len(pool):
-        pool = pool[in_contact(reference, texel_places(geometry, pool, size, _POOL_PLACES, seed), seed)]
+        pool = pool[in_contact(reference, surface_points(geometry, pool, size, _POOL_POINTS, seed), seed)]
         contact = choose_texels(flat, np.isin(np.arange(len(flat)), pool), even, int(n * _CONTACT), seed)
     rest = choose_texels(flat, usable, even, int(n * (1 - _BORDER - _CONTACT)), seed + 3)
     pixel = np.unique(np.concatenate([border, contact, rest]))
     if not len(pixel):
-        return EdgePoints(pixel, flat[pixel], texel_places(geometry, pixel, size, n_places, seed))
+        return EdgePoints(pixel, flat[pixel], surface_points(geometry, pixel, size, n_points, seed))
     point = _points(geometry, pixel, size, seed)
     random = np.random.Generator(np.random.PCG64([seed, 11]))
     where = point.position[:, None], point.normal[:, None], point.face_normal[:, None]
-    seen = ~buried_places(reference, *where, random)[:, 0]
+    seen = ~inside_points(reference, *where, random)[:, 0]
     point, pixel = point.of(seen), pixel[seen]
-    places = _footprints(reference, geometry, point, owner, n_places, seed)
-    return EdgePoints(pixel, flat[pixel], places)
+    surface = _footprints(reference, geometry, point, owner, n_points, seed)
+    return EdgePoints(pixel, flat[pixel], surface)
 
 
 @dataclass(frozen=True)
 class _Points:
-    """Points (n, 3) of the surface; `at` (n, 2): column and row in the page, in texels, not rounded."""
+    """Points of the surface.
+
+    Attributes
+    ----------
+    position, normal, face_normal : (n, 3) float64
+    at : (n, 2) float64, column and row in the page, texels, not rounded
+    page : (n,) int64
+    square : (n,) float64, m2, world area of a texel's square
+    """
 
     position: NDArray[np.float64]
     normal: NDArray[np.float64]
@@ -116,8 +152,8 @@ class _Points:
 
 
 def _points(geometry: Geometry, pixel: NDArray[np.int64], size: int, seed: int) -> _Points:
-    """Return one point inside each texel."""
-    triangle, weight = texel_points(geometry, pixel, size, seed)
+    """Return one random point inside each texel (n,)."""
+    triangle, weight = one_surface_point(geometry, pixel, size, seed)
     corner = geometry.triangle[triangle]
     position, normal, uv = (
         (array[corner].astype(np.float64) * weight[..., None]).sum(axis=1)
@@ -136,44 +172,44 @@ def _footprints(
     geometry: Geometry,
     point: _Points,
     owner: NDArray[np.int32],
-    n_places: int,
+    n_points: int,
     seed: int,
-) -> TexelPlaces:
-    """Return for each point places of the four texels of its lookup, as often as these weigh.
+) -> SurfacePoints:
+    """Return for each point n_points points in the four texels of its lookup, drawn by the lookup's weights.
 
-    Where it sees no place of them the point itself stands for them.
+    Where a point sees none of them, it is used itself.
     """
     size, n = owner.shape[1], len(point.at)
     tap, share = _taps(point, size)
     mine = owner[point.page, np.floor(point.at[:, 1]).astype(int), np.floor(point.at[:, 0]).astype(int)]
     usable = owner.reshape(-1)[tap] == mine[:, None]
-    pixel, place_of = np.unique(tap[usable], return_inverse=True)
-    spread = texel_places(geometry, pixel, size, _PLACES, seed)
+    pixel, number = np.unique(tap[usable], return_inverse=True)
+    spread = surface_points(geometry, pixel, size, _POINTS_PER_TEXEL, seed)
     row, column = np.nonzero(usable)
-    # Candidates (m, _PLACES) of point `row`.
-    position, normal, face = (
-        array[place_of] for array in (spread.position, spread.normal, spread.face_normal)
-    )
+    # Candidates (m, _POINTS_PER_TEXEL) of point `row`.
+    position, normal, face = (array[number] for array in (spread.position, spread.normal, spread.face_normal))
+    # Keep candidates on the same surface that the point sees.
     off = position - point.position[row][:, None]
-    near = np.linalg.norm(off, axis=2) < _REACH * np.sqrt(point.square[row])[:, None]
-    good = near & ((face * point.face_normal[row][:, None]).sum(axis=2) > _SAME)
+    near = np.linalg.norm(off, axis=2) < _MAX_TEXELS * np.sqrt(point.square[row])[:, None]
+    good = near & ((face * point.face_normal[row][:, None]).sum(axis=2) > _MIN_COSINE)
     i, j = np.nonzero(good)
     ends = lifted(reference, position[i, j], face[i, j])
     origin = lifted(reference, point.position[row[i]], point.face_normal[row[i]])
     good[i, j] = seen_along(reference, origin, ends - origin)
-    weight = np.zeros((n, 4, _PLACES))
+    # Distribute the weight of each texel over its candidates, and draw from them.
+    weight = np.zeros((n, 4, _POINTS_PER_TEXEL))
     weight[row, column] = good * (share[row, column] / np.maximum(good.sum(axis=1), 1))[:, None]
-    candidate = np.zeros((n, 4, _PLACES), np.int64)
-    candidate[row, column] = np.arange(len(row))[:, None] * _PLACES + np.arange(_PLACES)
-    drawn, none = _draw(weight.reshape(n, -1), n_places, seed)
+    candidate = np.zeros((n, 4, _POINTS_PER_TEXEL), np.int64)
+    candidate[row, column] = np.arange(len(row))[:, None] * _POINTS_PER_TEXEL + np.arange(_POINTS_PER_TEXEL)
+    drawn, none = _draw(weight.reshape(n, -1), n_points, seed)
     chosen = np.take_along_axis(candidate.reshape(n, -1), drawn, axis=1)
     own = (point.position, point.normal, point.face_normal)
     where = [
         np.where(none[:, None, None], alone[:, None], array.reshape(-1, 3)[chosen] if len(row) else 0.0)
         for alone, array in zip(own, (position, normal, face), strict=True)
     ]
-    places, normals, faces = where
-    return TexelPlaces(places, normals, faces, np.ones(n), point.square, np.mod(point.at, 1.0) - 0.5)
+    positions, normals, faces = where
+    return SurfacePoints(positions, normals, faces, np.ones(n), point.square, np.mod(point.at, 1.0) - 0.5)
 
 
 def _taps(point: _Points, size: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -187,10 +223,10 @@ def _taps(point: _Points, size: int) -> tuple[NDArray[np.int64], NDArray[np.floa
 
 
 def _draw(weight: NDArray[np.float64], n: int, seed: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return n columns of each row of `weight` (m, k), in proportion to it, and which rows have none."""
+    """Draw n columns of each row of `weight` (m, k) in proportion to it; return also which rows are 0."""
     total = weight.sum(axis=1)
     random = np.random.Generator(np.random.PCG64([seed, 12]))
-    # Even shares in random order, so that few passes already see all of a footprint.
+    # Stratify, in random order, so that few passes already sample all parts of a footprint.
     at = random.permuted((np.arange(n) + random.random((len(weight), 1))) / n, axis=1)
     edge = np.cumsum(weight, axis=1) / np.maximum(total, 1e-30)[:, None]
     drawn = (at[:, :, None] > edge[:, None, :]).sum(axis=2)

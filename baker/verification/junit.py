@@ -1,4 +1,4 @@
-"""A verification as JUnit cases: one for each limit."""
+"""A verification as a JUnit report: one test case for each limit."""
 
 from __future__ import annotations
 
@@ -11,6 +11,13 @@ from baker.verification.verify import Verification
 def write_junit(path: Path, found: Verification) -> None:
     """Write the JUnit file.
 
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    found : Verification
+        Result of `verify`.
+
     Raises
     ------
     ResourceError
@@ -22,7 +29,7 @@ def write_junit(path: Path, found: Verification) -> None:
         value = "missing" if verdict.value is None else f"{verdict.value:.6g}"
         problem = ""
         if verdict.failed:
-            remark = found.channels[verdict.limit.channel].remarks.get(verdict.limit.figure)
+            remark = found.channels[verdict.limit.channel].remarks.get(verdict.limit.metric)
             problem = f"{verdict.limit}: it is {value}" + (f"; {remark}" if remark else "")
         cases.append(Case(f"not {verdict.limit}", scene, problem))
     if cases:

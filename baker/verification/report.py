@@ -1,6 +1,6 @@
-"""A verification as one HTML page with its pictures inside: nothing is loaded from anywhere.
+"""A verification as one HTML page with embedded images and without external resources.
 
-Maps are shown as the sRGB curve of value / (value + middle), middle being the median of what is lit.
+Maps are shown with the tone curve value / (value + middle), sRGB-encoded; middle is the median of lit texels.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from baker.io.junit import write_text
 from baker.io.png import encode_png, srgb_levels
 from baker.metrics.error_metrics import dark_floor, relative_error
-from baker.verification.judgements.registry import FIGURE_NAMES
+from baker.verification.criteria.registry import METRIC_NAMES
 from baker.verification.summary import mean_flip, verification_json
 from baker.verification.verify import ChannelCheck, Verification
 
+# Largest side of the image of a page, texels, and largest number of regions listed.
 _SHOWN, _REGIONS = 512, 40
-# Relative errors of these colours' ends: dark blue is none, yellow is this and more.
+# Relative error at the end of the colour scale, yellow.
 _HOT = 0.10
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;margin:1rem 0}
@@ -34,6 +35,13 @@ figure{display:inline-block;margin:.5rem 1rem .5rem 0}figcaption{font-size:13px;
 
 def write_report(path: Path, found: Verification) -> None:
     """Write the page.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    found : Verification
+        Result of `verify`.
 
     Raises
     ------
@@ -52,11 +60,11 @@ def report_html(found: Verification) -> str:
         f"<h1>{scene}: {verdict}</h1>",
         f"<p>{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s,"
         f" {found.compile_seconds:.0f} s of compiling before."
-        f" {found.invalid} buried texels are not judged.</p>",
+        f" {found.invalid} invalid texels are not compared.</p>",
         _failures(found),
         _limits_table(found),
         _regions_table(found),
-        _figures_table(found),
+        _metrics_table(found),
     ]
     for name, check in found.channels.items():
         parts.append(f"<h2>{html.escape(name)}</h2>")
@@ -108,18 +116,18 @@ def _regions_table(found: Verification) -> str:
         for title in ("region", "texels", "m2", "light", "bias", "colour", "typical (noise)")
     )
     note = (
-        "<p>Each region is held against its own light: a room, as seen from one point, or those of its texels"
-        " that are lit alike. Worst first; what may be chance counts as nothing.</p>"
+        "<p>Deviations of a region are relative to its own light. A region is a room, as seen from one point,"
+        " or its texels of a light level. Worst first; what may be chance counts as nothing.</p>"
     )
     return f"<h2>Regions</h2>{note}<div class=wide><table><tr>{head}</tr>{rows}</table></div>"
 
 
-def _figures_table(found: Verification) -> str:
-    # A row for each figure: side by side they are wider than a page.
+def _metrics_table(found: Verification) -> str:
+    # One row for each metric: columns would be wider than a page.
     head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
     rows = ""
-    for key in FIGURE_NAMES:
-        cells = "".join(f"<td>{_number(check.figures[key])}</td>" for check in found.channels.values())
+    for key in METRIC_NAMES:
+        cells = "".join(f"<td>{_number(check.metrics[key])}</td>" for check in found.channels.values())
         rows += f"<tr><td>{key}</td>{cells}</tr>"
     cells = "".join(f"<td>{_number(mean_flip(found, name))}</td>" for name in found.channels)
     rows += f"<tr><td>flip</td>{cells}</tr>"
@@ -127,7 +135,7 @@ def _figures_table(found: Verification) -> str:
         "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's "
         "own noise adds to the median. energy_ratio is all that the map holds over all that path "
         "tracing finds, by area, with its standard error. flip is the mean over the pictures of the worst "
-        "places below.</p>"
+        "texels below.</p>"
     )
     return f"<table><tr><th>figure</th>{head}</tr>{rows}</table>{note}"
 
@@ -139,7 +147,7 @@ def _number(value: Any) -> str:
 
 
 def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
-    """Return each page, and where on it the judged texels are how wrong."""
+    """Return an image of each page, and a map of the errors of the compared texels."""
     size = found.bake.atlas.resolution
     step = max(size // _SHOWN, 1)
     usual = _usual(check.reference)
@@ -151,11 +159,11 @@ def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
         heat = np.full((*stored.shape[:2], 3), 24, np.uint8)
         mine = found.pixel // (size * size) == page
         row, column = np.divmod(found.pixel[mine] % (size * size), size)
-        # Dots of three pixels, the worst on top.
+        # Draw dots of three pixels, the worst last.
         for i in np.argsort(error[mine], kind="stable"):
             y, x = row[i] // step, column[i] // step
             heat[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = _heat(float(error[mine][i]))
-        text += _figure(heat, f"error of the judged texels: blue 0, yellow {_HOT:.0%} and more", 1)
+        text += _figure(heat, f"error of the compared texels: blue 0, yellow {_HOT:.0%} and more", 1)
     return text
 
 
@@ -165,7 +173,7 @@ def _heat(error: float) -> tuple[int, int, int]:
 
 
 def _usual(value: NDArray[np.float64]) -> float:
-    """Return the median of the colour means of (n, C) that are not black, 1 if all are."""
+    """Return the median of the colour means of (n, C) above 0; 1 if there are none."""
     mean = value.mean(axis=1)
     return float(np.median(mean[mean > 0])) if (mean > 0).any() else 1.0
 
@@ -184,7 +192,7 @@ def _figure(pixels: NDArray[np.uint8], caption: str, zoom: int) -> str:
 
 
 def _histogram(histogram: dict[str, list[float]]) -> str:
-    """Return the z-scores as bars, with the normal distribution that an exact bake would show."""
+    """Return a histogram of the z-scores, with the normal distribution of a bake without errors."""
     counts, edges = np.array(histogram["counts"]), np.array(histogram["edges"])
     if not counts.sum():
         return ""

@@ -1,4 +1,4 @@
-"""The settings of a verification: how much is path-traced, and the limits on the figures."""
+"""Settings of `verify`: how much is path-traced, and the limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class VerifySettings(Settings):
     what: ClassVar[str] = "verify setting"
 
     texels: int = setting(
-        2000, "Texels compared at their centres; points at edges and suspects come on top.", ge=1
+        2000, "Texels compared at their centres; points at edges and outliers are added.", ge=1
     )
     spp: int | None = setting(None, "Paths for each texel, whatever its error.", ge=1)
     target_se: float = setting(0.005, "Relative standard error at which a texel is good enough.", gt=0)

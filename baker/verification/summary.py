@@ -1,4 +1,4 @@
-"""A verification as plain values: what `--json` prints."""
+"""A verification as plain values, as `--json` prints it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,23 @@ from baker.verification.verify import ChannelCheck, Verification
 
 
 def verification_json(found: Verification) -> dict[str, Any]:
-    """Return what `--json` prints."""
+    """Return a verification as plain values, as `--json` prints it.
+
+    Parameters
+    ----------
+    found : Verification
+        Result of `verify`.
+
+    Returns
+    -------
+    dict
+        Keys as documented in docs/ACCURACY.md.
+    """
     return {
         "passed": found.passed,
         "channels": {
             name: {
-                **check.figures,
+                **check.metrics,
                 "unresolved": check.unresolved,
                 "flip": mean_flip(found, name),
                 "z_histogram": _histogram(check),
@@ -44,7 +55,7 @@ def mean_flip(found: Verification, channel: str) -> float | None:
 
 
 def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
-    """Return counts of z-scores between -6 and 6; what lies beyond is in the outer bins."""
+    """Return counts of z-scores between -6 and 6; the outer bins include all beyond."""
     z = np.clip(z_scores(check.value, check.reference, check.standard_error), -5.99, 5.99)
     count, edge = np.histogram(z, bins=24, range=(-6.0, 6.0))
     return {"edges": edge.tolist(), "counts": count.tolist()}

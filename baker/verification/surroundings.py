@@ -1,11 +1,13 @@
-"""What lies around judged places: whether they are buried or in narrow gaps, and which room they are in.
+"""The surroundings of compared points: inside geometry, narrow gaps, and rooms.
 
-`pathtracer.inside_geometry` tells what is buried. A place is in a gap if most of what it sees is nearer than
-two texels: no texel can follow the light there, so gaps are counted, and judged by the figures over all
-texels only.
-A room is what can be seen from one point in the air. Such points are the middles of rays between surfaces;
-the one that sees most places makes the first room, the one that sees most of the rest the second. Closed
-rooms are told apart, and so are those whose doors stand open, but for what is seen through the door.
+`pathtracer.inside_geometry` finds the points inside geometry. A point is in a narrow gap if more than half of
+its rays end within two texels: texels cannot resolve the light there, so gaps are only part of the metrics
+over all texels.
+
+A room is the set of points that are visible from one point in the air. Points in the air are the middles of
+rays between surfaces. The one that sees most points defines the first room, the one that sees most of the
+rest the second, and so on. This separates closed rooms, and rooms with open doors except for the part that is
+visible through the door.
 """
 
 from __future__ import annotations
@@ -17,197 +19,205 @@ from numpy.typing import NDArray
 
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.surface import OFFSET, ROUNDING
-from baker.metrics.texel_area import TexelPlaces
+from baker.metrics.texel_area import SurfacePoints
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.inside_geometry import RAYS, is_inside_geometry
 from baker.pathtracer.inside_geometry import look_around as cast_around
 from baker.pathtracer.scene import Reference
 
-# Texels; and the share of a place's rays that end within them in a gap.
-_NEAR, _GAP, _CONTACT = 2.0, 0.5, 0.1
-# Points in the air that rooms are made of; places that a room must have.
-_AIR, _LEAST_ROOM = 160, 8
-# Rays that tell whether a point in the air lies in a solid.
+# Distance within which rays count as near, texels.
+_NEAR = 2.0
+# Share of near rays above which a point is in a gap, and above which it is in contact with other surface.
+_GAP, _CONTACT = 0.5, 0.1
+# Points in the air from which rooms are found, and fewest points of a room.
+_AIR, _MIN_ROOM = 160, 8
+# Rays that test whether a point in the air is inside geometry.
 _AROUND = 32
-# A ray that meets nothing is taken to be this long, as a share of the scene's radius.
-_OUT = 0.25
+# Length of a ray without a hit, as a share of the scene's radius.
+_MISS_LENGTH = 0.25
+# Share of a segment's length within which a hit counts as its end.
 _TOUCH = 1.0e-3
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What was seen around n points.
+    """The surroundings of n texels with k points each.
 
     Attributes
     ----------
-    places : TexelPlaces
-        Those of texels with free places, without the buried ones.
-    buried : (n,) bool
-        All places are.
-    free : (n,) float64
-        Share of a point's places that are not buried.
+    points : SurfacePoints
+        The points; those inside geometry are replaced by valid points of the same texel if there are any.
+    inside : (n,) bool
+        Whether all points of a texel are inside geometry.
+    valid_share : (n,) float64
+        Share of a texel's points that are valid.
     gap : (n,) bool
-        In a gap, or buried.
+        In a narrow gap, or inside geometry.
     room : (n,) int32
-        Number of the room; -1 in gaps and where no point in the air sees.
-    air : (m, 3) float64
-        Points in the air that rooms were made of.
+        Number of the room; -1 in gaps, and where no point in the air sees the texel.
+    air : (m, 3) float64, metres, world, relative to the geometry's origin
+        Points in the air from which rooms were found.
     """
 
-    places: TexelPlaces
-    buried: NDArray[np.bool_]
-    free: NDArray[np.float64]
+    points: SurfacePoints
+    inside: NDArray[np.bool_]
+    valid_share: NDArray[np.float64]
     gap: NDArray[np.bool_]
     room: NDArray[np.int32]
     air: NDArray[np.float64]
 
 
-def look_around(reference: Reference, places: TexelPlaces, seed: int) -> Surroundings:
-    """Find what is buried, what lies in gaps, and rooms."""
+def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surroundings:
+    """Find points inside geometry, points in narrow gaps, and rooms."""
     random = np.random.Generator(np.random.PCG64([seed, 9]))
-    black, near, air = _first_look(reference, places, random)
-    suspect = np.flatnonzero(black.any(axis=1))
-    free = np.ones(len(places.position))
-    if len(suspect):
-        places, free[suspect] = _free_places(reference, places, suspect, random)
-    buried = free == 0
-    gap = (near.mean(axis=1) > _GAP) | buried
+    black, near, air = _first_look(reference, points, random)
+    # Test all points of the texels of which one ray meets a back or the inside of a solid.
+    tested = np.flatnonzero(black.any(axis=1))
+    valid_share = np.ones(len(points.position))
+    if len(tested):
+        points, valid_share[tested] = _valid_points(reference, points, tested, random)
+    inside = valid_share == 0
+    gap = (near.mean(axis=1) > _GAP) | inside
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
-    # Places that none of the first points in the air see get some of their own: small rooms.
+    # The second round finds small rooms: its points in the air are those of texels without a room.
     for _ in range(2):
         left = np.flatnonzero((room < 0) & ~gap)
         some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)
-        _add_rooms(reference, places, some, left, room)
+        _add_rooms(reference, points, some, left, room)
         eyes = np.concatenate([eyes, some])
-    return Surroundings(places, buried, free, gap, room, eyes)
+    return Surroundings(points, inside, valid_share, gap, room, eyes)
 
 
 def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    """Return the points (m, 3) in the air that lie in no solid: nobody looks around from inside of one.
+    """Return the points (m, 3) in the air that are not inside geometry.
 
-    A ray from a buried place of a texel that is partly free has its middle in a solid where it meets the
-    front of another solid within.
+    A ray that starts at an invalid point of a partly valid texel and meets the front of another solid has its
+    middle inside a solid.
     """
     random = np.random.Generator(np.random.PCG64([seed, 14]))
-    # Without a normal directions are even over the sphere.
+    # A normal of 0 gives uniform directions.
     views = cast_around(reference, air, np.zeros_like(air), _AROUND, random)
     return air[~is_inside_geometry(views)]
 
 
-def in_contact(reference: Reference, places: TexelPlaces, seed: int) -> NDArray[np.bool_]:
-    """Tell of points (n,) whether a tenth of what their places see is nearer than two texels."""
-    _, near, _ = _first_look(reference, places, np.random.Generator(np.random.PCG64([seed, 9])))
+def in_contact(reference: Reference, points: SurfacePoints, seed: int) -> NDArray[np.bool_]:
+    """Return of which texels (n,) more than a tenth of the rays from their points end within two texels."""
+    _, near, _ = _first_look(reference, points, np.random.Generator(np.random.PCG64([seed, 9])))
     touching: NDArray[np.bool_] = near.mean(axis=1) > _CONTACT
     return touching
 
 
-def _free_places(
-    reference: Reference, places: TexelPlaces, suspect: NDArray[np.int64], random: np.random.Generator
-) -> tuple[TexelPlaces, NDArray[np.float64]]:
-    """Return places, the buried ones replaced by free ones of the same texel, and the share of free ones."""
-    position, normal = places.position[suspect], places.normal[suspect]
-    free = ~buried_places(reference, position, normal, places.face_normal[suspect], random)
-    count = free.sum(axis=1, keepdims=True)
-    # Free places first, in their order; they are taken in turn.
-    order = np.argsort(~free, axis=1, kind="stable")
-    turn = np.arange(free.shape[1]) % np.maximum(count, 1)
-    pick = np.where(free | (count == 0), np.arange(free.shape[1]), np.take_along_axis(order, turn, axis=1))
-    changed = [np.array(a) for a in (places.position, places.normal, places.face_normal)]
+def _valid_points(
+    reference: Reference, points: SurfacePoints, tested: NDArray[np.int64], random: np.random.Generator
+) -> tuple[SurfacePoints, NDArray[np.float64]]:
+    """Replace invalid points of the tested texels (m,) by valid ones; return all points, and valid shares."""
+    position, normal = points.position[tested], points.normal[tested]
+    valid = ~inside_points(reference, position, normal, points.face_normal[tested], random)
+    count = valid.sum(axis=1, keepdims=True)
+    # Sort valid points first, and take them in turn.
+    order = np.argsort(~valid, axis=1, kind="stable")
+    turn = np.arange(valid.shape[1]) % np.maximum(count, 1)
+    pick = np.where(valid | (count == 0), np.arange(valid.shape[1]), np.take_along_axis(order, turn, axis=1))
+    changed = [np.array(a) for a in (points.position, points.normal, points.face_normal)]
     for array in changed:
-        array[suspect] = np.take_along_axis(array[suspect], pick[..., None], axis=1)
-    free_ones = replace(places, position=changed[0], normal=changed[1], face_normal=changed[2])
-    return free_ones, count[:, 0] / free.shape[1]
+        array[tested] = np.take_along_axis(array[tested], pick[..., None], axis=1)
+    replaced = replace(points, position=changed[0], normal=changed[1], face_normal=changed[2])
+    return replaced, count[:, 0] / valid.shape[1]
 
 
-def buried_places(
+def inside_points(
     reference: Reference,
     position: NDArray[np.float64],
     normal: NDArray[np.float64],
     face_normal: NDArray[np.float64],
     random: np.random.Generator,
 ) -> NDArray[np.bool_]:
-    """Return (n, k): which of the places (n, k, 3) are buried."""
+    """Return (n, k): which of the points (n, k, 3) are inside geometry."""
     origin = lifted(reference, position, face_normal)
     found = is_inside_geometry(cast_around(reference, origin, normal.reshape(-1, 3), RAYS, random))
     return found.reshape(position.shape[:2])
 
 
 def _first_look(
-    reference: Reference, places: TexelPlaces, random: np.random.Generator
+    reference: Reference, points: SurfacePoints, random: np.random.Generator
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
-    """Cast a ray from each place: does it meet what buries, is the hit near (n, k), a middle (n, 3)."""
-    n, k = places.position.shape[:2]
-    origin = lifted(reference, places.position, places.face_normal)
-    way = _cosine(places.normal.reshape(-1, 3), random)
-    hits = first_hits(reference, origin, way)
-    told = np.where(hits.triangle >= 0, reference.tells[hits.triangle], 0)
-    inside = told == np.where(hits.front, SOLID_FRONT, SOLID_BACK)
-    black = (inside | ((told == BLACK_BACK) & ~hits.front)).reshape(n, k)
-    width = np.sqrt(places.surface / np.maximum(places.area, 1e-12))
+    """Cast a ray from each point (n, k).
+
+    Returns whether it meets a back or the inside of a solid (n, k), whether the hit is near (n, k), and the
+    middle of the longest ray of each texel that does not (n, 3).
+    """
+    n, k = points.position.shape[:2]
+    origin = lifted(reference, points.position, points.face_normal)
+    direction = _cosine(points.normal.reshape(-1, 3), random)
+    hits = first_hits(reference, origin, direction)
+    flags = np.where(hits.triangle >= 0, reference.tells[hits.triangle], 0)
+    inside = flags == np.where(hits.front, SOLID_FRONT, SOLID_BACK)
+    black = (inside | ((flags == BLACK_BACK) & ~hits.front)).reshape(n, k)
+    width = np.sqrt(points.surface / np.maximum(points.area, 1e-12))
     near = hits.depth.reshape(n, k) < _NEAR * width[:, None]
-    length = np.minimum(hits.depth, _OUT * reference.sphere[3])
-    middle = origin + 0.5 * length[:, None] * way
-    # The longest of a point's rays ends its room's far side.
+    length = np.minimum(hits.depth, _MISS_LENGTH * reference.sphere[3])
+    middle = origin + 0.5 * length[:, None] * direction
+    # The longest ray of a texel ends at the far side of its room.
     longest = np.argmax(np.where(black, 0.0, length.reshape(n, k)), axis=1)
     return black, near, middle.reshape(n, k, 3)[np.arange(n), longest]
 
 
 def _add_rooms(
     reference: Reference,
-    places: TexelPlaces,
+    points: SurfacePoints,
     air: NDArray[np.float64],
     left: NDArray[np.int64],
     room: NDArray[np.int32],
 ) -> None:
-    """Make rooms of the points `left`, as seen from points in the air (m, 3); `room` is changed."""
-    seen = visible(reference, air, places.position[left, 0], places.face_normal[left, 0])
+    """Assign rooms to the texels `left` (p,) from what points in the air (m, 3) see; changes `room` (n,)."""
+    seen = visible(reference, air, points.position[left, 0], points.face_normal[left, 0])
     alone = np.ones(len(left), bool)
     while len(air):
         count = (seen & alone).sum(axis=1)
         best = int(np.argmax(count))
-        if count[best] < _LEAST_ROOM:
+        if count[best] < _MIN_ROOM:
             break
         room[left[alone & seen[best]]] = room.max() + 1
         alone &= ~seen[best]
 
 
 def visible(
-    reference: Reference, eye: NDArray[np.float64], place: NDArray[np.float64], face: NDArray[np.float64]
+    reference: Reference, eye: NDArray[np.float64], point: NDArray[np.float64], face: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (m, n): the front of place (n, 3) with normals `face` is seen from points `eye` (m, 3)."""
-    m, n = len(eye), len(place)
-    target = lifted(reference, place[:, None], face[:, None])
-    way = target[None] - eye[:, None]
-    facing = (way * face[None]).sum(axis=2) < 0
+    """Return (m, n): whether the front of point (n, 3), normal `face` (n, 3), is seen from `eye` (m, 3)."""
+    m, n = len(eye), len(point)
+    target = lifted(reference, point[:, None], face[:, None])
+    segment = target[None] - eye[:, None]
+    facing = (segment * face[None]).sum(axis=2) < 0
     row, column = np.nonzero(facing)
     result = np.zeros((m, n), bool)
-    result[row, column] = seen_along(reference, eye[row], way[row, column])
+    result[row, column] = seen_along(reference, eye[row], segment[row, column])
     return result
 
 
 def seen_along(
-    reference: Reference, origin: NDArray[np.float64], way: NDArray[np.float64]
+    reference: Reference, origin: NDArray[np.float64], segment: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return whether nothing lies between each origin (n, 3) and the end of its way (n, 3)."""
-    length = np.linalg.norm(way, axis=1)
-    hits = first_hits(reference, origin, way / np.maximum(length, 1e-30)[:, None])
+    """Return (n,): whether nothing lies between each origin (n, 3) and origin + segment (n, 3)."""
+    length = np.linalg.norm(segment, axis=1)
+    hits = first_hits(reference, origin, segment / np.maximum(length, 1e-30)[:, None])
     seen: NDArray[np.bool_] = hits.depth > length * (1 - _TOUCH)
     return seen
 
 
 def _cosine(normal: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Return cosine-weighted directions (n, 3): the normal and a point of the unit sphere."""
-    ball = random.standard_normal(normal.shape)
-    way = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
-    result: NDArray[np.float64] = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    """Return cosine-weighted directions (n, 3): sums of the normal and a point on the unit sphere."""
+    sphere = random.standard_normal(normal.shape)
+    total = normal + sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
+    result: NDArray[np.float64] = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
     return result
 
 
 def lifted(
     reference: Reference, position: NDArray[np.float64], face: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return places (n, k, 3) as (n k, 3), off their surface by what rounding needs."""
+    """Return points (n, k, 3) as (n k, 3), moved along their face normals against rounding errors."""
     position, face = position.reshape(-1, 3), face.reshape(-1, 3)
     far, sizes = np.abs(position).max(axis=1, keepdims=True), reference.surfaces
     step = OFFSET * np.minimum(np.maximum(far, sizes.min_offset_scale), sizes.default_size)

@@ -1,10 +1,9 @@
-"""Path-traces the chosen texels until they are known well enough, or time is up.
+"""Path tracing of the chosen points, until their standard errors reach a target or a time limit ends.
 
-A texel in the dark that only rare paths reach shows no spread at first: all its samples are black. Taken at
-its word it would be left alone, and found to be black. Each texel therefore counts as if one more of its
-samples had brought the mean light of its room: what was not seen in n samples is known to that mean / n at
-best. Errors are relative to a texel's own light, or a tenth of its room's median: a dim room is traced as
-long as a bright one.
+A dark point that only rare paths reach has no spread at first: all its samples are black. By its spread alone
+it would get no further samples and a reference of 0. So the standard error of n samples includes the mean
+light of the room divided by n, as if one further sample had that value. Errors are relative to the light of
+the point, or to a tenth of the median of its room: a dim room is traced as long as a bright one.
 """
 
 from __future__ import annotations
@@ -19,35 +18,35 @@ from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.metrics.error_metrics import dark_floor
-from baker.metrics.texel_area import TexelPlaces
+from baker.metrics.texel_area import SurfacePoints
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.scene import Reference
 
-# Passes of all texels before some are called good enough; passes beyond which AO is not followed.
-_FIRST, _MOST_OPENNESS = 8, 1024
-# Share of the time in which all texels get the same.
-_EVEN = 0.4
-# Standard error of AO that is good enough, and the share of the time that AO may take; it seldom needs it.
-OPENNESS_ERROR, _OPENNESS_TIME = 0.004, 0.25
+# Passes over all points before any may be finished; largest number of passes of AO.
+_FIRST, _MAX_AO_PASSES = 8, 1024
+# Share of the time limit in which all unfinished points get passes; then only the half nearest to the target.
+_ALL_POINTS_TIME = 0.4
+# Target standard error of AO, and the largest share of the time limit that AO takes.
+AO_ERROR, _AO_TIME = 0.004, 0.25
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How long to trace.
+    """When to stop tracing.
 
     Attributes
     ----------
     spp : int or None
-        Samples of each texel, whatever its error.
+        Samples of each point, regardless of its error.
     target : float
-        Relative standard error at which a texel is good enough.
+        Relative standard error at which a point is finished.
     deadline : float or None
-        Of `time.monotonic`.
+        Time of `time.monotonic` at which tracing ends.
     seed : int
     room : (n,) int32
-        Room of each texel, -1 for none.
+        Room of each point, -1 for none.
     """
 
     spp: int | None
@@ -57,7 +56,7 @@ class Effort:
     room: NDArray[np.int32]
 
     def passes(self, estimate: PointEstimate) -> int | None:
-        """Return the passes asked for, two at least: there is no error of one."""
+        """Return the number of passes for `spp`, at least two: one pass has no standard error."""
         return None if self.spp is None else max(-(-self.spp // estimate.samples), 2)
 
 
@@ -72,7 +71,7 @@ def standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[
 
 
 def room_floor(mean: NDArray[np.float64], room: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return for points (n,) with light (n, C) below what it is dark in their room."""
+    """Return the `dark_floor` (n,) of each point's room, from the light (n, C) and rooms (n,) of points."""
     floor = np.full(len(mean), dark_floor(mean))
     for number in np.unique(room[room >= 0]):
         floor[room == number] = dark_floor(mean[room == number])
@@ -82,13 +81,13 @@ def room_floor(mean: NDArray[np.float64], room: NDArray[np.int32]) -> NDArray[np
 def _nearest_to_done(
     estimate: PointEstimate, error: NDArray[np.float64], chosen: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the half of the chosen texels that needs the fewest samples: others would not get there."""
+    """Return the half of the chosen points (m,) that needs the fewest samples to reach the target."""
     need = estimate.count.sum(axis=0)[chosen] * error[chosen] ** 2
     return np.sort(chosen[np.argsort(need, kind="stable")[: -(-len(chosen) // 2)]])
 
 
 def relative_standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the standard error (n,) of the colour mean, relative as errors are (colours taken as one)."""
+    """Return the standard error (n,), mean over colours, relative to the light or the floor of the room."""
     mean = estimate.mean
     error = standard_error(estimate, room).mean(axis=1)
     scale = np.maximum(mean.mean(axis=1), np.maximum(room_floor(mean, room), 1e-12))
@@ -96,10 +95,10 @@ def relative_standard_error(estimate: PointEstimate, room: NDArray[np.int32]) ->
 
 
 def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) -> float:
-    """Cast a few rays of each kind from a triangle, before any time limit runs; return the seconds it took.
+    """Cast a few rays of each kind from a triangle, and return the seconds that this took.
 
-    On a machine's first run this compiles the kernels. That may take as long as the limit: a good bake would
-    be judged by hardly any path, and fail.
+    The first run on a machine compiles the kernels here, before the time limit starts. Compilation may take
+    as long as the limit; few paths would be left, and a correct bake would fail.
     """
     started = time.monotonic()
     middle = geometry.position[geometry.triangle[:1]].astype(np.float64).mean(axis=1)
@@ -113,40 +112,40 @@ def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) ->
     return time.monotonic() - started
 
 
-def trace_openness(
-    reference: Reference, places: TexelPlaces, distance: float, effort: Effort, progress: Progress
+def trace_ambient_occlusion(
+    reference: Reference, points: SurfacePoints, distance: float, effort: Effort, progress: Progress
 ) -> PointEstimate:
-    """Estimate AO."""
-    estimate = new_estimate(len(places.position), 1)
+    """Estimate ambient occlusion within `distance` metres at points (n, k)."""
+    estimate = new_estimate(len(points.position), 1)
     goal = effort.passes(estimate)
     started = time.monotonic()
-    for number in range(goal or _MOST_OPENNESS):
+    for number in range(goal or _MAX_AO_PASSES):
         ambient_occlusion_pass(
-            reference, estimate, places.position, places.normal, places.face_normal,
+            reference, estimate, points.position, points.normal, points.face_normal,
             distance=distance, seed=effort.seed,
         )  # fmt: skip
-        report(progress, Stage.AMBIENT_OCCLUSION, (number + 1) / (goal or _MOST_OPENNESS))
+        report(progress, Stage.AMBIENT_OCCLUSION, (number + 1) / (goal or _MAX_AO_PASSES))
         if goal is not None or number + 1 < _FIRST:
             continue
-        late = effort.deadline is not None and time.monotonic() > started + _OPENNESS_TIME * (
+        late = effort.deadline is not None and time.monotonic() > started + _AO_TIME * (
             effort.deadline - started
         )
-        if late or np.percentile(standard_error(estimate, effort.room), 95) < OPENNESS_ERROR:
+        if late or np.percentile(standard_error(estimate, effort.room), 95) < AO_ERROR:
             break
     return estimate
 
 
 def trace_irradiance(
-    reference: Reference, places: TexelPlaces, bounces: int | None, effort: Effort, progress: Progress
+    reference: Reference, points: SurfacePoints, bounces: int | None, effort: Effort, progress: Progress
 ) -> PointEstimate:
-    """Estimate irradiance; texels that are good enough are left alone."""
-    estimate = new_estimate(len(places.position), 3)
-    chosen = np.arange(len(places.position))
+    """Estimate irradiance at points (n, k); finished points get no further passes."""
+    estimate = new_estimate(len(points.position), 3)
+    chosen = np.arange(len(points.position))
     goal = effort.passes(estimate)
     started = time.monotonic()
     while True:
         irradiance_pass(
-            reference, estimate, places.position, places.normal, places.face_normal,
+            reference, estimate, points.position, points.normal, points.face_normal,
             max_bounces=bounces, seed=effort.seed, chosen=chosen,
         )  # fmt: skip
         if goal is not None:
@@ -160,7 +159,7 @@ def trace_irradiance(
             if effort.deadline is not None:
                 late = (time.monotonic() - started) / max(effort.deadline - started, 1e-9)
                 share = max(share, late)
-                if late > _EVEN:
+                if late > _ALL_POINTS_TIME:
                     chosen = _nearest_to_done(estimate, error, chosen)
             report(progress, Stage.PATH_TRACING, min(share, 1.0), f"{len(error) - len(chosen)} texels done")
             if not len(chosen):

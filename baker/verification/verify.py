@@ -1,8 +1,8 @@
-"""Path-traces chosen points of a finished bake and says how far the stored maps are from that.
+"""Compares the stored maps of a finished bake with path-traced values at chosen points.
 
-The reference knows scene and lights only (`baker.pathtracer`); the maps are taken as the files hold them,
-after half float, denoiser and repairs. Every figure stands beside what the reference's own noise adds to it.
-What is concluded from the figures is in `judgements`.
+The reference (`baker.pathtracer`) is computed from scene and lights only. The maps are read from the files:
+they include the effects of half floats, the denoiser and filled texels. `criteria` computes metrics, most of
+them beside the part that the noise of the reference adds, and their limits.
 """
 
 from __future__ import annotations
@@ -23,89 +23,102 @@ from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
 from baker.kernels.not_kept import cache_warnings
-from baker.metrics.groups import Compared
-from baker.metrics.limits import Verdict, judge, parse_limits
+from baker.metrics.groups import ComparedPoints
+from baker.metrics.limits import Verdict, evaluate_limits, parse_limits
 from baker.metrics.texel_area import look_up
 from baker.metrics.worst_texels import worst_texels
 from baker.pathtracer.point_estimate import PointEstimate
 from baker.pathtracer.scene import Reference, build_reference
+from baker.verification.criteria.criterion import ChannelData, CriterionResult
+from baker.verification.criteria.registry import CRITERIA, METRIC_NAMES, default_limits
+from baker.verification.criteria.unverified_area import NOISY
 from baker.verification.crops import Crop, trace_crops
-from baker.verification.judgements.judgement import Evidence, Judged
-from baker.verification.judgements.registry import FIGURE_NAMES, JUDGEMENTS, default_limits
-from baker.verification.judgements.unjudged import NOISY
 from baker.verification.points import TEXEL, Pages, Points, choose_points, read_pages
 from baker.verification.settings import VerifySettings
 from baker.verification.tracing import (
-    OPENNESS_ERROR,
+    AO_ERROR,
     Effort,
     first_rays,
     relative_standard_error,
     standard_error,
+    trace_ambient_occlusion,
     trace_irradiance,
-    trace_openness,
 )
-from baker.verification.unjudged import Unjudged, measure_unjudged
+from baker.verification.unverified_area import UnverifiedArea, measure_unverified_area
 
 CHANNELS = ("irradiance", "ao")
-# Pictures of the worst places get this share of the time limit on top.
+# Additional time for crops around the worst texels, as a share of the time limit.
 _CROP_TIME = 0.1
 
 
 @dataclass(frozen=True)
 class ChannelCheck:
-    """A channel's texels, stored and path-traced.
+    """Stored and path-traced values of a channel's n texels, with metrics.
 
     Attributes
     ----------
     value, reference, standard_error : (n, C) float64
     halves : two (n, C) float64
-    figures : dict
-        Of all judgements, see `judgements.registry`.
-    remarks : dict of figure to str
-        What a figure means, for those that are limits.
-    unresolved : int, texels whose standard error stayed above the target
+        Independent halves of the reference.
+    metrics : dict of str to number or None
+        Metrics of all criteria, see `criteria.registry`.
+    remarks : dict of str to str
+        By name of a metric, a sentence about the fault that it indicates.
+    unresolved : int
+        Texels whose standard error stayed above the target.
     """
 
     value: NDArray[np.float64]
     reference: NDArray[np.float64]
     standard_error: NDArray[np.float64]
     halves: tuple[NDArray[np.float64], NDArray[np.float64]]
-    figures: dict[str, Any]
+    metrics: dict[str, Any]
     remarks: dict[str, str]
     unresolved: int
 
     @property
     def shift(self) -> tuple[int, int]:
-        """Return the rows and columns by which the map would fit better."""
-        down, right = self.figures["shift"]
+        """Return the shift (rows, columns) by which the map would fit better."""
+        down, right = self.metrics["shift"]
         return down, right
 
     @property
     def exponent(self) -> float | None:
-        """Return the power of the truth that the values follow."""
-        power: float | None = self.figures["exponent"]
+        """Return the exponent of the reference that the values follow, see `metrics.misalignment`."""
+        power: float | None = self.metrics["exponent"]
         return power
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What `verify` found.
+    """The result of `verify`.
 
     Attributes
     ----------
     bake : StoredBake
-    pixel : (n,) int64, texels judged, (page * H + row) * W + column
-    owner : (n,) int32, their objects
-    position : (n, 3) float64, world
-    channels : dict of name to ChannelCheck
-    objects, levels, regions, worst : list of dict, as in the JSON
+    pixel : (n,) int64
+        Compared texels, (page * H + row) * W + column.
+    owner : (n,) int32
+        Their objects.
+    position : (n, 3) float64, metres, world
+        Their positions.
+    channels : dict of str to ChannelCheck
+        By name of channel.
+    objects, levels, regions, worst : list of dict
+        As in the JSON.
     verdicts : list of Verdict
-    problems : list of str, what the limits that failed mean
-    invalid : int, covered texels that the bake filled from neighbours (not judged)
-    crops : list of Crop, the surroundings of the worst texels
+        One for each limit.
+    problems : list of str
+        Remarks on the limits that failed.
+    invalid : int
+        Invalid texels, which the bake filled from neighbours; they are not compared.
     rays : int
-    seconds, compile_seconds : float
-        All but the compilation of kernels; that (a machine's first run).
+    seconds : float
+        Without the compilation of kernels.
+    compile_seconds : float
+        Compilation of kernels, on the first run on a machine.
+    crops : list of Crop
+        The surroundings of the worst texels.
     warnings : list of SceneWarning
     """
 
@@ -129,35 +142,49 @@ class Verification:
 
     @property
     def passed(self) -> bool:
-        """Tell whether no limit was passed."""
+        """Return whether no limit failed."""
         return not any(verdict.failed for verdict in self.verdicts)
 
 
 @dataclass(frozen=True)
 class _Traced:
-    """What the reference found: the points and their estimates, areas that were left out, pictures."""
+    """The points, their estimates by channel, the area that was not compared, and the compilation time."""
 
     points: Points
     estimates: dict[str, PointEstimate]
-    unjudged: Unjudged
+    unverified: UnverifiedArea
     compile_seconds: float
 
 
 def verify(
     out: Path | str, settings: VerifySettings | None = None, progress: Progress = silent
 ) -> Verification:
-    """Judge the bake in a folder against path tracing.
+    """Compare the bake in a folder with path-traced values.
 
     Parameters
     ----------
     out : Path or str
         Output folder of a bake.
     settings : VerifySettings, optional
+        How much is traced, and the limits.
     progress : Progress
+        Receives reports, and may cancel.
+
+    Returns
+    -------
+    Verification
+        Metrics of all channels, and whether the limits hold.
 
     Raises
     ------
-    InputError, SettingsError, ResourceError, Cancelled
+    InputError
+        If the folder holds no bake, or none with a channel that can be verified.
+    SettingsError
+        If a limit of `settings` is malformed or names an unknown channel or metric.
+    ResourceError
+        If memory runs out or a library is missing.
+    Cancelled
+        If `progress` cancels.
     """
     settings = settings or VerifySettings()
     start = time.monotonic()
@@ -166,7 +193,47 @@ def verify(
     names = [name for name in CHANNELS if name in bake.maps]
     if not names:
         raise InputError("the bake holds no channel that can be verified (irradiance, ao)", file=str(out))
-    limits = parse_limits(settings.fail_if or default_limits(names), names, FIGURE_NAMES)
+    limits = parse_limits(settings.fail_if or default_limits(names), names, METRIC_NAMES)
+    found = _compare(bake, names, settings, progress)
+    metrics = {name: check.metrics for name, check in found.channels.items()}
+    verdicts = evaluate_limits(limits, metrics, missing_fails=settings.fail_if is not None)
+    return Verification(
+        bake=bake,
+        pixel=found.pixel,
+        owner=found.owner,
+        position=found.position,
+        channels=found.channels,
+        objects=_objects({name: found.rows[name]["objects"] for name in names}),
+        levels=[row for name in names for row in found.rows[name]["levels"]],
+        regions=sorted((row for name in names for row in found.rows[name]["regions"]), key=_badness),
+        worst=found.worst,
+        verdicts=verdicts,
+        problems=_problems(verdicts, found.channels),
+        invalid=int((bake.status == TexelStatus.INVALID).sum()),
+        crops=found.crops,
+        rays=sum(estimate.rays for estimate in found.traced.estimates.values()),
+        seconds=time.monotonic() - start - found.traced.compile_seconds,
+        compile_seconds=found.traced.compile_seconds,
+        warnings=[*bake.warnings, *cache_warnings()],
+    )
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """The comparison of all channels: the texels, metrics, tables by channel and criterion, worst texels."""
+
+    traced: _Traced
+    pixel: NDArray[np.int64]
+    owner: NDArray[np.int32]
+    position: NDArray[np.float64]
+    channels: dict[str, ChannelCheck]
+    rows: dict[str, dict[str, list[dict[str, Any]]]]
+    worst: list[dict[str, Any]]
+    crops: list[Crop]
+
+
+def _compare(bake: StoredBake, names: list[str], settings: VerifySettings, progress: Progress) -> _Comparison:
+    """Path-trace the points and evaluate the criteria of all channels."""
     geometry = world_geometry(bake.scene, bake.atlas)
     pages = read_pages(bake, geometry, names)
     with build_reference(
@@ -179,33 +246,13 @@ def verify(
         position = points.position[texel] + geometry.origin
         channels, rows = {}, {}
         for name in names:
-            evidence = _evidence(name, bake, geometry, pages, traced, settings)
-            channels[name], rows[name] = _judge(evidence, settings.target_se, traced.estimates[name])
+            data = _channel_data(name, bake, geometry, pages, traced, settings)
+            channels[name], rows[name] = _evaluate(data, settings.target_se, traced.estimates[name])
         worst = worst_texels(bake.scene.instances, bake.atlas.resolution, pixel, owner, position, channels)
-        spare = None if settings.seconds is None else _CROP_TIME * settings.seconds
+        crop_seconds = None if settings.seconds is None else _CROP_TIME * settings.seconds
         bounces = bake.manifest.get("settings", {}).get("bounces")
-        crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, spare, progress)
-    figures = {name: check.figures for name, check in channels.items()}
-    verdicts = judge(limits, figures, missing_fails=settings.fail_if is not None)
-    return Verification(
-        bake=bake,
-        pixel=pixel,
-        owner=owner,
-        position=position,
-        channels=channels,
-        objects=_objects({name: rows[name]["objects"] for name in names}),
-        levels=[row for name in names for row in rows[name]["levels"]],
-        regions=sorted((row for name in names for row in rows[name]["regions"]), key=_badness),
-        worst=worst,
-        verdicts=verdicts,
-        problems=_problems(verdicts, channels),
-        invalid=int((bake.status == TexelStatus.INVALID).sum()),
-        crops=crops,
-        rays=sum(estimate.rays for estimate in traced.estimates.values()),
-        seconds=time.monotonic() - start - traced.compile_seconds,
-        compile_seconds=traced.compile_seconds,
-        warnings=[*bake.warnings, *cache_warnings()],
-    )
+        crops = trace_crops(bake, geometry, reference, worst, bounces, settings.seed, crop_seconds, progress)
+    return _Comparison(traced, pixel, owner, position, channels, rows, worst, crops)
 
 
 def _trace(
@@ -222,29 +269,29 @@ def _trace(
     compiled = first_rays(reference, geometry, names)
     report(progress, Stage.START, 0.5, "points")
     points, air = choose_points(reference, bake, geometry, pages, names, settings)
-    unjudged = measure_unjudged(reference, bake, geometry, pages, air, settings.seed)
+    unverified = measure_unverified_area(reference, bake, geometry, pages, air, settings.seed)
     deadline = None if settings.seconds is None else time.monotonic() + settings.seconds
     effort = Effort(settings.spp, settings.target_se, deadline, settings.seed, points.room)
     baked = bake.manifest.get("settings", {})
     estimates: dict[str, PointEstimate] = {}
     if "ao" in names:
-        reach = baked.get("ao_distance_metres")
-        distance = np.inf if reach is None else float(reach)
-        estimates["ao"] = trace_openness(reference, points.places, distance, effort, progress)
+        metres = baked.get("ao_distance_metres")
+        distance = np.inf if metres is None else float(metres)
+        estimates["ao"] = trace_ambient_occlusion(reference, points.surface, distance, effort, progress)
     if "irradiance" in names:
         estimates["irradiance"] = trace_irradiance(
-            reference, points.places, baked.get("bounces"), effort, progress
+            reference, points.surface, baked.get("bounces"), effort, progress
         )
-    return _Traced(points, estimates, unjudged, compiled)
+    return _Traced(points, estimates, unverified, compiled)
 
 
-def _evidence(
+def _channel_data(
     name: str, bake: StoredBake, geometry: Geometry, pages: Pages, traced: _Traced, settings: VerifySettings
-) -> Evidence:
-    """Put a channel's stored values beside its estimate."""
+) -> ChannelData:
+    """Combine a channel's stored values and its estimate."""
     estimate, points = traced.estimates[name], traced.points
-    # A texel on a chart's border holds the value at its centre, beside its surface: engines look up between.
-    value = look_up(bake.maps[name], points.pixel, points.places.middle)[:, : estimate.mean.shape[1]]
+    # Look up beside the centres of border texels: they hold the value at their centre, off their surface.
+    value = look_up(bake.maps[name], points.pixel, points.surface.offset)[:, : estimate.mean.shape[1]]
     error = standard_error(estimate, points.room)
     samples = estimate.count.sum(axis=0) * estimate.samples
     halves = (estimate.half(0), estimate.half(1))
@@ -252,31 +299,31 @@ def _evidence(
         noisy = error.max(axis=1) > NOISY
     else:
         noisy = relative_standard_error(estimate, points.room) > max(settings.target_se, NOISY)
-    compared = Compared(value, estimate.mean, error, halves, samples, estimate.standard_error)
-    return Evidence(name, bake, geometry, pages, points, compared, traced.unjudged, noisy)
+    compared = ComparedPoints(value, estimate.mean, error, halves, samples, estimate.standard_error)
+    return ChannelData(name, bake, geometry, pages, points, compared, traced.unverified, noisy)
 
 
-def _judge(
-    evidence: Evidence, target: float, estimate: PointEstimate
+def _evaluate(
+    data: ChannelData, target: float, estimate: PointEstimate
 ) -> tuple[ChannelCheck, dict[str, list[dict[str, Any]]]]:
-    """Return a channel's figures of all judgements, and their tables by name."""
-    found: dict[str, Judged] = {judgement.name: judgement.judge(evidence) for judgement in JUDGEMENTS}
-    mine = evidence.texels
-    places = evidence.compared.of(mine)
-    if evidence.channel == "ao":
-        unresolved = (places.standard_error > 2 * OPENNESS_ERROR).any(axis=1)
+    """Return a channel's metrics of all criteria, and their tables by name."""
+    found: dict[str, CriterionResult] = {criterion.name: criterion.evaluate(data) for criterion in CRITERIA}
+    mine = data.texels
+    compared = data.compared.of(mine)
+    if data.channel == "ao":
+        unresolved = (compared.standard_error > 2 * AO_ERROR).any(axis=1)
     else:
-        unresolved = relative_standard_error(estimate, evidence.points.room)[mine] > target
+        unresolved = relative_standard_error(estimate, data.points.room)[mine] > target
     check = ChannelCheck(
-        value=places.value,
-        reference=places.reference,
-        standard_error=places.standard_error,
-        halves=places.halves,
-        figures={name: value for judged in found.values() for name, value in judged.figures.items()},
-        remarks={name: text for judged in found.values() for name, text in judged.remarks.items()},
+        value=compared.value,
+        reference=compared.reference,
+        standard_error=compared.standard_error,
+        halves=compared.halves,
+        metrics={name: value for result in found.values() for name, value in result.metrics.items()},
+        remarks={name: text for result in found.values() for name, text in result.remarks.items()},
         unresolved=int(unresolved.sum()),
     )
-    return check, {name: judged.rows for name, judged in found.items()}
+    return check, {name: result.rows for name, result in found.items()}
 
 
 def _badness(row: dict[str, Any]) -> float:
@@ -284,21 +331,21 @@ def _badness(row: dict[str, Any]) -> float:
 
 
 def _objects(rows: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Return one row for each object with the figures of all channels."""
+    """Return one row for each object with the metrics of all channels."""
     found: dict[int, dict[str, Any]] = {}
     for name, table in rows.items():
         for row in table:
-            figures = dict(row)
-            entry = {"object": figures.pop("object"), "node": figures.pop("node"), "channels": {}}
-            found.setdefault(entry["node"], entry)["channels"][name] = figures
+            metrics = dict(row)
+            entry = {"object": metrics.pop("object"), "node": metrics.pop("node"), "channels": {}}
+            found.setdefault(entry["node"], entry)["channels"][name] = metrics
     return list(found.values())
 
 
 def _problems(verdicts: list[Verdict], channels: dict[str, ChannelCheck]) -> list[str]:
-    """Return what the limits that failed mean, where a figure alone does not say it; each once."""
+    """Return the remarks on the metrics of the limits that failed, without duplicates."""
     found = []
     for verdict in verdicts:
-        remark = channels[verdict.limit.channel].remarks.get(verdict.limit.figure)
+        remark = channels[verdict.limit.channel].remarks.get(verdict.limit.metric)
         if verdict.failed and remark and remark not in found:
             found.append(remark)
     return found

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import struct
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from gltf_builder import QUAD, QUAD_TRIANGLE, quad_builder
 
 from baker.core.errors import BakerError, InputError
+from baker.core.settings import make_settings
+from baker.io import importers
+from baker.io.formats import scene_file_help, scene_suffixes
 from baker.io.load import IMPORTERS, load_scene
+from baker.pipeline.bake import bake
+
+ROOT = Path(__file__).parents[2]
 
 _OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 _OFF = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
@@ -93,3 +103,70 @@ def test_broken_files_give_a_scene_or_an_input_error(tmp_path, suffix):
         assert np.isfinite(mesh.position).all()
         assert mesh.triangle.max() < len(mesh.position)
     assert refused > 10
+
+
+def test_help_texts_list_what_is_registered():
+    assert scene_suffixes() == IMPORTERS.names()
+    assert scene_file_help() == "glb, gltf, obj, off, ply or stl file."
+
+
+def test_the_hook_matches_what_is_registered():
+    command = [sys.executable, str(ROOT / "docs" / "make_hooks.py"), "--print"]
+    page = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8") == page
+
+
+# A new format in one file: each line of a .corners file is a corner, three are a triangle.
+_TOY = """
+import hashlib
+
+import numpy as np
+
+from baker.core.scene import Material
+from baker.core.source_mesh import SourcePrimitive
+from baker.io.load import IMPORTERS
+from baker.io.mesh.scene import scene_of_meshes, to_world
+
+
+@IMPORTERS.register(".corners")
+def import_corners(source):
+    corner = np.array([line.split() for line in source.data.decode().splitlines()], np.float64)
+    triangle = np.arange(len(corner)).reshape(-1, 3)
+    primitive = SourcePrimitive(0, 0, to_world(corner, source.up, source.scale), triangle)
+    digest = hashlib.sha256(source.data).hexdigest()
+    return scene_of_meshes(source, [("mesh", [primitive])], [Material("grey")], [], digest)
+"""
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    """An importer in one file, found like those of the package; the scene file that it reads."""
+    folder = tmp_path / "plugins"
+    folder.mkdir()
+    (folder / "toy_corners.py").write_text(_TOY)
+    names = IMPORTERS.names()
+    monkeypatch.setattr(IMPORTERS, "_plugins", {name: IMPORTERS.get(name) for name in names})
+    monkeypatch.setattr(IMPORTERS, "_searched", False)
+    monkeypatch.setattr(importers, "__path__", [*importers.__path__, str(folder)])
+    scene = tmp_path / "scene.corners"
+    corner = QUAD[QUAD_TRIANGLE].reshape(-1, 3)
+    scene.write_text("".join(f"{x} {y} {z}\n" for x, y, z in corner))
+    yield scene
+    sys.modules.pop("baker.io.importers.toy_corners", None)
+
+
+def test_a_new_importer_is_one_file(toy, tmp_path):
+    assert ".corners" in scene_suffixes()
+    assert ".corners" in IMPORTERS.names()
+    assert "corners, glb" in scene_file_help()
+    settings = make_settings(
+        {"channels": "ao", "resolution": 32, "quality": "preview", "up": "z", "scale": 2.0}
+    )
+    out = tmp_path / "out"
+    result = bake(toy, settings=settings, out=out)
+    # +z of the file is +Y of the world, and two metres are one unit.
+    np.testing.assert_allclose(result.scene.meshes[0].position.max(axis=0), [2, 0, 0], atol=1e-6)
+    assert json.loads((out / "bake.json").read_text())["input"]["sha256"] == load_scene(toy).sha256
+    assert (out / "scene.glb").stat().st_size > 0
+    value = result.lightmaps["ao"].value
+    assert (value[result.status == 1] == 1).all()

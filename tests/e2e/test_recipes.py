@@ -78,7 +78,7 @@ def test_the_makefile(game):
     assert code != 0
     assert "1 baked, 0 unchanged" in text
     assert told(game, "verify-cornell.xml") == (1, 1)
-    # The bake stays, and its stamp is the old one: it will be judged again.
+    # The bake stays, and its stamp is the old one: it will be checked again.
     stamp, bake = game / "reports" / "cornell.verified", game / "baked" / "cornell" / "bake.json"
     assert stamp.stat().st_mtime < bake.stat().st_mtime
 

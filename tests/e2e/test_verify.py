@@ -31,9 +31,9 @@ def sound(tmp_path_factory) -> Path:
     red = Material(base_colour=(0.7, 0.2, 0.1, 1.0))
     walls = box_quads((0, 0, 0), (2, 3, 2), inward=True, material=grey(0.6))
     walls[0] = replace(walls[0], material=red)
-    lamp = Quad((0.5, 1.9, 1.95), (0.8, 0, 0), (0, -0.6, 0), grey(0, 8.0))
+    emitter = Quad((0.5, 1.9, 1.95), (0.8, 0, 0), (0, -0.6, 0), grey(0, 8.0))
     block = box_quads((0.3, 0.4, 0.2), (0.9, 1.0, 0.8), inward=False, material=grey(0.4))
-    scene = quad_scene([*walls, lamp, *block])
+    scene = quad_scene([*walls, emitter, *block])
     light = PunctualLight("point", "bulb", 0, (0.4, 0.4, 0.5), (1.6, 0.5, 1.2))
     out = tmp_path_factory.mktemp("verify") / "out"
     settings = make_settings({"resolution": 128, "samples": 128, "ao_distance": "0.7"})
@@ -112,7 +112,7 @@ def test_tampering_is_caught(sound, tmp_path, name):
     assert code == 1
     assert found["passed"] is False
     assert found["problems"] or any(limit["failed"] for limit in found["limits"])
-    # The file is judged as it is, and said to have changed.
+    # The file is compared as it is, and reported as changed.
     assert [w["object"] for w in found["warnings"]] == ["irradiance_0.exr"]
     if "shifted" in name:
         assert found["channels"]["irradiance"]["shift"] != [0, 0]
@@ -129,7 +129,7 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
     assert (code, [v["failed"] for v in after["limits"]]) == (1, [True, False])
     figures = [found["channels"]["irradiance"] for found in (before, after)]
     ratio = [found["energy_ratio"] for found in figures]
-    # Rounding to half floats reorders texels by brightness, so some of those judged are others.
+    # Rounding to half floats reorders texels by brightness, so some of the chosen ones are others.
     error = np.hypot(*(found["energy_ratio_se"] for found in figures))
     assert ratio[1] / ratio[0] == pytest.approx(1.03, abs=4 * error)
     stream = StringIO()
@@ -140,14 +140,14 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
 def test_texels_stand_for_the_surface_of_their_objects(sound):
     from baker.core.geometry import world_geometry
     from baker.io.bake.read_bake import read_bake
-    from baker.metrics.texel_area import instance_map, texel_places
+    from baker.metrics.texel_area import instance_map, surface_points
 
     stored = read_bake(sound)
     geometry = world_geometry(stored.scene, stored.atlas)
     owner = instance_map(geometry, 1, 128).reshape(-1)
     pixel = np.flatnonzero(owner >= 0)
-    size = np.bincount(owner[pixel], weights=texel_places(geometry, pixel, 128, 4, 0).surface)
-    # Walls of 2 x 3 x 2 m, the lamp, the block's sides of 0.6 m.
+    size = np.bincount(owner[pixel], weights=surface_points(geometry, pixel, 128, 4, 0).surface)
+    # Walls of 2 x 3 x 2 m, the emitter, the block's sides of 0.6 m.
     np.testing.assert_allclose(np.sort(size[:6]), [4, 4, 6, 6, 6, 6], rtol=0.02)
     assert size[6] == pytest.approx(0.48, rel=0.06)
     np.testing.assert_allclose(size[7:], 0.36, rtol=0.06)
@@ -199,11 +199,11 @@ def test_reports(sound, tmp_path):
     assert suite.attrib["failures"] == "0"
 
 
-def test_the_same_seed_judges_the_same(sound):
+def test_the_same_seed_compares_the_same(sound):
     one = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=3, threads=1))
     two = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=3, threads=2))
     other = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=4))
-    assert one.channels["irradiance"].figures == two.channels["irradiance"].figures
+    assert one.channels["irradiance"].metrics == two.channels["irradiance"].metrics
     assert not np.array_equal(one.pixel, other.pixel)
 
 
@@ -230,7 +230,7 @@ def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
     assert found.compile_seconds > 1.5
 
 
-def test_few_bounces_are_judged_as_few(tmp_path):
+def test_few_bounces_are_compared_with_few(tmp_path):
     scene = quad_scene([*box_quads((0, 0, 0), (1, 1, 1), inward=True, material=grey(0.5, 1.0))])
     bake(scene, settings=make_settings({"resolution": 64, "samples": 64, "bounces": 1}), out=tmp_path / "out")
     found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
@@ -238,11 +238,11 @@ def test_few_bounces_are_judged_as_few(tmp_path):
     assert found.passed
 
 
-def test_a_bake_under_a_weaker_sky_is_judged_under_it(tmp_path):
+def test_a_bake_under_a_weaker_sky_is_compared_under_it(tmp_path):
     scene = quad_scene(box_quads((0, 0, 0), (1, 1, 1), inward=False, material=grey(0.5)))
     settings = make_settings({"resolution": 64, "samples": 64, "sky": "2,2,2", "sky_strength": 0.25})
     bake(scene, settings=settings, out=tmp_path / "out")
     found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
     # A box alone sees nothing but the sky: E = pi L.
     assert found.channels["irradiance"].reference == pytest.approx(0.5 * np.pi, rel=1e-3)
-    assert found.channels["irradiance"].figures["energy_ratio"] == pytest.approx(1, abs=0.002)
+    assert found.channels["irradiance"].metrics["energy_ratio"] == pytest.approx(1, abs=0.002)

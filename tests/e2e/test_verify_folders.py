@@ -43,7 +43,7 @@ def test_a_moved_folder(plain, tmp_path):
     assert found.passed
     # A furnace: E = pi L / (1 - albedo), and the truth is no luckier than that.
     assert found.channels["irradiance"].reference.mean() == pytest.approx(2 * np.pi, rel=0.01)
-    assert abs(found.channels["irradiance"].figures["bias"]) < 0.005
+    assert abs(found.channels["irradiance"].metrics["bias"]) < 0.005
 
 
 def test_ao_alone(tmp_path):
@@ -67,7 +67,7 @@ def test_many_pages(tmp_path):
 def test_nothing_is_lit(tmp_path):
     found = verify(baked(tmp_path / "out", room(0.0)), QUICK)
     assert found.passed
-    figures = found.channels["irradiance"].figures
+    figures = found.channels["irradiance"].metrics
     assert figures["bias"] == figures["median"] == figures["max"] == 0
     # Numbers only: what JSON cannot say is not in it.
     json.dumps(verification_json(found), allow_nan=False)

@@ -1,7 +1,7 @@
 """`baker verify` with its own limits: what may go wrong in a map or in a bake must not pass.
 
 Two closed rooms side by side, one a thousand times brighter than the other. The reference is traced once, as
-it knows nothing of the maps; only which texels are judged would depend on them.
+it knows nothing of the maps; only the choice of texels would depend on them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.bake.read_bake import read_bake
 from baker.lights.emissive import build_emitters
-from baker.metrics.texel_area import instance_map, texel_places
+from baker.metrics.texel_area import instance_map, surface_points
 from baker.pathtracer.emitters import find_emitters
 from baker.pipeline.bake import bake
 from baker.verification.settings import VerifySettings
@@ -35,14 +35,16 @@ BAKED = {"resolution": 128, "samples": 256, "ao_distance": "0.5"}
 DIM, SIZE = 1e-3, 128
 
 
-def rooms(dim_lamp=2.0 * DIM):
+def rooms(dim_emitter=2.0 * DIM):
     red, green = Material(base_colour=(0.7, 0.2, 0.1, 1.0)), Material(base_colour=(0.2, 0.6, 0.3, 1.0))
     quads = []
     for x in (0.0, 3.0):
         walls = box_quads((x, 0, 0), (x + 2, 2.5, 2), inward=True, material=grey(0.6))
         walls[0], walls[1] = replace(walls[0], material=red), replace(walls[1], material=green)
-        lamp = Quad((x + 0.5, 1.6, 1.95), (1.0, 0, 0), (0, -0.8, 0), grey(0, 2.0 if x == 0 else dim_lamp))
-        quads += [*walls, lamp]
+        emitter = Quad(
+            (x + 0.5, 1.6, 1.95), (1.0, 0, 0), (0, -0.8, 0), grey(0, 2.0 if x == 0 else dim_emitter)
+        )
+        quads += [*walls, emitter]
     quads += box_quads((0.3, 0.4, 0.2), (0.9, 1.0, 0.8), inward=False, material=grey(0.4))
     return quad_scene(quads)
 
@@ -78,7 +80,7 @@ def surface(sound):
     owner = instance_map(geometry, 1, SIZE)
     pixel = np.flatnonzero(owner.reshape(-1) >= 0)
     position = np.full((SIZE * SIZE, 3), np.nan)
-    position[pixel] = texel_places(geometry, pixel, SIZE, 1, 0).position[:, 0] + geometry.origin
+    position[pixel] = surface_points(geometry, pixel, SIZE, 1, 0).position[:, 0] + geometry.origin
     return owner[0], position.reshape(SIZE, SIZE, 3), stored.status[0]
 
 
@@ -207,7 +209,7 @@ TAMPERING = {
     "left and right": (lambda p, _: p[:, ::-1].copy(), "chart_noise"),
     "shifted by a texel": (lambda p, _: np.roll(p, 1, axis=0), "shifted"),
     "red and blue swapped": (lambda p, _: p[..., ::-1].copy(), "whole_colour"),
-    "tint of 3 %": (lambda p, _: p * np.float32([1.03, 1, 1]), "whole_colour"),
+    "red of 3 %": (lambda p, _: p * np.float32([1.03, 1, 1]), "whole_colour"),
     "green of 3 %": (lambda p, _: p * np.float32([1, 1.03, 1]), "whole_colour"),
     "an object 4 % red": (one(4, np.float32([1.04, 1, 1])), "object_colour"),
     "an object 10 % darker": (one(2, 0.9), "object_bias"),
@@ -277,8 +279,8 @@ def test_single_wrong_texels_are_found(sound, surface, tmp_path):
     ("scene", "settings"),
     [
         pytest.param(rooms(), {"bounces": 1}, id="the solver stopped early"),
-        pytest.param(rooms(dim_lamp=0.0), {}, id="a lamp was lost"),
-        pytest.param(rooms(dim_lamp=1.8 * DIM), {}, id="a lamp of 90 %"),
+        pytest.param(rooms(dim_emitter=0.0), {}, id="an emitter was lost"),
+        pytest.param(rooms(dim_emitter=1.8 * DIM), {}, id="an emitter of 90 %"),
     ],
 )
 def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene, settings):
@@ -309,6 +311,6 @@ def test_an_emitter_that_a_finder_forgets_is_missed(tmp_path, monkeypatch, both)
         monkeypatch.setattr("baker.pathtracer.light_table.find_emitters", forgetful(find_emitters))
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
     found = verify(tmp_path / "out", SETTINGS.changed(texels=300, spp=256))
-    # Only what rays meet at the lamp itself is left in the dim room of this bake.
+    # Only what rays meet at the emitter itself is left in the dim room of this bake.
     assert "region_bias" in failed(found)
     assert not found.passed

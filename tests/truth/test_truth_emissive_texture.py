@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judged import copies_of, traced
+from reference_runs import copies_of, traced
 from scenes import SceneBuilder
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical

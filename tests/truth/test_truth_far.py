@@ -74,7 +74,7 @@ def test_the_maps_are_the_same(folders):
 
 def test_the_judge_finds_the_far_bake_right_and_says_where(folders):
     found = verify(folders["far"], VerifySettings(texels=200, spp=64))
-    figures = found.channels["irradiance"].figures
+    figures = found.channels["irradiance"].metrics
     assert abs(figures["bias"]) < 0.03
     for entry in found.worst:
         assert np.abs(np.array(entry["position"]) - FAR - (0, 1, 0)).max() <= 1.001
@@ -102,9 +102,9 @@ def test_pictures_are_taken_from_cameras_in_the_world(estimator):
 def test_diff_finds_the_far_surface(folders):
     found = compare(folders["far"], folders["far"])
     assert found.unmatched == 0
-    assert found.channels["irradiance"].figures["max"] == 0
+    assert found.channels["irradiance"].metrics["max"] == 0
     moved = compare(folders["near"], folders["far"])
-    assert moved.channels["irradiance"].figures["median"] < 1e-3
+    assert moved.channels["irradiance"].metrics["median"] < 1e-3
 
 
 @pytest.mark.parametrize("around", ["nothing", "sky", "terrain", "centimetres"])

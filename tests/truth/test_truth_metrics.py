@@ -1,4 +1,4 @@
-"""The judge is judged: every closed form within three of its own standard errors and within 0.2 %."""
+"""The reference against closed forms: each within three of its own standard errors and within 0.2 %."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from closed_forms import (
     spot_flux,
     walled_open_share,
 )
-from judged import UP, assert_closed_form, copies_of, opened, spread_over, traced
+from reference_runs import UP, assert_closed_form, copies_of, spread_over, traced, traced_ao
 from scenes import icosphere
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 
@@ -294,14 +294,14 @@ def test_openness_beside_a_wall(height, reach):
     wall = Quad((0, -2, 0), (0, 4, 0), (0, 0, height), grey(0.5, double_sided=True))
     corners = np.array([(0, 2, 0), (0, 2, height), (0, -2, height), (0, -2, 0)], float)
     truth = [1 - polygon_irradiance(corners, (x, 0.5, 0), UP) / math.pi for x in NEAR]
-    assert_closed_form(opened(quad_scene([wall]), floor_places(NEAR, 0.5), reach, samples=256), truth)
+    assert_closed_form(traced_ao(quad_scene([wall]), floor_places(NEAR, 0.5), reach, samples=256), truth)
 
 
 @pytest.mark.parametrize(("height", "reach"), [(10.0, 0.5), (0.2, 0.5), (1.0, 0.9)])
 def test_openness_beside_a_wall_within_a_distance(height, reach):
     wall = Quad((0, -2, 0), (0, 4, 0), (0, 0, height), grey(0.5, double_sided=True))
     truth = walled_open_share(NEAR, height, reach)
-    assert_closed_form(opened(quad_scene([wall]), floor_places(NEAR), reach, samples=256), truth)
+    assert_closed_form(traced_ao(quad_scene([wall]), floor_places(NEAR), reach, samples=256), truth)
 
 
 @pytest.mark.parametrize("reach", [0.5, np.inf])
@@ -316,4 +316,4 @@ def test_openness_where_two_walls_meet(reach):
         truth = 1 - (polygon_irradiance(first, place, UP) + polygon_irradiance(second, place, UP)) / math.pi
     else:
         truth = cornered_open_share(x, y, reach)
-    assert_closed_form(opened(quad_scene([a, b]), floor_places(x, y), reach, samples=256), truth)
+    assert_closed_form(traced_ao(quad_scene([a, b]), floor_places(x, y), reach, samples=256), truth)

@@ -44,7 +44,7 @@ def barycentric(corner, point):
 
 
 def test_furnace_of_the_path_tracer_itself():
-    """The judge is judged: E = pi L / (1 - rho) in a glowing box."""
+    """The reference against a closed form: E = pi L / (1 - rho) in a glowing box."""
     builder = SceneBuilder(64)
     builder.box((0, 0, 0), (1, 2, 3), builder.material(0.5, 1.0), 8, inward=True)
     rng = np.random.default_rng(1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import point_irradiance
-from judged import copies_of, traced
+from reference_runs import copies_of, traced
 from scenes import SceneBuilder
 from test_truth_tint import COLOUR, HALF, glass, passed
 from tiny_scenes import Quad, box_quads, grey, quad_scene

@@ -111,7 +111,7 @@ def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
     "scene-size",
     group="geometry",
     severity="warning",
-    fix="export in metres (`scale` for OBJ, PLY, STL and OFF)",
+    fix="export in metres (`scale` for formats without units)",
 )
 def scene_size(context: CheckContext) -> Iterator[RawFinding]:
     """A scene whose size suggests a wrong unit: a diagonal below 5 cm or above 5 km.

@@ -1,7 +1,7 @@
-"""Keeps two runs from baking into one output folder at the same time.
+"""A lock that prevents two runs from baking into one output folder at the same time.
 
-The lock is the operating system's, on a small file beside the folder: it ends with the process that holds
-it, however that ends, so nothing can stay locked. What a killed run left half written is removed here, too.
+It is a file lock of the operating system on a small file beside the folder, which is released when the
+process that holds it ends for any reason. The incomplete output of killed runs is removed here, too.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from baker.io.temporary import temporaries
 
 
 class OutputLock:
-    """Holds an output folder for one job.
+    """The lock of an output folder.
 
     Parameters
     ----------
     out : Path
-        The output folder; it need not exist, its parents are made.
+        The output folder, which need not exist; its parents are created.
     """
 
     def __init__(self, out: Path) -> None:
@@ -38,7 +38,7 @@ class OutputLock:
         Raises
         ------
         OSError
-            If the lock file cannot be made: the place is not writable.
+            If the lock file cannot be created.
         """
         for parent in reversed([p for p in self.path.parents if not p.exists()]):
             with contextlib.suppress(FileExistsError):
@@ -51,15 +51,15 @@ class OutputLock:
         if _lock(file) and _is_at(file, self.path):
             self._file = file
             return True
-        # Held by another run; or its holder removed the file between our opening and locking it.
+        # Another run holds it, or removed the file after it was opened and before it was locked here.
         os.close(file)
         return False
 
     def release(self) -> None:
-        """Give the lock back and remove its file, and folders that were made for nothing."""
+        """Release the lock, and remove its file and the empty parents that were created."""
         if self._file is None:
             return
-        # While it is still held: nobody else may have locked the name meanwhile.
+        # Remove the file before the release, so that no other run can have locked it.
         with contextlib.suppress(OSError):
             self.path.unlink()
         os.close(self._file)
@@ -73,9 +73,19 @@ class OutputLock:
 
 @contextlib.contextmanager
 def held(out: Path) -> Iterator[None]:
-    """Hold an output folder for one bake that does not wait for others.
+    """Hold the lock of an output folder within a `with` block, without waiting for other runs.
 
-    Where no lock file can be made beside the folder (it is a mount point, say), nothing is held.
+    Where no lock file can be created beside the folder (a mount point, for example), no lock is held.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder.
+
+    Yields
+    ------
+    None
+        While the lock is held.
 
     Raises
     ------
@@ -84,7 +94,7 @@ def held(out: Path) -> Iterator[None]:
     """
     lock = OutputLock(out)
     try:
-        # A second time: whoever held it may have removed it meanwhile.
+        # Try twice: the run that held it may have removed the file in between.
         free = lock.acquire() or lock.acquire() or not lock.path.exists()
     except OSError:
         free = True
@@ -98,13 +108,30 @@ def held(out: Path) -> Iterator[None]:
 
 
 def sweep(out: Path) -> None:
-    """Remove what runs that were killed left of a bake into `out`; call it with the lock held."""
+    """Remove the incomplete output of killed runs; call it with the lock held.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder.
+    """
     dead = dead_writers(out)
     remove_leftovers(out, [found for found in temporaries(out) if found.process in dead])
 
 
 def dead_writers(out: Path) -> set[int]:
-    """Return the ids of processes that left temporary folders of `out` and no longer live."""
+    """Return the processes that have ended and left temporary folders.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder.
+
+    Returns
+    -------
+    set of int
+        Process ids.
+    """
     return {found.process for found in temporaries(out) if not _alive(found.process)}
 
 

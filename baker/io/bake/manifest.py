@@ -1,6 +1,6 @@
-"""Makes `bake.json`, which says what a bake is: its files, where each object lies in them, how it was made.
+"""Builds `bake.json`, the manifest of a bake: its files, the page of each object, settings and versions.
 
-The same bake gives the same text, `created` and `timings` aside.
+Equal bakes have equal manifests, except for `created` and `timings`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from baker.core.lightmap import BakeResult
 from baker.core.scene import SceneWarning
 from baker.core.settings import BakeSettings
 
-# The layout of the manifest; it changes when a key changes its name or meaning.
+# Version of the manifest's layout; it changes when the name or the meaning of a key changes.
 VERSION = 1
 
-# Distributions whose version can change the numbers of a bake, with the name users know them by.
+# Distributions whose version can change the numbers of a bake, by their common name.
 _LIBRARIES = {
     "baker": "baker", "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
     "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
@@ -46,30 +46,31 @@ def make_manifest(
     Parameters
     ----------
     result : BakeResult
+        The bake.
     out : Path
         The folder that the input's path is relative to.
     pages : list of dict
-        One entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of a channel.
+        An entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of a channel.
     files : list of dict
-        Every file of the folder but the manifest: {file, sha256}.
+        An entry {file, sha256} for every file of the folder except the manifest.
     instance_mesh : tuple of int
         Mesh of each instance in `scene.glb`.
     warnings : tuple of SceneWarning
-        What writing the maps found.
+        Warnings from writing the maps.
     created : datetime or None
         Time of writing; None is now.
 
     Returns
     -------
     dict
+        The manifest.
     """
-    scene = result.scene
     moment = (created or datetime.now(UTC)).astimezone(UTC)
     manifest = {
         "version": VERSION,
         "settings": _settings(result),
         "versions": library_versions(),
-        "input": {"path": _relative(scene.path, out), "sha256": scene.sha256 or None},
+        "input": {"path": _relative(result.scene.path, out), "sha256": result.scene.sha256 or None},
         "created": moment.isoformat(timespec="seconds").replace("+00:00", "Z"),
         "pages": pages,
         "instances": _instances(result, instance_mesh),
@@ -88,8 +89,8 @@ def make_manifest(
         "denoise": result.denoise,
         "files": files,
     }
-    plain: dict[str, Any] = _plain(manifest)
-    return plain
+    values: dict[str, Any] = _plain(manifest)
+    return values
 
 
 def manifest_text(manifest: dict[str, Any]) -> str:
@@ -105,7 +106,18 @@ def manifest_schema() -> dict[str, Any]:
 
 
 def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
-    """Return every setting with its default filled in, but the number of threads: it changes nothing."""
+    """Return every setting with its default value resolved, without `threads`, which changes no result.
+
+    Parameters
+    ----------
+    settings : BakeSettings
+        The settings of a bake.
+
+    Returns
+    -------
+    dict
+        Plain JSON values by name.
+    """
     values = settings.model_dump(mode="json", exclude={"threads"})
     samples = settings.hemisphere_samples
     values["samples"] = samples
@@ -115,8 +127,8 @@ def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
 
 
 def _settings(result: BakeResult) -> dict[str, Any]:
-    reach = result.settings.ao_reach(_diagonal(result))
-    return {**resolved_settings(result.settings), "ao_distance_metres": reach}
+    metres = result.settings.ao_reach(_diagonal(result))
+    return {**resolved_settings(result.settings), "ao_distance_metres": metres}
 
 
 def _diagonal(result: BakeResult) -> float:
@@ -133,7 +145,13 @@ def _diagonal(result: BakeResult) -> float:
 
 
 def library_versions() -> dict[str, str | None]:
-    """Return the versions of baker, Python and the libraries that can change the numbers of a bake."""
+    """Return the versions of baker, Python and the libraries that can change the numbers of a bake.
+
+    Returns
+    -------
+    dict of str to str or None
+        None for libraries that are not installed.
+    """
     versions: dict[str, str | None] = {}
     for name, distribution in _LIBRARIES.items():
         try:
@@ -149,7 +167,7 @@ def _relative(path: Path | None, out: Path) -> str | None:
     try:
         return Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
     except ValueError:
-        # Another drive: there is no way from one to the other.
+        # There is no relative path between drives.
         return path.resolve().as_posix()
 
 
@@ -194,19 +212,19 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
 
 
 def _statistics(result: BakeResult, channel: str) -> dict[str, Any]:
-    """Return what the bake found out, or the plain figures of the covered texels."""
+    """Return the statistics of a channel: those of the bake, or those of the covered texels."""
     if channel in result.statistics:
         return result.statistics[channel]
     covered = np.isin(result.status, (1, 3, 4))
     value = result.lightmaps[channel].value[covered]
-    figures = (
+    range_and_mean = (
         {"min": value.min(), "max": value.max(), "mean": value.mean(dtype=np.float64)} if value.size else {}
     )
     return {
         "min": 0.0,
         "max": 0.0,
         "mean": 0.0,
-        **figures,
+        **range_and_mean,
         "clipped": 0,
         "invalid": (result.status == 3).sum(),
     }
@@ -218,7 +236,7 @@ def _warnings(result: BakeResult, more: tuple[SceneWarning, ...]) -> list[dict[s
 
 
 def _plain(value: Any) -> Any:
-    """Return `value` made of plain JSON types; numbers that JSON cannot say become null."""
+    """Return `value` in plain JSON types; numbers that are not finite become null."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

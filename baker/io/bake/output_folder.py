@@ -1,8 +1,8 @@
-"""An output folder that is either the old one or the new one, never a half of each.
+"""Atomic replacement of an output folder: it holds either the old bake or the new one.
 
-All files go to a temporary folder beside the output folder, which takes its place by renaming at the end.
-Renames are kept in a journal, so that whatever goes wrong is put back. Where the output folder itself cannot
-be renamed (a mount point, the current folder) the files are exchanged one by one under the same journal.
+All files are written to a temporary folder beside the output folder, which replaces it by renaming at the
+end. Renames are recorded in a journal and undone after an error. Where the output folder itself cannot be
+renamed (a mount point, the current folder) its files are exchanged one by one with the same journal.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
-    """Make sure, before the long work, that a bake may be written to `out`.
+    """Check, before the long work, that a bake may be written to a folder.
 
     Parameters
     ----------
     out : Path
         The output folder; neither it nor its parents need to exist.
     force : bool
-        Also accept a folder with files that baker did not write (they stay there).
+        Accept a folder with files that baker did not write (they are kept).
     scene_path : Path or None
-        The input, which must not be among the files to be replaced.
+        The input, which must not be among the replaced files.
 
     Raises
     ------
@@ -69,9 +69,18 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
 
 
 def own_files(folder: Path) -> set[str] | None:
-    """List the files of a bake, as paths relative to its folder; None if it is not baker's.
+    """List the files of a bake.
 
-    A manifest that names a file outside of the folder, by its path or through a link, is not baker's.
+    Parameters
+    ----------
+    folder : Path
+        An output folder.
+
+    Returns
+    -------
+    set of str or None
+        Paths relative to the folder; None if it has no manifest of baker. A manifest that names a file
+        outside of the folder, by its path or through a link, is not accepted.
     """
     try:
         manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
@@ -91,7 +100,20 @@ def _lies_inside(folder: Path, name: object) -> bool:
 
 
 def file_state(path: Path, sha256: str) -> str:
-    """Compare a file of a bake with the hash in its manifest: "as baked", "changed" or "missing"."""
+    """Compare a file of a bake with the hash in its manifest.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    sha256 : str
+        Its hash in the manifest.
+
+    Returns
+    -------
+    str
+        "as baked", "changed" or "missing".
+    """
     if not path.is_file():
         return "missing"
     with path.open("rb") as file:
@@ -99,15 +121,15 @@ def file_state(path: Path, sha256: str) -> str:
 
 
 class OutputFolder:
-    """Collects the files of a bake in `path` until `commit` puts them in place.
+    """A temporary folder, `path`, for the files of a bake, which `commit` moves to the output folder.
 
-    Use it as a context manager: leaving it without `commit`, by whatever exception, removes the temporary
-    folder. `abort` may be called more than once.
+    Use it as a context manager: leaving it without `commit` removes the temporary folder. `abort` may be
+    called more than once.
 
     Parameters
     ----------
     out : Path
-        Where the files end up; see `check_out`.
+        The output folder; see `check_out`.
 
     Attributes
     ----------
@@ -124,7 +146,7 @@ class OutputFolder:
         self._made: list[Path] = []
 
     def __enter__(self) -> OutputFolder:
-        """Make the temporary folder, and the parents of the output folder."""
+        """Create the temporary folder, and the parents of the output folder."""
         try:
             for parent in reversed([p for p in self.path.parents if not p.exists()]):
                 parent.mkdir()
@@ -138,16 +160,16 @@ class OutputFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Remove what was not committed."""
+        """Remove the temporary folder if it was not committed."""
         self.abort()
 
     def commit(self) -> None:
-        """Put the files in the place of the old ones; files that baker did not write stay.
+        """Replace the old files by the new ones; files that baker did not write are kept.
 
         Raises
         ------
         OSError
-            If the system refuses; the old folder is then as it was.
+            If a file cannot be moved; the old folder is unchanged.
         """
         try:
             if self._in_place:
@@ -163,7 +185,7 @@ class OutputFolder:
             shutil.rmtree(leftover, ignore_errors=True)
 
     def abort(self) -> None:
-        """Put the old folder back as it was and remove everything temporary."""
+        """Restore the old folder, and remove all temporary files."""
         while self._journal:
             source, target = self._journal[-1]
             if os.path.lexists(target) and not os.path.lexists(source):
@@ -175,7 +197,7 @@ class OutputFolder:
             try:
                 self._made.pop().rmdir()
             except OSError:
-                # Someone else has put something there meanwhile: it is theirs.
+                # Another process has created files there.
                 self._made.clear()
 
     def _exchange_folders(self) -> None:
@@ -188,7 +210,7 @@ class OutputFolder:
     def _exchange_files(self) -> None:
         new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
         old = {Path(name) for name in own_files(self.out) or ()} | set(new)
-        # The old manifest goes first and the new one last: a folder with a manifest is whole.
+        # Move the old manifest first and the new one last: a folder with a manifest is complete.
         for name in sorted(old, key=lambda n: (n.as_posix() != MANIFEST_NAME, n)):
             if (self.out / name).exists():
                 (self._aside / name).parent.mkdir(parents=True, exist_ok=True)
@@ -198,7 +220,7 @@ class OutputFolder:
             self._rename(self.path / name, self.out / name)
 
     def _rename(self, source: Path, target: Path) -> None:
-        # Written down first: an interruption between the two lines must still find its way back.
+        # Record the rename before it is done, so that an interruption in between is undone as well.
         self._journal.append((source, target))
         try:
             source.rename(target)
@@ -208,14 +230,14 @@ class OutputFolder:
 
 
 def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
-    """Clean up after a process that was killed while it wrote: the old files come back, if they were moved.
+    """Restore the old files after a process was killed while it wrote, and remove its temporary folders.
 
     Parameters
     ----------
     out : Path
-        The output folder, or the file, it wrote to.
+        The output folder or file of the process.
     left : iterable of Temporary
-        Its temporary folders, among those that `temporaries` finds.
+        Its temporary folders, from `temporaries`.
     """
     target, left = out.resolve(), list(left)
     for temporary in left:
@@ -226,11 +248,12 @@ def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
 
 
 def _put_back(aside: Path, target: Path) -> None:
+    """Move the old files from the folder `aside` back to the output folder."""
     if aside.parent != target:
         if not target.exists():
             aside.rename(target)
     elif not (target / MANIFEST_NAME).exists():
-        # The manifest is exchanged last: without it the new files are not all there.
+        # The manifest is moved last: without it the new files are incomplete.
         for path in sorted(path for path in aside.rglob("*") if path.is_file()):
             name = path.relative_to(aside).as_posix()
             if _lies_inside(target, name):
@@ -238,13 +261,13 @@ def _put_back(aside: Path, target: Path) -> None:
 
 
 def _cannot_move(folder: Path) -> bool:
-    """Say whether a folder must stay where it is: mounted, in a locked parent, or the one we stand in."""
+    """Return whether a folder cannot be renamed: mounted, in a read-only parent, or the current folder."""
     if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
         return True
     try:
         return Path.cwd().is_relative_to(folder)
     except OSError:
-        # The current folder was removed under our feet.
+        # The current folder no longer exists.
         return False
 
 
@@ -256,7 +279,7 @@ def _check_writable(folder: Path, out: Path) -> None:
 
 
 def _carry_over(old: Path, new: Path, own: set[str], prefix: str = "") -> None:
-    """Bring the files that are not baker's from the old folder into the new, linked where possible."""
+    """Link or copy the files that are not baker's from the old folder to the new one."""
     for entry in sorted(os.scandir(old), key=lambda e: e.name):
         name, target = prefix + entry.name, new / entry.name
         if name in own or (os.path.lexists(target) and not entry.is_dir(follow_symlinks=False)):

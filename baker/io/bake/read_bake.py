@@ -1,6 +1,6 @@
-"""Reads a finished output folder back: scene, lightmap uv, maps, status, manifest.
+"""Reads a finished output folder: scene, lightmap uv, maps, status, manifest.
 
-Whatever judges or shows a bake starts here; it sees the files as they are, not as they were written.
+Verification, comparison and the viewer use it: they read the files, not the data of the bake in memory.
 """
 
 from __future__ import annotations
@@ -38,11 +38,12 @@ class StoredBake:
     scene : Scene
         `scene.glb`; the sky is in `manifest["settings"]`.
     atlas : Atlas
-        From TEXCOORD_1, page numbers from the manifest; `chart` is the instance's number.
-    maps : dict of channel to (P, H, W, C) float32
+        From TEXCOORD_1, with page numbers from the manifest; `chart` is the index of the instance.
+    maps : dict of str to (P, H, W, C) float32
+        Pages of each channel.
     status : (P, H, W) uint8, `core.lightmap.TexelStatus`
     warnings : tuple of SceneWarning
-        Files that are not as they were baked.
+        Files that changed since the bake.
     """
 
     folder: Path
@@ -72,11 +73,12 @@ def read_bake(folder: Path | str) -> StoredBake:
     Returns
     -------
     StoredBake
+        The bake, with warnings about files that changed.
 
     Raises
     ------
     InputError
-        If the folder holds no bake, a file of it is missing or unreadable, or its parts do not fit together.
+        If the folder holds no bake, a file of it is missing or unreadable, or its parts are inconsistent.
     """
     folder = Path(folder)
     if folder.name == MANIFEST_NAME:
@@ -84,8 +86,8 @@ def read_bake(folder: Path | str) -> StoredBake:
     manifest = read_manifest(folder)
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
     scene = load_scene(_present(folder, SCENE_NAME))
-    told = manifest.get("settings", {})
-    scene = choose_objects(scene, told.get("include", ()), told.get("exclude", ()))
+    settings = manifest.get("settings", {})
+    scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
     maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
     resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
@@ -119,7 +121,7 @@ def _differs(folder: Path, entry: dict[str, Any]) -> bool:
 def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:
     name = str(entry["file"])
     if (folder / name).is_file():
-        return SceneWarning("changed-file", f"{name} is not as it was baked; it is judged as it is", name)
+        return SceneWarning("changed-file", f"{name} is not as it was baked; it is read as it is", name)
     return SceneWarning("missing-file", f"{name} is missing", name)
 
 

@@ -1,7 +1,7 @@
-"""Reads `bake.json` of a finished folder, and refuses what could not have been written there.
+"""Reads and validates `bake.json` of a finished folder.
 
-Numbers of a manifest become sizes and indices, and its names become paths. So it is compared with the
-schema, and its parts with each other, before anything else reads it.
+Its numbers are used as sizes and indices, and its names as paths. So it is compared with the schema, and its
+parts with each other, before it is used.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from baker.core.errors import InputError
 from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 
-# Far above the manifest of a million instances; a longer file is not read.
+# Largest file that is read, bytes; the manifest of a million instances is far smaller.
 _LONGEST = 1 << 30
-# Larger than any page that can be baked.
+# Largest page, texels a side.
 _WIDEST = 1 << 16
+# Characters at the beginning and at the end of a long text in messages.
 _SHORT = 60
 
 
@@ -32,7 +33,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        It obeys the schema; page numbers of instances and channels exist, nodes and names are unique, every
+        Valid by the schema; page numbers of instances and channels exist, nodes and names are unique, every
         file name is a path inside the folder, numbers are finite.
 
     Raises
@@ -47,8 +48,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
     try:
         manifest: dict[str, Any] = json.loads(path.read_text("utf-8"), parse_constant=_no_number)
-        _obey_schema(manifest)
-        _fit_together(manifest)
+        _check_schema(manifest)
+        _check_consistency(manifest)
     except (ValueError, OverflowError, RecursionError) as error:
         what = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"the manifest is damaged: {what}; bake the scene again", file=str(path)) from None
@@ -59,8 +60,9 @@ def _no_number(name: str) -> NoReturn:
     raise ValueError(f"{name} is not a JSON number")
 
 
-def _obey_schema(manifest: dict[str, Any]) -> None:
-    # Slow to import, and only needed where a bake is read back.
+def _check_schema(manifest: dict[str, Any]) -> None:
+    """Raise ValueError for the first violation of the schema."""
+    # Import here: it is slow, and only needed where a bake is read.
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
@@ -79,8 +81,8 @@ def _short(text: str) -> str:
     return text if len(text) <= 2 * _SHORT else f"{text[:_SHORT]} ... {text[-_SHORT:]}"
 
 
-def _fit_together(manifest: dict[str, Any]) -> None:
-    """Raise ValueError if parts of a manifest that obeys the schema contradict each other."""
+def _check_consistency(manifest: dict[str, Any]) -> None:
+    """Raise ValueError if parts of a manifest that is valid by the schema contradict each other."""
     _finite(manifest["pages"], "pages")
     _finite(manifest["instances"], "instances")
     by_channel: dict[str, list[int]] = {}
@@ -108,7 +110,7 @@ def _fit_together(manifest: dict[str, Any]) -> None:
 
 
 def _finite(value: Any, where: str) -> None:
-    """Raise ValueError if a number is larger than float32 can hold."""
+    """Raise ValueError if a number exceeds the range of float32."""
     queue = [value]
     while queue:
         part = queue.pop()

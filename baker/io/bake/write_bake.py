@@ -22,7 +22,7 @@ from baker.io.png import encode_palette_png, encode_png, grey_levels
 
 __all__ = ["check_out", "write_bake"]
 
-# Colours told apart in grey and by eyes that mix red and green.
+# Colours that differ in luminance and for red-green colour blindness.
 STATUS_COLOURS = {
     TexelStatus.EMPTY: (16, 16, 16),
     TexelStatus.COVERED: (86, 180, 233),
@@ -31,7 +31,7 @@ STATUS_COLOURS = {
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
 
-# Fewer banded texels than this share of a page are told in the manifest, but not warned of.
+# Share of banded texels of a page above which there is a warning; the manifest lists all.
 BANDED_SHARE = 0.01
 
 _QUANTITY = {
@@ -48,17 +48,18 @@ def write_bake(
     progress: Progress = silent,
     created: datetime | None = None,
 ) -> dict[str, Any]:
-    """Write a bake to `out`, all of it or nothing.
+    """Write a bake to a folder, completely or not at all.
 
     Parameters
     ----------
     result : BakeResult
+        The bake.
     out : Path
         The output folder. A bake there is replaced; files that baker did not write are kept.
     force : bool
         Also write into a folder that is not a bake.
     progress : Progress
-        Is told of each file; may cancel.
+        Receives a report for each file, and may cancel.
     created : datetime or None
         Time to write into the manifest; None is now.
 
@@ -70,11 +71,11 @@ def write_bake(
     Raises
     ------
     SettingsError
-        If `out` is not a place to write to, see `check_out`.
+        If `out` may not be written to, see `check_out`.
     ResourceError
-        If the disk is full or not writable; the folder is then as it was.
+        If the disk is full or not writable; the folder is unchanged.
     Cancelled
-        If `progress` says so; the folder is then as it was.
+        If `progress` cancels; the folder is unchanged.
     """
     check_out(out, force=force, scene_path=result.scene.path)
     try:
@@ -86,7 +87,7 @@ def write_bake(
         message = f"the bake cannot be written ({why}); free some space or name another folder"
         raise ResourceError(message, file=str(out)) from error
     except ResourceError as error:
-        # The file named by the error lay in the temporary folder, which is gone.
+        # Name the output folder: the temporary file of the error is removed.
         raise ResourceError(error.message, file=str(out)) from error
     return manifest
 
@@ -127,7 +128,7 @@ def _write_files(
         created=created,
     )
     _write_manifest(folder.path, manifest)
-    # An export reads a bake that is whole but for the exports themselves.
+    # Exports read the folder, which is complete except for exports.
     for name in result.settings.export:
         report(progress, Stage.WRITE, 1.0, f"export {name}")
         manifest["files"] += _write_export(folder.path, name)
@@ -141,7 +142,7 @@ def _write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
 
 
 def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Write one export into a folder of its name; return its files for the manifest."""
+    """Write an export into a folder of its name; return its files for the manifest."""
     export = EXPORTS.require(name, "export", setting="export")
     target = folder / name
     target.mkdir()
@@ -196,28 +197,41 @@ def _write_page(
 
 
 def encoding_named(name: str) -> Encoding[Any]:
-    """Return the encoding of that name.
+    """Return an encoding that `encode` takes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the encoding.
+
+    Returns
+    -------
+    Encoding
+        The plugin.
 
     Raises
     ------
     SettingsError
         If there is none.
     """
-    # The EXR is always written, so `encode` does not take it.
+    # The message does not offer EXR: it is always written, so `encode` does not take it.
     return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 
 def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
-    """Make sure, before the long work, that each encoding asked for has a channel to hold.
+    """Check, before the long work, that each encoding can hold one of the channels.
 
     Parameters
     ----------
     names : tuple of str
-    components : dict of channel to its number of components
+        Encodings asked for.
+    components : dict of str to int
+        Number of components of each channel.
 
     Raises
     ------
     SettingsError
+        If an encoding is unknown, is EXR, or can hold none of the channels.
     """
     for name in names:
         encoding = encoding_named(name)

@@ -17,24 +17,26 @@ _DTYPE = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 FLOAT = 5126
 UNSIGNED = (5121, 5123, 5125)
-# More rows than this without any bytes behind them are a broken count, not a mesh.
-_MOST_ZEROS = 1 << 26
+# Largest count of an accessor without data.
+_MAX_ZEROS = 1 << 26
 
 
 def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...]) -> NDArray[np.float32]:
-    """Return an accessor's rows as float32; normalised integers become 0 to 1 or -1 to 1.
+    """Read the elements of an accessor as float32; normalised integers become 0 to 1 or -1 to 1.
 
     Parameters
     ----------
     document : GltfDocument
+        The document.
     index : int
         A valid accessor index.
     types : tuple of str
-        The element types that the use allows, like ("VEC3",).
+        Allowed element types, such as ("VEC3",).
 
     Returns
     -------
     (N, width) float32
+        The elements.
 
     Raises
     ------
@@ -52,7 +54,19 @@ def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...])
 
 
 def read_indices(document: GltfDocument, index: int) -> NDArray[np.int64]:
-    """Return an index accessor's values, (N,) int64.
+    """Read the values of an index accessor.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        The document.
+    index : int
+        A valid accessor index.
+
+    Returns
+    -------
+    (N,) int64
+        The indices.
 
     Raises
     ------
@@ -78,7 +92,7 @@ def _rows(document: GltfDocument, accessor: JsonObject, types: tuple[str, ...]) 
     width, count = _WIDTH[kind], accessor.integer("count", minimum=1)
     if "bufferView" in accessor:
         rows = _strided(document, accessor, dtype, count, width)
-    elif count > _MOST_ZEROS:
+    elif count > _MAX_ZEROS:
         accessor.fail(f"the accessor has {count} rows but no data", "count")
     else:
         rows = np.zeros((count, width), dtype)
@@ -99,7 +113,7 @@ def _dtype(holder: JsonObject) -> np.dtype[Any]:
 def _strided(
     document: GltfDocument, holder: JsonObject, dtype: np.dtype[Any], count: int, width: int
 ) -> NDArray[Any]:
-    """Return a view of (count, width) elements, without a copy, after checking that it fits."""
+    """Return a view (count, width) of the elements, without a copy; raise if they exceed the buffer view."""
     n_views = len(document.root.children("bufferViews"))
     data, view_offset, length, stride = document.view(holder.index("bufferView", n_views, "bufferViews"))
     offset, element = holder.integer("byteOffset", 0), dtype.itemsize * width

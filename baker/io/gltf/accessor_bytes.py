@@ -1,4 +1,4 @@
-"""Reads accessors as raw element bytes, so that vertices can be put in another order and nothing converted.
+"""Reads the elements of accessors as bytes, to reorder vertices without converting them.
 
 Based on: Khronos Group, glTF 2.0 specification, 3.6.2 Accessors.
 """
@@ -18,7 +18,7 @@ _MATRIX = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
 
 
 def element_size(accessor: Json) -> int:
-    """Return the bytes of one element; matrix columns start at multiples of four bytes."""
+    """Return the size of an element in bytes; matrix columns start at multiples of four bytes."""
     component = COMPONENT[accessor["componentType"]].itemsize
     if accessor["type"] in _MATRIX:
         side = _MATRIX[accessor["type"]]
@@ -29,25 +29,28 @@ def element_size(accessor: Json) -> int:
 def gather_rows(
     document: Json, buffers: tuple[bytes, ...], index: int, rows: NDArray[np.int32]
 ) -> NDArray[np.uint8]:
-    """Return the raw bytes of some elements of an accessor, sparse ones included.
+    """Return the bytes of some elements of an accessor, which may be sparse.
 
     Parameters
     ----------
-    document : dict, glTF JSON
+    document : dict
+        glTF JSON.
     buffers : tuple of bytes
+        Buffers of the document.
     index : int
-        The accessor.
+        Index of the accessor.
     rows : (N,) int32
-        Element numbers; any may come several times.
+        Numbers of the elements, possibly with repetitions.
 
     Returns
     -------
     (N, B) uint8
+        Bytes of each element.
 
     Raises
     ------
     InputError
-        If the accessor is malformed, points outside its buffer or has too few elements.
+        If the accessor is malformed, exceeds its buffer or has too few elements.
     """
     name = f"accessor {index}"
     if not isinstance(index, int) or not 0 <= index < len(document.get("accessors", [])):
@@ -70,9 +73,26 @@ def gather_rows(
 
 
 def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int) -> InputError | None:
-    """Return why an accessor does not give `n_rows` rows, or None if it does."""
+    """Return the error of an accessor that has no `n_rows` readable elements, or None.
+
+    Parameters
+    ----------
+    document : dict
+        glTF JSON.
+    buffers : tuple of bytes
+        Buffers of the document.
+    index : Any
+        Index of the accessor, possibly of a wrong type.
+    n_rows : int
+        Number of elements that are needed.
+
+    Returns
+    -------
+    InputError or None
+        None if they can be read.
+    """
     try:
-        # Its first and last row, for the window on the buffer is checked as a whole.
+        # Read the first and the last element: `_elements` checks the whole range.
         gather_rows(document, buffers, index, np.array([0, max(n_rows - 1, 0)], np.int32))
     except InputError as error:
         return error
@@ -82,7 +102,7 @@ def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int
 def _elements(
     document: Json, buffers: tuple[bytes, ...], view_index: int, offset: int, count: int, size: int
 ) -> NDArray[np.uint8]:
-    """Return a (count, size) window on a buffer view."""
+    """Return a read-only view (count, size) of the elements in a buffer view."""
     view = document["bufferViews"][view_index]
     stride = view.get("byteStride", size)
     start = view.get("byteOffset", 0) + offset
@@ -101,7 +121,7 @@ def _substitute(
     rows: NDArray[np.int32],
     data: NDArray[np.uint8],
 ) -> None:
-    """Put the sparse values over those rows of `data` that they replace."""
+    """Overwrite the rows of `data` that sparse values replace."""
     sparse: dict[str, Any] = accessor["sparse"]
     count, size = sparse["count"], element_size(accessor)
     dtype = COMPONENT[sparse["indices"]["componentType"]]

@@ -1,6 +1,6 @@
-"""Puts the AO pages into materials, and keeps textures that read a moved uv set pointing at it.
+"""Adds the AO pages to materials, and adjusts textures that read a renumbered uv set.
 
-A material shared by primitives that need different things is cloned; every index that exists stays.
+A material of primitives with different pages or uv sets is copied; existing indices stay valid.
 
 Based on: Khronos Group, glTF 2.0 specification, 5.19 Material; KHR_texture_transform; KHR_materials_variants.
 """
@@ -23,8 +23,9 @@ class BakedUse:
     primitive : dict
         The primitive in the output document.
     page : int
+        Page of its lightmap.
     moved : int or None
-        The TEXCOORD set that holds what TEXCOORD_1 held before, if that is still needed.
+        New number of the old TEXCOORD_1, if a material reads it.
     """
 
     primitive: Json
@@ -33,12 +34,12 @@ class BakedUse:
 
 
 def add_ao_textures(packer: Packer, ao_png: dict[int, bytes]) -> dict[int, int]:
-    """Embed the AO pages and return the texture of each page."""
+    """Embed the AO pages (PNG by page number), and return the texture index of each page."""
     document = packer.document
     if not ao_png:
         return {}
     samplers = document.setdefault("samplers", [])
-    # Linear without mip levels, which would mix charts, and clamped, for a page does not repeat.
+    # Filter linearly, without mip levels, which would mix charts; clamp, since a page does not repeat.
     samplers.append({"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071})
     textures: dict[int, int] = {}
     for page, data in sorted(ao_png.items()):
@@ -51,12 +52,21 @@ def add_ao_textures(packer: Packer, ao_png: dict[int, bytes]) -> dict[int, int]:
 
 
 def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> bool:
-    """Say whether a material of the primitive has a texture on TEXCOORD_1.
+    """Return whether a material of the primitive has a texture on TEXCOORD_1.
 
     Parameters
     ----------
+    document : dict
+        glTF JSON.
+    primitive : dict
+        A primitive of the document.
     occlusion : bool
-        Whether the occlusion texture counts (not if AO takes its place).
+        Whether the occlusion texture counts; False if the baked AO replaces it.
+
+    Returns
+    -------
+    bool
+        Includes the materials of variants.
     """
     for holder in material_holders(primitive):
         if _names_material(document, holder.get("material")):
@@ -67,7 +77,20 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
 
 
 def reads_texture(document: Json, primitive: Json) -> bool:
-    """Say whether a material of the primitive has any texture."""
+    """Return whether a material of the primitive has any texture.
+
+    Parameters
+    ----------
+    document : dict
+        glTF JSON.
+    primitive : dict
+        A primitive of the document.
+
+    Returns
+    -------
+    bool
+        Includes the materials of variants.
+    """
     return any(
         next(_texture_infos(document["materials"][holder["material"]], occlusion=True), None) is not None
         for holder in material_holders(primitive)
@@ -76,16 +99,16 @@ def reads_texture(document: Json, primitive: Json) -> bool:
 
 
 def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int, int]) -> None:
-    """Give every baked primitive the AO of its page, cloning materials where needed.
+    """Assign the AO of its page to every baked primitive, with copies of materials where needed.
 
     Parameters
     ----------
     document : dict
         Changed in place: materials, and the `material` of baked primitives.
     uses : list of BakedUse
-        All baked primitives; those not named keep their materials exactly as they are.
-    ao_texture : dict of page to texture index
-        Empty if AO was not baked.
+        All baked primitives; the materials of others are not changed.
+    ao_texture : dict of int to int
+        Texture index by page; empty if AO was not baked.
     """
     baked = {id(use.primitive): use for use in uses}
     wanted: dict[int, dict[tuple[int, int], list[Json]]] = {}
@@ -100,7 +123,7 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
                 wanted.setdefault(index, {}).setdefault(need, []).append(holder)
     for index, needs in sorted(wanted.items()):
         pristine = {} if index == _NONE else copy.deepcopy(document["materials"][index])
-        # The first need changes the material itself, unless a primitive that is not baked uses it too.
+        # Change the material itself for the first need, unless a primitive that is not baked uses it, too.
         free = index != _NONE and _UNCHANGED not in needs
         for need in sorted(needs.keys() - {_UNCHANGED}):
             if free:
@@ -118,13 +141,13 @@ _UNCHANGED = (-1, -1)
 
 
 def _names_material(document: Json, index: object) -> bool:
-    """Tell whether an index leads to a material; of what is not baked it need not."""
+    """Return whether an index refers to a material; objects that are not baked may be malformed."""
     materials = document.get("materials", [])
     return is_index(index) and index < len(materials) and isinstance(materials[index], dict)
 
 
 def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> tuple[int, int]:
-    """Return what a material must become: (AO texture or -1, new number of uv set 1 or -1)."""
+    """Return the change that a use needs of a material: (AO texture or -1, new number of uv set 1 or -1)."""
     if use is None:
         return _UNCHANGED
     texture = ao_texture.get(use.page, -1)
@@ -146,13 +169,13 @@ def _apply(material: Json, texture: int, moved: int) -> None:
 
 
 def _texcoord(info: Json) -> int:
-    """Return the uv set that a texture reads; KHR_texture_transform has the last word."""
+    """Return the uv set that a texture reads; KHR_texture_transform takes precedence."""
     transform = info.get("extensions", {}).get("KHR_texture_transform", {})
     return int(transform.get("texCoord", info.get("texCoord", 0)))
 
 
 def _texture_infos(node: Json, *, occlusion: bool) -> Iterator[Json]:
-    """List every texture reference of a material, those inside extensions included."""
+    """Yield every texture info of a material and its extensions."""
     for key, value in node.items():
         if isinstance(value, dict) and key != "extras" and (occlusion or key != "occlusionTexture"):
             if isinstance(value.get("index"), int):
@@ -161,7 +184,18 @@ def _texture_infos(node: Json, *, occlusion: bool) -> Iterator[Json]:
 
 
 def material_holders(primitive: Json) -> Iterator[Json]:
-    """List the objects whose `material` a primitive may be drawn with: itself and its variants."""
+    """Yield the objects whose `material` applies to a primitive: the primitive and its variants.
+
+    Parameters
+    ----------
+    primitive : dict
+        glTF JSON.
+
+    Yields
+    ------
+    dict
+        Objects that may have a `material`.
+    """
     yield primitive
     extensions = primitive.get("extensions")
     variants = extensions.get("KHR_materials_variants") if isinstance(extensions, dict) else None

@@ -1,7 +1,7 @@
-"""Builds a glTF document for a scene that came from another format.
+"""Builds a glTF document for a scene of another format.
 
-Node i is instance i of the scene, in the order of `Instance.node`; lights come after. World matrices stand on
-the nodes, colours stay linear, textures are embedded as PNG.
+Node i is instance i of the scene, in the order of `Instance.node`, followed by the lights. Nodes have world
+matrices, colours are linear, textures are embedded as PNG.
 
 Based on: Khronos Group, glTF 2.0 specification; KHR_lights_punctual, KHR_materials_emissive_strength,
 KHR_texture_transform.
@@ -28,7 +28,24 @@ _NEAREST = 9728
 
 
 def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], list[int]]:
-    """Return a document with lightmap uv, its baked primitives, and each instance's mesh."""
+    """Build a document with lightmap uv.
+
+    Parameters
+    ----------
+    scene : Scene
+        The baked scene.
+    atlas : Atlas
+        Its lightmap uv, one layout for each instance.
+
+    Returns
+    -------
+    packer : Packer
+        The document.
+    uses : list of BakedUse
+        Its primitives with lightmap uv.
+    instance_mesh : list of int
+        Index of each instance's mesh in the document.
+    """
     document: Json = {"asset": {"version": "2.0", "generator": "baker"}}
     packer = Packer(document)
     extensions: set[str] = set()
@@ -74,7 +91,7 @@ def _mirrors(instance: Instance) -> bool:
 
 
 def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
-    """Return the node and the mesh to put under it."""
+    """Return the node of an instance, and its mesh, transformed to world space if the node cannot do that."""
     matrix = np.asarray(instance.world_from_object, np.float64)
     if np.array_equal(matrix, np.eye(4)):
         return {"name": instance.name}, mesh
@@ -82,7 +99,7 @@ def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
     product = linear.T @ linear
     if np.abs(product - np.diag(np.diag(product))).max() <= 1e-6 * np.abs(product).max():
         return {"name": instance.name, "matrix": matrix.T.ravel().tolist()}, mesh
-    # glTF nodes cannot shear, so the mesh itself goes into the world.
+    # Nodes should not shear, since T R S cannot represent it: transform the mesh to world space.
     position = mesh.position.astype(np.float64) @ linear.T + matrix[:3, 3]
     normal = mesh.normal.astype(np.float64) @ np.linalg.inv(linear)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
@@ -91,7 +108,7 @@ def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
 
 
 def _primitives(packer: Packer, mesh: Mesh, layout: InstanceLayout, *, mirrored: bool) -> list[Json]:
-    """Return one primitive for each material of an instance; `mirrored` turns the faces over."""
+    """Return one primitive for each material of an instance; `mirrored` reverses the winding."""
     primitives = []
     for material in np.unique(mesh.material).tolist():
         used, corner = np.unique(layout.triangle[mesh.material == material], return_inverse=True)
@@ -114,17 +131,23 @@ def _primitives(packer: Packer, mesh: Mesh, layout: InstanceLayout, *, mirrored:
 
 
 def material_json(packer: Packer, material: Material, images: dict[int, int], extensions: set[str]) -> Json:
-    """Return a material as glTF has it.
+    """Return a material as glTF JSON.
 
     Parameters
     ----------
     packer : Packer
-        Takes the material's images.
+        The material's images are added to it.
     material : Material
-    images : dict
-        Image index by the identity of its array, of those that are embedded already; added to.
+        The material.
+    images : dict of int to int
+        Index of each embedded image by the identity of its array; added to.
     extensions : set of str
         Extensions in use; added to.
+
+    Returns
+    -------
+    dict
+        glTF JSON.
     """
     surface: Json = {
         "baseColorFactor": [min(max(float(v), 0.0), 1.0) for v in material.base_colour],
@@ -135,7 +158,7 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     if material.base_colour_texture is not None:
         surface["baseColorTexture"] = _texture(packer, material.base_colour_texture, images, extensions)
     if any(material.emission):
-        # Factors end at 1; what is brighter goes into the strength.
+        # Factors are at most 1: normalise, and write the maximum as strength.
         strength = max(1.0, *map(float, material.emission))
         result["emissiveFactor"] = [max(float(v), 0.0) / strength for v in material.emission]
         if strength > 1.0:
@@ -153,7 +176,7 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
 
 
 def _texture(packer: Packer, texture: Texture, images: dict[int, int], extensions: set[str]) -> Json:
-    """Embed a texture and return what a material says of it."""
+    """Embed a texture, and return the texture info that refers to it."""
     document = packer.document
     if id(texture.image) not in images:
         pixels = texture.image
@@ -182,7 +205,7 @@ def _texture(packer: Packer, texture: Texture, images: dict[int, int], extension
 
 
 def _texture_transform(matrix: NDArray[np.float64]) -> Json:
-    """Split (2, 3) into offset, rotation and scale: the matrix is T R S with R = [[c, s], [-s, c]]."""
+    """Decompose (2, 3) into offset, rotation and scale: the matrix is T R S with R = [[c, s], [-s, c]]."""
     (a, b, x), (c, d, y) = matrix.tolist()
     angle = math.atan2(-c, a)
     scale = [math.hypot(a, c), d * math.cos(angle) + b * math.sin(angle)]
@@ -205,7 +228,7 @@ def _light(light: PunctualLight) -> Json:
 
 
 def _turn_from_minus_z(direction: tuple[float, float, float]) -> list[float]:
-    """Return the quaternion x, y, z, w that turns -Z, where glTF lights shine, into `direction`."""
+    """Return the quaternion x, y, z, w that rotates -Z, the axis of glTF lights, to `direction`."""
     x, y, z = (float(v) for v in np.asarray(direction) / np.linalg.norm(direction))
     if z > 1.0 - 1e-12:
         return [0.0, 1.0, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""Reads perspective cameras, placed by their nodes: they look along -Z, +Y is up.
+"""Reads perspective cameras: they look along the -Z axis of their node, with +Y up.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.10.
 """
@@ -21,9 +21,16 @@ def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[Sc
     Parameters
     ----------
     placed : list of Placed
+        Nodes of the scene.
     document : GltfDocument
+        The document.
     warnings : list of SceneWarning
-        Added to: one for each camera that is broken, which no bake needs.
+        A warning is added for each broken camera, since bakes do not use cameras.
+
+    Returns
+    -------
+    list of Camera
+        In world space.
     """
     cameras = []
     for node in placed:
@@ -31,8 +38,8 @@ def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[Sc
             try:
                 camera = _camera(node, document)
             except InputError as error:
-                place = f"{error.object}: " if error.object else ""
-                message = f"the camera is left out ({place}{error.message})"
+                prefix = f"{error.object}: " if error.object else ""
+                message = f"the camera is left out ({prefix}{error.message})"
                 warnings.append(SceneWarning("broken-camera", message, _name(node)))
             else:
                 cameras += [] if camera is None else [camera]

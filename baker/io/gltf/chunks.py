@@ -1,4 +1,4 @@
-"""Takes a binary glTF file apart into its chunks.
+"""Splits a binary glTF file into its chunks.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 4 (GLB).
 """
@@ -23,7 +23,7 @@ class Chunks(NamedTuple):
     binary : bytes or None
         The first BIN chunk.
     others : tuple of (int, bytes)
-        Kind and content of the chunks that glTF 2.0 does not define.
+        Type and content of the chunks that glTF 2.0 does not define.
     """
 
     json: bytes
@@ -32,12 +32,24 @@ class Chunks(NamedTuple):
 
 
 def split_glb(data: bytes, file: str) -> Chunks:
-    """Return the chunks of a GLB file; bytes behind the length that its header says are left out.
+    """Split a GLB file; bytes after the length in its header are ignored.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the file.
+    file : str
+        Its name, for messages.
+
+    Returns
+    -------
+    Chunks
+        The JSON chunk, the first BIN chunk, and others.
 
     Raises
     ------
     InputError
-        For another version than 2, and chunks that are cut off, missing or in the wrong order.
+        For another version than 2, and chunks that are truncated, missing or in the wrong order.
     """
 
     def fail(message: str) -> NoReturn:

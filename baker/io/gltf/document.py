@@ -1,6 +1,6 @@
 """Opens glTF 2.0 documents: JSON, buffers, and the bytes of images.
 
-A buffer or image that cannot be read is no error before something needs it.
+A buffer or image that cannot be read is an error only when its data is needed.
 
 Based on: Khronos Group, glTF 2.0 Specification, sections 3.2 (asset) and 3.6 (buffers).
 """
@@ -32,7 +32,7 @@ UNDERSTOOD = frozenset(
         "EXT_texture_webp",
     }
 )
-# Change neither geometry nor base colour nor emission, which is all that a bake reads: safe to pass by.
+# Extensions that change neither geometry nor base colour nor emission: they may be ignored.
 IRRELEVANT = frozenset(
     {
         "KHR_animation_pointer",
@@ -47,30 +47,32 @@ IRRELEVANT = frozenset(
         "KHR_xmp_json_ld",
     }
 )
-# The lists that scene.glb may add to, whether a bake reads them or not.
+# Lists to which the writer of scene.glb may append.
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
-# Not applied, and told of each material that has it.
-_TOLD = frozenset({"KHR_materials_transmission"})
+# Extensions that are ignored with a warning for each material that has them.
+_REPORTED = frozenset({"KHR_materials_transmission"})
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 @dataclass(frozen=True)
 class GltfDocument:
-    """A parsed document with its outside files read.
+    """A parsed document with the content of its external files.
 
     Attributes
     ----------
     root : JsonObject
     buffers : tuple of bytes
-        Each cut to its `byteLength`; what there is of those in `buffer_faults`.
+        Each truncated to its `byteLength`; those in `buffer_faults` may be shorter.
     image_files : dict of int to bytes
         Content of the images that have a URI, by image index.
     buffer_faults, image_faults : dict of int to InputError
-        Why a buffer or an image's file cannot be used.
+        Errors of buffers and image files that cannot be read.
     chunks : tuple of (int, bytes)
-        GLB chunks other than JSON and BIN.
+        Type and content of GLB chunks other than JSON and BIN.
+    folder : Path
+        Folder that relative URIs refer to.
     sha256 : str
-        Over the scene file, then its outside buffers, then its outside images.
+        Hash of the scene file, then its external buffers, then its external images.
     warnings : tuple of SceneWarning
     """
 
@@ -90,7 +92,7 @@ class GltfDocument:
         Raises
         ------
         InputError
-            If the view leaves its buffer, is compressed by an extension, or the buffer cannot be used.
+            If the view exceeds its buffer, is compressed by an extension, or the buffer cannot be read.
         """
         view = self.root.children("bufferViews")[index]
         for name in _COMPRESSED_VIEW:
@@ -112,20 +114,24 @@ class GltfDocument:
 
 
 def open_document(path: Path, data: bytes) -> GltfDocument:
-    """Parse a .glb or .gltf file and read every file that it names.
+    """Parse a .glb or .gltf file and read every file that it refers to.
 
     Parameters
     ----------
     path : Path
-        For messages, and as the folder where relative URIs begin.
+        The file; relative URIs refer to its folder.
     data : bytes
         The file's content.
+
+    Returns
+    -------
+    GltfDocument
+        The document; external files that cannot be read are in its faults.
 
     Raises
     ------
     InputError
-        For a broken container, JSON that is none, another version than 2.x, and a required extension that
-        is not understood.
+        For a broken container, malformed JSON, another version than 2.x, or an unknown required extension.
     """
     file, folder = str(path), path.parent
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
@@ -202,14 +208,14 @@ def _check_extensions(root: JsonObject) -> list[SceneWarning]:
     return [
         SceneWarning("extension-ignored", f"the extension {name} is not understood and was ignored", name)
         for name in root.strings("extensionsUsed")
-        if name not in known | _TOLD
+        if name not in known | _REPORTED
     ]
 
 
 def _read_buffer(
     buffer: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash
 ) -> tuple[bytes, InputError | None]:
-    """Return a buffer's bytes, as many as there are, and why they cannot be used."""
+    """Return the available bytes of a buffer, and the error if they cannot be used."""
     data = b""
     try:
         length = buffer.integer("byteLength", minimum=1)
@@ -232,7 +238,7 @@ def _read_buffer(
 
 
 def _read_file(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
-    """Return the bytes behind `holder`'s "uri"; those of a file are also added to `digest`."""
+    """Return the bytes of `holder`'s "uri"; those of a file are also added to `digest`."""
     uri = holder.string("uri")
     try:
         data = read_uri(uri, folder)

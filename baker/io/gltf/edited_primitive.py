@@ -1,4 +1,4 @@
-"""What mending makes of a primitive: old vertices in new order, or a surface made anew."""
+"""The result of editing a primitive: its vertices in a new order, or a new surface."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class EditedPrimitive:
-    """New vertices and triangles of one primitive. What is not named here is copied from the old rows.
+    """New vertices and triangles of a primitive; all other attributes are copied from the old vertices.
 
     Attributes
     ----------
     row : (V,) int64
-        The old vertex that each new one is a copy of.
+        The old vertex that each new vertex is a copy of.
     triangle : (T, 3) int64, indices into the new vertices
     normal : (V, 3) float32, unit, object space, or None
-        None keeps NORMAL as it is, byte for byte.
+        None keeps the bytes of NORMAL.
     turned : (V,) bool
-        Vertices whose normal points the other way now, so that their tangent's handedness has to follow.
-    uv : (V, 2) float32, or None
-        New TEXCOORD_1; None keeps what is there.
+        Vertices whose normal was reversed, so that the handedness of their tangent is reversed as well.
+    uv : (V, 2) float32 or None
+        New TEXCOORD_1; None keeps the old one.
     """
 
     row: NDArray[np.int64]
@@ -34,14 +34,14 @@ class EditedPrimitive:
 
 @dataclass(frozen=True)
 class ReplacedPrimitive:
-    """A primitive whose vertices are all new. It has no other attributes than these.
+    """A primitive with new vertices, which have these attributes only.
 
     Attributes
     ----------
-    position : (V, 3) float32, object space
-    triangle : (T, 3) int64
-    normal : (V, 3) float32, unit, or None
-    colour : (V, 4) float32, linear, or None
+    position : (V, 3) float32, metres, object space
+    triangle : (T, 3) int64, indices into the vertices
+    normal : (V, 3) float32, unit, object space, or None
+    colour : (V, 4) float32, linear Rec.709, or None
     """
 
     position: NDArray[np.float32]

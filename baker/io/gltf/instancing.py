@@ -1,6 +1,6 @@
-"""Makes nodes of EXT_mesh_gpu_instancing: each of its instances gets texels, and so a node, of its own.
+"""Expands EXT_mesh_gpu_instancing: each instance becomes a node, since each has its own texels.
 
-The nodes are appended to the document, below the node that has the extension; no index changes.
+The nodes are appended to the document as children of the node that has the extension; no index changes.
 
 Based on: EXT_mesh_gpu_instancing.
 """
@@ -25,22 +25,28 @@ _MEMBERS = {
 
 
 def spread_instances(document: GltfDocument) -> None:
-    """Replace the extension by child nodes, in the document itself; nodes whose data is broken keep it."""
+    """Replace the extension by child nodes, in the document itself; nodes with broken data keep it.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        Changed in place.
+    """
     root = document.root.value
     if INSTANCING not in root.get("extensionsUsed", []) and INSTANCING not in root.get(
         "extensionsRequired", []
     ):
         return
     nodes = document.root.children("nodes")
-    left = False
+    broken = False
     for index, node in enumerate(nodes):
         try:
             if "mesh" in node and node.extension(INSTANCING) is not None:
                 _spread(document, node, index)
         except InputError:
-            left = True
+            broken = True
     document.root.forget("nodes")
-    if not left:
+    if not broken:
         for key in ("extensionsUsed", "extensionsRequired"):
             if INSTANCING in root.get(key, []):
                 root[key] = [name for name in root[key] if name != INSTANCING]
@@ -49,7 +55,15 @@ def spread_instances(document: GltfDocument) -> None:
 
 
 def refuse_broken(document: GltfDocument, node: JsonObject) -> None:
-    """Raise `InputError` for a node whose instances could not be read."""
+    """Raise `InputError` for a node whose instances could not be read.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        The document after `spread_instances`.
+    node : JsonObject
+        A node.
+    """
     if "mesh" in node and node.extension(INSTANCING) is not None:
         _members(document, node)
 
@@ -75,7 +89,7 @@ def _members(document: GltfDocument, node: JsonObject) -> list[dict[str, Any]]:
 
 
 def _count(document: GltfDocument, attributes: JsonObject) -> int:
-    """Return the number of instances that only have attributes of an application."""
+    """Return the number of instances that only have application-specific attributes."""
     accessors = document.root.children("accessors")
     for key in attributes.value:
         return accessors[attributes.index(key, len(accessors), "accessors")].integer("count", minimum=1)
@@ -83,12 +97,13 @@ def _count(document: GltfDocument, attributes: JsonObject) -> int:
 
 
 def _spread(document: GltfDocument, node: JsonObject, index: int) -> None:
+    """Append a node for each instance of a node."""
     members = _members(document, node)
     value, nodes = node.value, document.root.value["nodes"]
     name = node.string("name", f"node_{index}")
     first = len(nodes)
-    for k, place in enumerate(members):
-        nodes.append({"name": f"{name}_{k}", "mesh": value["mesh"], **place})
+    for k, transform in enumerate(members):
+        nodes.append({"name": f"{name}_{k}", "mesh": value["mesh"], **transform})
     value["children"] = [*node.indices("children", first, "nodes"), *range(first, len(nodes))]
     del value["mesh"]
     del value["extensions"][INSTANCING]

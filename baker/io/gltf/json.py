@@ -1,4 +1,4 @@
-"""Reads members of parsed JSON with the type that glTF gives them, or says which one is wrong."""
+"""Typed access to the members of parsed JSON, with errors that name the member."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from baker.core.errors import InputError
 
 
 class JsonObject:
-    """Wraps one JSON object of a document and knows where in the document it stands.
+    """A JSON object of a document with its path in the document.
 
     Parameters
     ----------
     value : dict
-        Anything else fails when a member is asked for.
+        Any other type is an error when a member is read.
     where : str
-        Its place, like "accessors[3].sparse"; empty for the root.
+        Path such as "accessors[3].sparse"; empty for the root.
     file : str
         The file concerned, for messages.
     """
@@ -35,29 +35,29 @@ class JsonObject:
         Raises
         ------
         InputError
-            If the document has something else than an object here: nobody minds until it is needed.
+            If the value is no object.
         """
         if not isinstance(self._value, dict):
             self.fail(f"expected an object, found {_show(self._value)}")
         return self._value
 
     def __contains__(self, key: str) -> bool:
-        """Tell whether the member is there."""
+        """Return whether the member exists."""
         return key in self.value
 
     def fail(self, message: str, key: str = "") -> NoReturn:
         """Raise `InputError` about this object, or about its member `key`."""
-        raise InputError(message, file=self.file, object=self.place(key) or None)
+        raise InputError(message, file=self.file, object=self.path_of(key) or None)
 
-    def place(self, key: str = "") -> str:
-        """Return where the member stands, like "nodes[2].mesh"."""
+    def path_of(self, key: str = "") -> str:
+        """Return the path of the member, such as "nodes[2].mesh"."""
         return f"{self.where}.{key}" if self.where and key else self.where or key
 
     def integer(self, key: str, default: int | None = None, *, minimum: int = 0) -> int:
-        """Return an integer of at least `minimum`; without a default the member must be there."""
+        """Return an integer of at least `minimum`; without a default the member is required."""
         value = self._get(key, default)
         if isinstance(value, float) and value.is_integer():
-            # For good: who writes the document uses the number as an index, too.
+            # Store the integer: the writer of the document uses it as an index, too.
             value = self.value[key] = int(value)
         if not isinstance(value, int) or isinstance(value, bool):
             self.fail(f"expected an integer, found {_show(value)}", key)
@@ -121,25 +121,25 @@ class JsonObject:
         return value
 
     def child(self, key: str) -> JsonObject:
-        """Return the object under `key`, which must be there."""
+        """Return the object under `key`, which is required."""
         value = self._get(key, None)
         if not isinstance(value, dict):
             self.fail(f"expected an object, found {_show(value)}", key)
-        return JsonObject(value, self.place(key), self.file)
+        return JsonObject(value, self.path_of(key), self.file)
 
     def child_or_empty(self, key: str) -> JsonObject:
         """Return the object under `key`, or an empty one if it is absent."""
-        return self.child(key) if key in self.value else JsonObject({}, self.place(key), self.file)
+        return self.child(key) if key in self.value else JsonObject({}, self.path_of(key), self.file)
 
     def children(self, key: str) -> list[JsonObject]:
-        """Return the list of objects under `key` (empty if absent); each is looked at when it is needed."""
-        # Kept: a file with ten thousand accessors asks for the same list as many times.
+        """Return the list of objects under `key` (empty if absent); elements are not checked before use."""
+        # Cache the list: importers call this for each of possibly thousands of accessors.
         if key not in self._lists:
             self._lists[key] = list(self._children(key))
         return self._lists[key]
 
     def forget(self, key: str) -> None:
-        """Read the list under `key` anew the next time: it has changed."""
+        """Drop the cached list under `key` after a change of the document."""
         self._lists.pop(key, None)
 
     def _children(self, key: str) -> Iterator[JsonObject]:
@@ -147,7 +147,7 @@ class JsonObject:
         if not isinstance(value, list):
             self.fail(f"expected a list, found {_show(value)}", key)
         for i, item in enumerate(value):
-            yield JsonObject(item, self.place(f"{key}[{i}]"), self.file)
+            yield JsonObject(item, self.path_of(f"{key}[{i}]"), self.file)
 
     def extension(self, name: str) -> JsonObject | None:
         """Return this object's extension of that name, or None."""

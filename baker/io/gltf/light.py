@@ -1,7 +1,7 @@
-"""Reads KHR_lights_punctual: point, spot and directional lights placed by their nodes.
+"""Reads KHR_lights_punctual: lights without area, positioned by their nodes.
 
-A light shines along its node's -Z; intensity is in cd (point, spot) or lx (directional); the node's scale
-changes neither.
+A light shines along the -Z axis of its node. Its intensity is in the unit of its kind; the node's scale does
+not change intensity and range.
 
 Based on: Khronos Group, KHR_lights_punctual.
 """
@@ -18,8 +18,8 @@ from baker.core.scene import PunctualLight, SceneWarning
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed
 
-# Length of the light's axis, as a share of the node's largest stretch, below which rounding aims the light:
-# exporters write single precision.
+# Smallest length of the transformed axis, as a share of the largest singular value of the node's matrix.
+# Below it the direction is rounding noise, since exporters write single precision.
 _FLATTEST = 1e-6
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -27,12 +27,23 @@ _TINY = float(np.finfo(np.float64).tiny)
 def read_light(
     light: JsonObject, node: Placed, warnings: list[SceneWarning], *, lenient: bool = False
 ) -> PunctualLight | None:
-    """Return a light in world space, or None with a warning if its node leaves it no direction.
+    """Read a light.
 
     Parameters
     ----------
+    light : JsonObject
+        The light of the extension.
+    node : Placed
+        The node that refers to it.
+    warnings : list of SceneWarning
+        A warning is added for a light that is left out.
     lenient : bool
-        Let negative colours and intensities pass.
+        Accept negative colours and intensities.
+
+    Returns
+    -------
+    PunctualLight or None
+        In world space; None if the node's matrix maps its direction to 0.
 
     Raises
     ------
@@ -71,9 +82,9 @@ def read_light(
 
 
 def _axis(node: Placed) -> tuple[NDArray[np.float64], float]:
-    """Return where the node's -Z points, unit, and its length as a share of the node's largest stretch."""
+    """Return the node's -Z axis in world space, unit, and its length over the largest singular value."""
     linear = node.matrix[:3, :3]
-    # Scaled first: the squares of very small or large numbers are not numbers.
+    # Divide by the largest element, so that squares neither overflow nor underflow.
     linear = linear / max(float(np.abs(linear).max()), _TINY)
     axis = -linear[:, 2]
     length = float(np.linalg.norm(axis))

@@ -21,8 +21,8 @@ from baker.io.gltf.unread import image_bytes, unreadable_textures
 from baker.io.images import decode_image
 
 DEFAULT_MATERIAL = Material(name="default")
-# Sets above this number are a broken file, not a mesh that somebody made.
-MOST_TEXCOORDS = 16
+# Number of TEXCOORD sets that are read.
+MAX_TEXCOORDS = 16
 _WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 # Values of a sampler's magFilter.
 _NEAREST, _LINEAR = 9728, 9729
@@ -35,16 +35,18 @@ class MaterialReader:
     Parameters
     ----------
     document : GltfDocument
+        The document.
     reflections : bool
-        Also decode textures that only say how mirror-like a surface is.
+        Also decode metallic-roughness textures.
 
     Attributes
     ----------
     materials : list of Material
-        In the file's order. Those that no surface has needed so far are plain.
+        In the file's order. Those that no surface has needed so far have default values.
     warnings : list of SceneWarning
-    told : set of int
-        Images that the warnings name.
+        Warnings about the materials that were read.
+    reported : set of int
+        Images that these warnings name.
     """
 
     def __init__(self, document: GltfDocument, *, reflections: bool = False) -> None:
@@ -55,7 +57,7 @@ class MaterialReader:
         self.materials = [Material(name=_name(m, i)) for i, m in enumerate(self._unread)]
         self._read: set[int] = set()
         self.warnings: list[SceneWarning] = []
-        self.told: set[int] = set()
+        self.reported: set[int] = set()
 
     def need(self, number: int) -> Material:
         """Return a material; the number behind the last one is glTF's default material.
@@ -81,9 +83,9 @@ class MaterialReader:
         emission = material.numbers("emissiveFactor", 3, (0.0, 0.0, 0.0))
         if min(surface.colour) < 0 or min(emission) < 0:
             material.fail("a colour factor is negative")
-        glow = material.extension("KHR_materials_emissive_strength")
-        strength = glow.number("emissiveStrength", 1.0, low=0.0) if glow is not None else 1.0
-        # An unlit surface shows its base colour and nothing else; here that colour reflects.
+        factor = material.extension("KHR_materials_emissive_strength")
+        strength = factor.number("emissiveStrength", 1.0, low=0.0) if factor is not None else 1.0
+        # The base colour of an unlit material is taken as its reflectance; it emits nothing.
         strength = 0.0 if unlit else strength
         mode = material.string("alphaMode", "OPAQUE")
         if mode not in _ALPHA:
@@ -96,18 +98,16 @@ class MaterialReader:
             )
             self.warnings.append(SceneWarning("transmission", message, name))
         read = {(surface.holder.where, surface.texture)}
-        needs_glow = strength > 0 and max(emission) > 0
-        if needs_glow:
+        emits = strength > 0 and max(emission) > 0
+        if emits:
             read.add((material.where, "emissiveTexture"))
-        self.warnings += unreadable_textures(self._document, material, name, read, self.told)
+        self.warnings += unreadable_textures(self._document, material, name, read, self.reported)
         return Material(
             name=name,
             base_colour=surface.colour,
             base_colour_texture=self._texture(surface.holder, surface.texture),
             emission=(emission[0] * strength, emission[1] * strength, emission[2] * strength),
-            emission_texture=(
-                None if unlit else self._texture(material, "emissiveTexture", needed=needs_glow)
-            ),
+            emission_texture=(None if unlit else self._texture(material, "emissiveTexture", needed=emits)),
             double_sided=material.boolean("doubleSided", False),
             alpha_mode=mode,
             alpha_cutoff=material.number("alphaCutoff", 0.5, low=0.0),
@@ -130,7 +130,7 @@ class MaterialReader:
 
 
 def _name(material: JsonObject, number: int) -> str:
-    """Return the name of a material that may be broken: nothing may need it."""
+    """Return the name of a material, the default name if it is malformed."""
     try:
         return material.string("name", f"material_{number}")
     except InputError:
@@ -156,26 +156,32 @@ def _texture(
             moved.number("rotation", 0.0),
             moved.numbers("scale", 2, (1.0, 1.0)),
         )
-    if texcoord >= MOST_TEXCOORDS:
-        info.fail(f"set {texcoord} is not read; there may be {MOST_TEXCOORDS}", "texCoord")
+    if texcoord >= MAX_TEXCOORDS:
+        info.fail(f"set {texcoord} is not read; there may be {MAX_TEXCOORDS}", "texCoord")
     return Texture(image, texcoord, transform, *_sampler(document, texture))
 
 
 def texture_transform(
     offset: tuple[float, ...], rotation: float, scale: tuple[float, ...]
 ) -> NDArray[np.float64]:
-    """Return KHR_texture_transform as a (2, 3) matrix, image uv from mesh uv.
+    """Return KHR_texture_transform as a matrix.
 
     Parameters
     ----------
     offset, scale : (2,) tuple
+        Members of the extension.
     rotation : float
-        Radians, counter-clockwise as seen on the image, whose v points down.
+        Radians, counter-clockwise on the image, whose v points down.
+
+    Returns
+    -------
+    (2, 3) float64
+        Image uv from mesh uv.
 
     Notes
     -----
-    The extension's text, its example of a turned quadrant and its test model agree on
-    u' = u cos + v sin, v' = -u sin + v cos; its GLSL lines, read as column-major, turn the other way.
+    The text of the extension, its example of a rotated quadrant and its test model agree on
+    u' = u cos + v sin, v' = -u sin + v cos; its GLSL code, read as column-major, rotates the other way.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     return np.array(
@@ -184,7 +190,7 @@ def texture_transform(
 
 
 def _sampler(document: GltfDocument, texture: JsonObject) -> tuple[tuple[str, str], bool]:
-    """Return wrap modes along u and v, and whether magnified texels are not interpolated."""
+    """Return the wrap modes along u and v, and whether magnification takes the nearest texel."""
     if "sampler" not in texture:
         return ("repeat", "repeat"), False
     samplers = document.root.children("samplers")

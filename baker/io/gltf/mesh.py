@@ -1,7 +1,7 @@
 """Reads the primitives of a glTF mesh: triangles, strips and fans, with or without indices.
 
-Positions stay in object space, in the file's winding. A node whose matrix has a negative determinant turns
-the winding over in world space only (glTF 2.0, section 3.7.4); `core.geometry` does that.
+Positions are in object space, with the winding of the file. A node whose matrix has a negative determinant
+reverses the winding in world space (glTF 2.0, section 3.7.4), see `core.geometry`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from baker.io.gltf.accessor import FLOAT, component_type, read_accessor, read_in
 from baker.io.gltf.accessor_bytes import fault_of, gather_rows
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
-from baker.io.gltf.material import MOST_TEXCOORDS, MaterialReader
+from baker.io.gltf.material import MAX_TEXCOORDS, MaterialReader
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DRACO = "KHR_draco_mesh_compression"
@@ -30,13 +30,22 @@ def read_primitives(
     Parameters
     ----------
     document : GltfDocument
+        The document.
     mesh : JsonObject
+        The mesh.
     name : str
-        The mesh's name, for warnings.
+        Its name, for warnings.
     materials : MaterialReader
-        Reads those that the primitives name.
+        Reads the materials of the primitives.
     lenient : bool
-        Let indices out of range pass.
+        Accept indices out of range.
+
+    Returns
+    -------
+    primitives : list of SourcePrimitive
+        In the file's order.
+    warnings : list of SceneWarning
+        Warnings about the mesh.
 
     Raises
     ------
@@ -57,7 +66,7 @@ def read_primitives(
             message = f"primitive {i} has morph targets; its base shape is baked"
             warnings.append(SceneWarning("morphed", message, name))
         arrays.append(_primitive(document, primitive, i, mode, materials, lenient))
-        if _plain_integers(document, primitive.child("attributes")):
+        if _unmarked_integers(document, primitive.child("attributes")):
             message = (
                 f"COLOR_0 of primitive {i} holds integers that are not marked as normalized; they are read "
                 "as 0 to 1: export it again with 'normalized', or an engine may show other colours"
@@ -127,7 +136,7 @@ def _primitive(
                 raise
             return None
 
-    texcoords = {k: texcoord(k) for k in range(MOST_TEXCOORDS)}
+    texcoords = {k: texcoord(k) for k in range(MAX_TEXCOORDS)}
     colour = optional("COLOR_0", ("VEC3", "VEC4"))
     if colour is not None:
         colour = _colour(document, attributes, colour)
@@ -145,8 +154,8 @@ def _primitive(
 
 
 def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) -> NDArray[np.uint8] | None:
-    """Return the bytes of the attributes that are not read otherwise, (V, B) uint8, or None without any."""
-    known = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in range(MOST_TEXCOORDS))}
+    """Return the bytes of all other attributes, (V, B) uint8, or None if there are none."""
+    known = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in range(MAX_TEXCOORDS))}
     root = document.root.value
     row = np.arange(n_vertices, dtype=np.int32)
     found = [
@@ -160,7 +169,7 @@ def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) ->
 def _unreadable(
     document: GltfDocument, primitive: JsonObject, arrays: SourcePrimitive, mesh: str
 ) -> list[SceneWarning]:
-    """Return a warning for each vertex attribute that cannot be read and that no bake needs."""
+    """Return a warning for each vertex attribute that cannot be read and is not needed for baking."""
     root, buffers, n_vertices = document.root.value, document.buffers, len(arrays.position)
     read = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in arrays.texcoord)}
     attributes = primitive.child("attributes").value
@@ -180,7 +189,7 @@ def _unreadable(
 
 
 def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list[JsonObject]) -> None:
-    """Raise if the primitive's data exists only in Draco's form; with a plain copy beside it all is well."""
+    """Raise if the primitive's data exists only Draco-compressed, without an uncompressed copy."""
     if primitive.extension(_DRACO) is None:
         return
     used = [attributes.index(key, len(accessors), "accessors") for key in attributes.value]
@@ -188,21 +197,21 @@ def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list
         primitive.fail(f"the data is compressed with {_DRACO}, which is not understood; export without it")
 
 
-def _plain_integers(document: GltfDocument, attributes: JsonObject) -> bool:
-    """Tell whether vertex colours are integers that do not say that they mean 0 to 1."""
+def _unmarked_integers(document: GltfDocument, attributes: JsonObject) -> bool:
+    """Return whether vertex colours are integers that are not marked as normalized."""
     if "COLOR_0" not in attributes:
         return False
     accessor = attributes.integer("COLOR_0")
-    plain = not document.root.children("accessors")[accessor].boolean("normalized", False)
-    return plain and component_type(document, accessor) != FLOAT
+    unmarked = not document.root.children("accessors")[accessor].boolean("normalized", False)
+    return unmarked and component_type(document, accessor) != FLOAT
 
 
 def _colour(
     document: GltfDocument, attributes: JsonObject, colour: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     accessor = attributes.integer("COLOR_0")
-    if _plain_integers(document, attributes):
-        # Integer colours have no meaning but 0 to 1; some exporters forget to say "normalized".
+    if _unmarked_integers(document, attributes):
+        # Normalise integer colours: some exporters omit "normalized".
         colour = colour / np.float32(255 if component_type(document, accessor) == 5121 else 65535)
     if colour.shape[1] == 3:
         colour = np.concatenate([colour, np.ones((len(colour), 1), np.float32)], axis=1)
@@ -226,20 +235,26 @@ def _corners(
 
 
 def triangles_of(corner: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """Return the (T, 3) triangles that a row of (N,) corners stands for.
+    """Return the triangles of a primitive.
 
     Parameters
     ----------
     corner : (N,) int64
+        Vertex of each corner, in the order of the file.
     mode : int
         4 triangles, 5 strip, 6 fan. Spare corners at the end of mode 4 are left out.
+
+    Returns
+    -------
+    (T, 3) int64
+        Vertices of each triangle.
     """
     n = len(corner)
     if mode == _TRIANGLES:
         return corner[: n - n % 3].reshape(-1, 3)
     i = np.arange(max(0, n - 2))
     if mode == _STRIP:
-        # Every second triangle of a strip lists its corners the other way round.
+        # Reverse every second triangle of a strip.
         odd = i % 2
         return np.stack([corner[i], corner[i + 1 + odd], corner[i + 2 - odd]], axis=1)
     return np.stack([corner[i + 1], corner[i + 2], np.full(len(i), corner[0] if n else 0)], axis=1)

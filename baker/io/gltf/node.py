@@ -1,4 +1,4 @@
-"""Walks a glTF node hierarchy and gives every node its world matrix."""
+"""Traverses a glTF node hierarchy and computes the world matrix of every node."""
 
 from __future__ import annotations
 
@@ -31,19 +31,24 @@ class Placed:
 def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Placed]:
     """Return all nodes below `roots`, parents first, in the file's order of children.
 
-    Nodes that KHR_node_visibility hides are left out with all that is below them.
+    Nodes that KHR_node_visibility hides are left out together with their descendants.
 
     Parameters
     ----------
     nodes : sequence of JsonObject
-        All nodes of the file; those that no root leads to may be broken.
+        All nodes of the file; nodes that are not below a root may be broken.
     roots : sequence of int
-        The scene's own nodes.
+        The scene's root nodes.
+
+    Returns
+    -------
+    list of Placed
+        The visible nodes with their world matrices.
 
     Raises
     ------
     InputError
-        If nodes form a cycle, a node has two places, or a matrix is not a finite affine map.
+        If nodes form a cycle, a node has two parents, or a matrix is not a finite affine map.
     """
     placed: list[Placed] = []
     parent: dict[int, int | None] = {}
@@ -53,7 +58,7 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
     while waiting:
         index, above, outer = waiting.pop()
         if index in parent:
-            _refuse_second_place(nodes, parent, index, above)
+            _refuse_second_parent(nodes, parent, index, above)
         parent[index] = above
         visibility = nodes[index].extension("KHR_node_visibility")
         if visibility is not None and not visibility.boolean("visible", True):
@@ -68,10 +73,10 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
     return placed
 
 
-def _refuse_second_place(
+def _refuse_second_parent(
     nodes: Sequence[JsonObject], parent: dict[int, int | None], index: int, above: int | None
 ) -> NoReturn:
-    """Say whether a node is met again because nodes form a cycle, or because two others hold it."""
+    """Raise for a node that is reached twice: nodes form a cycle, or two nodes have it as a child."""
     ring: list[int] = []
     at = above
     while at is not None:
@@ -88,7 +93,17 @@ def _refuse_second_place(
 
 
 def local_matrix(node: JsonObject) -> NDArray[np.float64]:
-    """Return a node's own (4, 4) float64 matrix, from `matrix` or from T R S.
+    """Return a node's local matrix, from `matrix` or from T R S.
+
+    Parameters
+    ----------
+    node : JsonObject
+        The node.
+
+    Returns
+    -------
+    (4, 4) float64
+        Parent from node.
 
     Raises
     ------

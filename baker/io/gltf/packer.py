@@ -1,7 +1,7 @@
 """Packs a glTF document and all its data into one GLB file.
 
-No accessor or buffer view is ever renumbered, because an extension that baker does not know may name it
-by its index. Data that is replaced frees its place in the lists, and new data takes the free places first.
+Accessors and buffer views keep their index, because unknown extensions may refer to them. Entries of replaced
+data are free; new data takes free entries first.
 
 Based on: Khronos Group, glTF 2.0 specification, 3.6 Binary Data Storage and 4 GLB File Format.
 """
@@ -33,7 +33,7 @@ COMPONENT: dict[int, np.dtype[Any]] = {
     5123: np.dtype("<u2"), 5125: np.dtype("<u4"), 5126: np.dtype("<f4"),
 }  # fmt: skip
 
-# Extensions that are known to name no accessor and no buffer view.
+# Prefixes of extensions that are known to refer to no accessor and no buffer view.
 _NO_DATA = (
     "KHR_materials_", "KHR_lights_punctual", "KHR_texture_", "EXT_texture_", "MSFT_texture_dds",
     "KHR_mesh_quantization", "KHR_xmp",
@@ -41,35 +41,35 @@ _NO_DATA = (
 
 
 def is_index(value: object) -> TypeGuard[int]:
-    """Tell whether a JSON value may be an index."""
+    """Return whether a JSON value may be an index."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def objects(document: Json, key: str) -> Iterator[tuple[int, Json]]:
-    """List the objects under `key` with their numbers; a document may be broken where nothing is baked."""
+    """Yield the objects in the list under `key` with their indices; skip anything malformed."""
     items = document.get(key)
     if isinstance(items, list):
         yield from ((number, item) for number, item in enumerate(items) if isinstance(item, dict))
 
 
 class Packer:
-    """Holds a document under construction and the bytes of its one buffer.
+    """Builds a GLB file: a document and the bytes of its single buffer.
 
     Parameters
     ----------
     document : dict
-        glTF JSON; it is changed in place. Its primitives no longer name the accessors in `replaced`.
+        glTF JSON; changed in place. Its primitives no longer refer to the accessors in `replaced`.
     buffers : tuple of bytes
-        The buffers that the document's views point into.
+        The buffers of the document.
     replaced : set of int
-        Accessors that primitives have given up; those that nothing else may use are dropped.
+        Accessors that primitives used before; those that nothing else may use are dropped.
     missing : set of int
-        Buffers that cannot be read: they stay beside the one buffer as the document names them.
+        Buffers that cannot be read: they stay in the document, after the single buffer.
 
     Attributes
     ----------
     chunks : tuple of (int, bytes)
-        Further GLB chunks, kind and content, that follow the buffer.
+        Type and content of further GLB chunks, which follow the buffer.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Packer:
         self._chunks, self._length = _merge(self._views, buffers, self._free_views, sorted(missing))
 
     def add_bytes(self, data: bytes, **keys: Any) -> int:
-        """Append `data` in a buffer view of its own and return the view's index."""
+        """Append `data` in a new buffer view, and return the index of the view."""
         view = {"buffer": 0, "byteOffset": self._length, "byteLength": len(data), **keys}
         padded = data + b"\0" * (-len(data) % 4)
         self._chunks.append(padded)
@@ -103,18 +103,19 @@ class Packer:
         Parameters
         ----------
         rows : (N, B) uint8
-            The raw bytes of each element.
+            Bytes of each element.
         like : dict
-            Accessor whose component type, type, normalisation, name and extras the new one takes over.
+            Accessor from which component type, type, normalisation, name and extras are copied.
         bounds : bool
             Write `min` and `max` even if `like` has none.
 
         Returns
         -------
         int
+            Index of the accessor.
         """
         size = rows.shape[1]
-        # Vertex data must start at multiples of four bytes.
+        # Align elements to four bytes (glTF 2.0, section 3.6.2.4).
         padded = np.pad(rows, ((0, 0), (0, -size % 4)))
         keep = {key: value for key, value in like.items() if key not in _OWN_KEYS}
         accessor: Json = {**copy.deepcopy(keep), "count": len(rows)}
@@ -124,16 +125,16 @@ class Packer:
         return self._add(padded.tobytes(), accessor, {"target": ARRAY_BUFFER, **stride})
 
     def add_floats(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
-        """Add a float vertex attribute (N, 2 to 4) and return its accessor."""
+        """Add a float vertex attribute (N, 2 to 4), and return the index of its accessor."""
         like = {"componentType": 5126, "type": f"VEC{values.shape[1]}"}
         data = np.ascontiguousarray(values, "<f4")
         return self.add_rows(data.view(np.uint8).reshape(len(data), -1), like, bounds=bounds)
 
     def add_indices(self, triangle: NDArray[np.integer[Any]]) -> int:
-        """Add triangle corners (T, 3) in the smallest type that all engines read, return the accessor.
+        """Add triangle corners (T, 3) in the smallest type that all engines read; return the accessor.
 
-        Eight bit indices are legal but slow or refused on current graphics interfaces, and the type's
-        highest number means "restart" to them, so 16 bit goes up to 65534.
+        8-bit indices are valid but slow or unsupported in current graphics APIs. The highest value of a type
+        is the primitive restart index, so 16-bit indices are used up to 65534.
         """
         kind = 5123 if int(triangle.max(initial=0)) < 65535 else 5125
         data = triangle.ravel().astype(COMPONENT[kind]).tobytes()
@@ -141,7 +142,7 @@ class Packer:
         return self._add(data, accessor, {"target": ELEMENT_ARRAY_BUFFER})
 
     def glb(self) -> bytes:
-        """Return the whole file; the packer is not to be used afterwards.
+        """Return the content of the file; call it once, after all data is added.
 
         Raises
         ------
@@ -179,7 +180,7 @@ class Packer:
         return struct.pack("<III", 0x46546C67, 2, total) + b"".join(parts)
 
     def _add(self, data: bytes, accessor: Json, keys: Json) -> int:
-        """Add an accessor with a view of its own, or return an equal one added before."""
+        """Add an accessor with a new view, or return the index of an equal one added before."""
         name = (hashlib.sha256(data).digest(), json.dumps([accessor, keys], sort_keys=True))
         if name not in self._cache:
             view = self.add_bytes(data, **keys)
@@ -193,7 +194,7 @@ def _dump(document: Json) -> bytes:
     try:
         return json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     except ValueError:
-        # Numbers like 1e999 in extras: legal JSON, but beyond what Python can say again.
+        # Numbers such as 1e999 in extras are valid JSON, but infinite in Python.
         return json.dumps(_finite(document), separators=(",", ":"), allow_nan=False).encode()
 
 
@@ -212,7 +213,7 @@ _OWN_KEYS = {"bufferView", "byteOffset", "count", "sparse", "min", "max"}
 
 
 def primitive_accessors(primitive: Json) -> Iterator[int]:
-    """List the accessors that a primitive names."""
+    """Yield the accessors that a primitive refers to."""
     targets = primitive.get("targets")
     holders = [primitive.get("attributes"), *(targets if isinstance(targets, list) else [])]
     for holder in holders:
@@ -223,7 +224,7 @@ def primitive_accessors(primitive: Json) -> Iterator[int]:
 
 
 def _bounds(rows: NDArray[np.uint8], dtype: np.dtype[Any]) -> Json:
-    """Return the accessor's min and max, nothing if it holds numbers that JSON cannot."""
+    """Return the accessor's min and max; nothing if a value is not finite, which JSON cannot represent."""
     values = np.ascontiguousarray(rows).view(dtype)
     if not len(values) or not np.isfinite(values).all():
         return {}
@@ -231,7 +232,7 @@ def _bounds(rows: NDArray[np.uint8], dtype: np.dtype[Any]) -> Json:
 
 
 def _place(items: list[Json], free: list[int], item: Json) -> int:
-    """Put `item` in the first free place of the list, or at its end."""
+    """Store `item` in the first free entry of the list, or append it; return its index."""
     if free:
         index = free.pop(0)
         items[index] = item
@@ -241,7 +242,7 @@ def _place(items: list[Json], free: list[int], item: Json) -> int:
 
 
 def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
-    """Take free places off the end of the list and put a harmless item in those between."""
+    """Remove free entries from the end of the list, and set the remaining ones to `blank`."""
     while free and free[-1] == len(items) - 1:
         free.pop()
         items.pop()
@@ -250,7 +251,7 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 
 
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
-    """Find which replaced accessors, and which views of theirs, nothing else may name."""
+    """Return the replaced accessors, and the views of these, that nothing else may refer to."""
     used: set[int] = set()
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
@@ -292,7 +293,7 @@ def _views_of(accessor: Any) -> Iterator[int]:
 
 
 def _numbers(node: Any, collect: bool) -> Iterator[int]:
-    """List every whole number inside extensions that might be the index of an accessor or a view."""
+    """Yield every integer in extensions that may be the index of an accessor or a view."""
     if isinstance(node, dict):
         for key, value in node.items():
             if key == "extensions" and isinstance(value, dict):
@@ -310,15 +311,15 @@ def _numbers(node: Any, collect: bool) -> Iterator[int]:
 def _merge(
     views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
 ) -> tuple[list[bytes], int]:
-    """Join all buffers without the bytes that only free views cover, and move the views along.
+    """Concatenate all buffers without the bytes that only free views cover, and adjust the views.
 
-    Views of missing buffers follow theirs, which come behind the joined one.
+    Missing buffers follow the concatenated one; their views are adjusted as well.
     """
     gone = set(free)
     chunks: list[bytes] = []
     length = 0
     holders = [(index, view) for index, view in enumerate(views) if isinstance(view, dict)]
-    # Compressed views say once more, in their extension, where their bytes are.
+    # Extensions of compressed views refer to bytes of a buffer as well.
     holders += [
         (-1, extension)
         for _, view in holders
@@ -331,7 +332,7 @@ def _merge(
             continue
         words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
         drop = np.zeros(len(words), bool)
-        # A view that is no part of its buffer is one that nothing needs: it is left as it is.
+        # Leave views that exceed their buffer unchanged: nothing that is baked needs them.
         mine = [
             (index, holder, span)
             for index, holder in holders
@@ -365,7 +366,7 @@ def _extensions(holder: Json) -> list[Any]:
 
 
 def _span(view: Json, size: int) -> tuple[int, int] | None:
-    """Return the first and the last byte (exclusive) of a view, or None if it is not within its buffer."""
+    """Return the range of bytes of a view, end exclusive, or None if it exceeds its buffer."""
     start, length = view.get("byteOffset", 0), view.get("byteLength")
     if not is_index(start) or not is_index(length) or start + length > size:
         return None

@@ -1,7 +1,7 @@
-"""Reads the vertices of glTF primitives as raw bytes, and says which primitives must not be written anew.
+"""Reads the vertices of glTF primitives as bytes, and finds the primitives that must not be rewritten.
 
-A primitive is written anew only if every byte of it is understood: its vertices may be put in another order,
-and nothing else in the file may count them.
+A primitive is rewritten only if all its data is known, so that its vertices can be reordered, and nothing
+else in the file depends on their order.
 """
 
 from __future__ import annotations
@@ -15,17 +15,27 @@ from baker.core.scene import SourceDocument
 from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.packer import Json, objects
 
-# Extensions of primitives and meshes that neither hold nor count vertices.
+# Extensions of primitives and meshes that neither contain vertices nor depend on their order.
 _HARMLESS = frozenset({"KHR_materials_variants"})
 _FLOAT = 5126
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
-    """Return each vertex attribute of a primitive, (V, B) uint8 by name, for comparison.
+    """Return the bytes of each vertex attribute of a primitive, for comparison.
 
-    They are the bytes of the file, but for -0 among floats, which has become 0. An attribute with fewer
-    elements than POSITION is left out.
+    Parameters
+    ----------
+    source : SourceDocument
+        The document.
+    primitive : dict
+        The primitive, glTF JSON.
+
+    Returns
+    -------
+    dict of str to (V, B) uint8
+        The bytes of the file by name of the attribute, except that -0 in floats is replaced by 0. An
+        attribute with fewer elements than POSITION is left out.
 
     Raises
     ------
@@ -46,14 +56,21 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
 
 
 def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
-    """Say why a primitive must stay as it is, as the end of a sentence; empty if it may be written anew.
+    """Return the reason why a primitive must not be rewritten.
 
     Parameters
     ----------
     source : SourceDocument
+        The document.
     mesh : int
-        Index of its mesh in the file.
+        Index of the primitive's mesh in the file.
     primitive : dict
+        The primitive, glTF JSON.
+
+    Returns
+    -------
+    str
+        The end of a sentence; empty if it may be rewritten.
     """
     document = source.json
     holder = document["meshes"][mesh]

@@ -1,4 +1,4 @@
-"""Poses skinned meshes as the joints of the file stand: the mesh's own node does not place it.
+"""Poses skinned meshes by the joint matrices of the file; the matrix of the mesh's own node does not apply.
 
 world position = sum over joints of weight x joint's world matrix x inverse bind matrix x position
 
@@ -21,14 +21,14 @@ from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed, local_matrix
 
-# Sets of four joints that a vertex may have.
-_MOST_SETS = 4
-# A mesh whose distance from the world's origin is more than this many times its size gets a place of its own.
+# Largest number of sets of four joints of a vertex.
+_MAX_SETS = 4
+# Ratio of distance from the world's origin to size above which a posed mesh gets an object space of its own.
 _FAR = 8.0
 
 
 class Poser:
-    """Knows where the joints of a file stand."""
+    """Computes the pose of skinned meshes from the node matrices of a document."""
 
     def __init__(self, document: GltfDocument) -> None:
         self._document = document
@@ -38,15 +38,15 @@ class Poser:
     def pose(
         self, mesh: JsonObject, arrays: Sequence[SourcePrimitive], node: Placed
     ) -> tuple[list[SourcePrimitive], NDArray[np.float64]]:
-        """Return a mesh's primitives in their pose and the (4, 4) float64 matrix that places them.
+        """Return a mesh's posed primitives and the (4, 4) float64 matrix, world from posed mesh.
 
         Parameters
         ----------
         mesh : JsonObject
         arrays : sequence of SourcePrimitive
-            As `read_primitives` returned them.
+            As `read_primitives` returns them.
         node : Placed
-            Names the skin, and places primitives without joints.
+            Refers to the skin; its matrix applies to primitives without joints.
 
         Raises
         ------
@@ -63,18 +63,18 @@ class Poser:
             else:
                 blend = np.tile(node.matrix, (len(part.position), 1, 1))
             posed.append((part, *_moved(part, blend)))
-        place = np.eye(4)
+        world_from_posed = np.eye(4)
         all_points = np.concatenate([p for _, p, _ in posed]) if posed else np.zeros((0, 3))
         finite = all_points[np.isfinite(all_points).all(axis=1)]
         if len(finite):
             low, high = finite.min(axis=0), finite.max(axis=0)
             if np.abs(low + high).max() > 2 * _FAR * (high - low).max():
-                place[:3, 3] = 0.5 * (low + high)
+                world_from_posed[:3, 3] = 0.5 * (low + high)
         out = [
-            replace(part, position=(p - place[:3, 3]).astype(np.float32), normal=normal)
+            replace(part, position=(p - world_from_posed[:3, 3]).astype(np.float32), normal=normal)
             for part, p, normal in posed
         ]
-        return out, place
+        return out, world_from_posed
 
     def _matrices(self, skin: JsonObject) -> NDArray[np.float64]:
         """Return (J, 4, 4) float64: world from bind pose, for each joint of a skin."""
@@ -90,15 +90,15 @@ class Poser:
             accessors[at].fail("inverse bind matrices must be MAT4 of floats")
         rows = np.arange(len(joints), dtype=np.int32)
         try:
-            raw = gather_rows(self._document.root.value, self._document.buffers, at, rows)
+            data = gather_rows(self._document.root.value, self._document.buffers, at, rows)
         except InputError as error:
             skin.fail(f"{error.object}: {error.message}", "inverseBindMatrices")
-        # Columns come first in the file.
-        inverse = np.ascontiguousarray(raw).view("<f4").reshape(-1, 4, 4).transpose(0, 2, 1)
+        # Matrices are stored column by column.
+        inverse = np.ascontiguousarray(data).view("<f4").reshape(-1, 4, 4).transpose(0, 2, 1)
         return np.asarray(world @ inverse.astype(np.float64), np.float64)
 
     def _world(self, node: int) -> NDArray[np.float64]:
-        """Return a node's world matrix, wherever it hangs."""
+        """Return the world matrix of a node, which may be outside of the scene."""
         if self._parent is None:
             self._parent = {}
             for k, above in enumerate(self._nodes):
@@ -126,7 +126,7 @@ class Poser:
         accessors = self._document.root.children("accessors")
         joints: list[NDArray[np.float64]] = []
         weights: list[NDArray[np.float64]] = []
-        for k in range(_MOST_SETS):
+        for k in range(_MAX_SETS):
             if f"JOINTS_{k}" not in attributes:
                 break
             for key, into in ((f"JOINTS_{k}", joints), (f"WEIGHTS_{k}", weights)):
@@ -138,7 +138,7 @@ class Poser:
         joint, weight = np.concatenate(joints, axis=1).astype(np.int64), np.concatenate(weights, axis=1)
         weight = np.nan_to_num(weight, nan=0.0, posinf=0.0, neginf=0.0)
         total = weight.sum(axis=1, keepdims=True)
-        # A vertex without weights stays with its first joint.
+        # A vertex without weights follows its first joint.
         weight = np.where(total > 0, weight / np.where(total > 0, total, 1.0), np.eye(1, weight.shape[1]))
         joint = np.where(weight != 0, joint, 0)
         if len(joint) and joint.max() >= len(matrices):
@@ -159,7 +159,7 @@ def _moved(
         )
         if part.normal is None:
             return position, None
-        # Normals go with the cofactors: no division by a determinant that may be 0.
+        # Transform normals by the cofactor matrix, without division by a determinant that may be 0.
         a, b, c = (blend[:, :3, k] for k in range(3))
         cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
         normal = np.einsum("vij,vj->vi", cofactor, part.normal.astype(np.float64))

@@ -1,8 +1,7 @@
-"""Finds what gives a glTF material its base colour: metallic-roughness, specular-glossiness, or neither.
+"""Reads the base colour of a glTF material: metallic-roughness, specular-glossiness, or neither.
 
-base colour = baseColorFactor x baseColorTexture, or diffuseFactor x diffuseTexture where
-KHR_materials_pbrSpecularGlossiness stands: by its text it takes the place of pbrMetallicRoughness for whoever
-understands it.
+base colour = baseColorFactor x baseColorTexture, or diffuseFactor x diffuseTexture where the material has
+KHR_materials_pbrSpecularGlossiness, which takes precedence over pbrMetallicRoughness.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9.2; KHR_materials_pbrSpecularGlossiness.
 """
@@ -15,10 +14,10 @@ from baker.core.scene import SceneWarning
 from baker.io.gltf.document import IRRELEVANT, UNDERSTOOD
 from baker.io.gltf.json import JsonObject
 
-# What a material reflects whose model is not understood.
+# Albedo of a material of an unknown model.
 UNKNOWN_ALBEDO = 0.5
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-# Extensions that add to pbrMetallicRoughness: without a base colour theirs is glTF's white.
+# Extensions that extend pbrMetallicRoughness: a material with them and without base colour is white.
 _LAYERS = (
     UNDERSTOOD
     | IRRELEVANT
@@ -46,9 +45,9 @@ class Surface(NamedTuple):
     ----------
     colour : (4,) tuple, linear RGB and alpha
     holder : JsonObject
-        The object that holds the base colour's texture.
+        The object with the base colour texture.
     texture : str
-        The texture's key there.
+        Key of the texture in that object.
     metallic, roughness : float
     """
 
@@ -60,17 +59,23 @@ class Surface(NamedTuple):
 
 
 def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) -> Surface:
-    """Return what a material reflects; an unknown model gets albedo 0.5 and a warning.
+    """Read base colour and reflection of a material; an unknown model gets albedo 0.5 and a warning.
 
     Parameters
     ----------
     material : JsonObject
+        The material.
     name : str
-        For the warning.
+        Its name, for the warning.
     warnings : list of SceneWarning
-        Added to.
+        A warning is added for a material of an unknown model.
+
+    Returns
+    -------
+    Surface
+        Base colour, its texture, metallic and roughness.
     """
-    plain = material.child_or_empty("pbrMetallicRoughness")
+    metallic_roughness = material.child_or_empty("pbrMetallicRoughness")
     unlit = material.extension("KHR_materials_unlit") is not None
     glossy = material.extension(_GLOSSY)
     if glossy is not None and not unlit:
@@ -81,8 +86,8 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
             0.0,
             1.0 - glossy.number("glossinessFactor", 1.0, low=0.0, high=1.0),
         )
-    colour = _four(plain.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0)))
-    if "baseColorFactor" not in plain and "baseColorTexture" not in plain:
+    colour = _four(metallic_roughness.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0)))
+    if "baseColorFactor" not in metallic_roughness and "baseColorTexture" not in metallic_roughness:
         unknown = sorted(set(material.child_or_empty("extensions").value) - _LAYERS)
         if unknown:
             message = (
@@ -93,10 +98,10 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
             colour = (UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, 1.0)
     return Surface(
         colour,
-        plain,
+        metallic_roughness,
         "baseColorTexture",
-        plain.number("metallicFactor", 1.0, low=0.0, high=1.0),
-        plain.number("roughnessFactor", 1.0, low=0.0, high=1.0),
+        metallic_roughness.number("metallicFactor", 1.0, low=0.0, high=1.0),
+        metallic_roughness.number("roughnessFactor", 1.0, low=0.0, high=1.0),
     )
 
 

@@ -1,6 +1,7 @@
-"""Tells what of a glTF file is missing or broken although no bake needs it: normal maps, unused files.
+"""Warnings about data of a glTF file that is missing or broken and not needed for baking.
 
-Such things never stop a bake. They are named, for whoever shows `scene.glb` will miss them.
+Examples are normal maps and unused files. They do not stop a bake, but are missing where `scene.glb` is
+shown.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from baker.core.scene import SceneWarning
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 
-# First bytes of the image formats that glTF and its extensions name, and of others that loaders take.
+# First bytes of the image formats of glTF and its extensions, and of others that loaders accept.
 _HEADS = (
     b"\x89PNG", b"\xff\xd8\xff", b"RIFF", b"\xabKTX", b"DDS ", b"sB", b"BM", b"GIF8", b"II*\0", b"MM\0*",
 )  # fmt: skip
@@ -20,6 +21,18 @@ _HEADS = (
 
 def image_bytes(document: GltfDocument, number: int) -> bytes:
     """Return the content of an image as it is stored.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        The document.
+    number : int
+        Index of the image.
+
+    Returns
+    -------
+    bytes
+        The encoded image.
 
     Raises
     ------
@@ -39,20 +52,27 @@ def image_bytes(document: GltfDocument, number: int) -> bytes:
 
 
 def unreadable_textures(
-    document: GltfDocument, material: JsonObject, name: str, read: Set[tuple[str, str]], told: set[int]
+    document: GltfDocument, material: JsonObject, name: str, read: Set[tuple[str, str]], reported: set[int]
 ) -> list[SceneWarning]:
-    """Return a warning for each texture of a material that a bake does not read and nobody could.
+    """Return a warning for each texture of a material that is not read for baking and cannot be read.
 
     Parameters
     ----------
     document : GltfDocument
+        The document.
     material : JsonObject
+        The material.
     name : str
-        The material's.
+        Its name.
     read : set of (str, str)
-        Place and key of the textures that the bake does read.
-    told : set of int
-        Added to: the images whose faults are told here.
+        Path of the holder and key of the textures that are read for baking.
+    reported : set of int
+        Indices of the images that the warnings name are added.
+
+    Returns
+    -------
+    list of SceneWarning
+        Code `missing-texture`.
     """
     found = []
     for holder, key in _texture_infos(material):
@@ -61,26 +81,32 @@ def unreadable_textures(
         try:
             _check_texture(document, holder.child(key))
         except InputError as error:
-            place = f"{error.object}: " if error.object else ""
+            prefix = f"{error.object}: " if error.object else ""
             message = (
-                f"the {key} of material '{name}' cannot be read ({place}{error.message}); "
+                f"the {key} of material '{name}' cannot be read ({prefix}{error.message}); "
                 "a bake does not need it, and scene.glb keeps it as it is"
             )
             found.append(SceneWarning("missing-texture", message, name))
-            told.update(k for k, fault in document.image_faults.items() if fault is error)
+            reported.update(k for k, fault in document.image_faults.items() if fault is error)
     return found
 
 
-def unneeded_faults(document: GltfDocument, told: Set[int]) -> list[SceneWarning]:
-    """Return a warning for each buffer and image file that cannot be read and turned out not to be needed.
+def unneeded_faults(document: GltfDocument, reported: Set[int]) -> list[SceneWarning]:
+    """Return a warning for each buffer and image file that cannot be read and was not needed.
 
     Parameters
     ----------
     document : GltfDocument
-    told : set of int
-        Images whose faults are known already.
+        The document, after all data for baking is read.
+    reported : set of int
+        Images that other warnings name.
+
+    Returns
+    -------
+    list of SceneWarning
+        Code `missing-file`.
     """
-    images = {k: fault for k, fault in document.image_faults.items() if k not in told}
+    images = {k: fault for k, fault in document.image_faults.items() if k not in reported}
     found = []
     for kind, faults in (("buffers", document.buffer_faults), ("images", images)):
         for number, error in faults.items():
@@ -90,7 +116,7 @@ def unneeded_faults(document: GltfDocument, told: Set[int]) -> list[SceneWarning
 
 
 def _texture_infos(holder: JsonObject) -> Iterator[tuple[JsonObject, str]]:
-    """List the texture references of a material, those inside its extensions included."""
+    """Yield the texture references of a material and its extensions, as holder and key."""
     for key, value in holder.value.items():
         if key == "extras" or not isinstance(value, dict):
             continue
@@ -101,7 +127,7 @@ def _texture_infos(holder: JsonObject) -> Iterator[tuple[JsonObject, str]]:
 
 
 def _check_texture(document: GltfDocument, info: JsonObject) -> None:
-    """Raise `InputError` if the texture's image is not there or is no image by its first bytes."""
+    """Raise `InputError` if the texture's image is missing, truncated, or no image by its first bytes."""
     textures, images = document.root.children("textures"), document.root.children("images")
     texture = textures[info.index("index", len(textures), "textures")]
     extensions = texture.child_or_empty("extensions")

@@ -1,4 +1,4 @@
-"""Reads what a URI of a glTF file stands for: data in the URI itself, or a file beside the scene.
+"""Reads the data of a URI in a glTF file: embedded in the URI, or in a file beside the scene.
 
 Based on: RFC 2397 (data URIs), RFC 3986 (percent-encoding); glTF 2.0 Specification, section 2.8.
 """
@@ -10,29 +10,35 @@ import binascii
 from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
+# Characters of a URI that a message shows.
 _LONGEST = 80
 _URL_SAFE = bytes.maketrans(b"-_", b"+/")
 
 
 class UriError(Exception):
-    """The sentence that says why a URI gives no data."""
+    """The data of a URI cannot be read; the message is the reason."""
 
 
 def is_data(uri: str) -> bool:
-    """Tell whether the URI holds its data itself."""
+    """Return whether the URI is a data URI."""
     return uri[:5].lower() == "data:"
 
 
 def read_uri(uri: str, folder: Path) -> bytes:
-    """Return the bytes behind a URI.
+    """Return the data of a URI.
 
     Parameters
     ----------
     uri : str
-        A data URI of any media type, or the relative name of a file. Names with percent signs or Windows
-        backslashes are understood although neither follows the rules.
+        A data URI of any media type, or the relative name of a file. Names with bare percent signs or
+        backslashes are accepted although they are no valid URIs.
     folder : Path
-        Where relative names begin.
+        Folder that relative names refer to.
+
+    Returns
+    -------
+    bytes
+        The data.
 
     Raises
     ------
@@ -56,8 +62,8 @@ def read_uri(uri: str, folder: Path) -> bytes:
 
 
 def file_names(uri: str) -> list[str]:
-    """Return the names that the URI of a file may mean, the likeliest first."""
-    # A name may hold a bare % sign, against the rules: the literal name counts if such a file exists.
+    """Return the file names that a URI may refer to, the most likely first."""
+    # Try the literal name as well: some exporters do not encode % signs.
     names = [unquote(uri), uri]
     return list(dict.fromkeys([*names, *(name.replace("\\", "/") for name in names)]))
 
@@ -70,7 +76,7 @@ def _decode_data(uri: str) -> bytes:
         return unquote_to_bytes(body)
     try:
         data = (unquote(body) if "%" in body else body).encode("ascii").translate(_URL_SAFE, b" \t\r\n\f")
-        # Padding may be left out, as in browsers.
+        # Accept missing padding, as browsers do.
         return base64.b64decode(data.rstrip(b"=") + b"=" * (-len(data.rstrip(b"=")) % 4), validate=True)
     except (binascii.Error, ValueError) as error:
         raise UriError(f"the data URI is not valid base64 ({error})") from None

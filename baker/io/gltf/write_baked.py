@@ -1,6 +1,6 @@
-"""Writes a baked scene as GLB: the input with TEXCOORD_1 and AO, all else kept.
+"""Writes a baked scene as GLB: the input with TEXCOORD_1 and AO, otherwise unchanged.
 
-Every index of the input stays valid: nodes, meshes, materials, accessors. What has to be new is appended.
+All indices of the input stay valid: nodes, meshes, materials, accessors. New objects are appended.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ _IMAGE_HEADS = {
 
 @dataclass(frozen=True)
 class GlbFile:
-    """A finished file, and where its instances are.
+    """A GLB file and the meshes of its instances.
 
     Attributes
     ----------
     data : bytes
-        The whole GLB.
+        The content of the file.
     instance_mesh : tuple of int
-        Mesh index in the file of each instance, in the order of `Scene.instances`.
+        Index of each instance's mesh in the file, in the order of `Scene.instances`.
     """
 
     data: bytes
@@ -51,7 +51,19 @@ class GlbFile:
 
 @dataclass(frozen=True)
 class _Piece:
-    """The part of one instance that comes from one primitive of its mesh."""
+    """The part of an instance that comes from one primitive of its mesh.
+
+    Attributes
+    ----------
+    primitive, source : dict
+        The primitive in the output and in the source document.
+    page : int
+    row : (V,) int32, source vertex of each vertex
+    uv : (V, 2) float32, lightmap uv
+    triangle : (T, 3) int64
+    kept : bool
+        Whether the primitive has this uv already and is not rewritten.
+    """
 
     primitive: Json
     source: Json
@@ -68,35 +80,35 @@ def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None)
     Parameters
     ----------
     scene : Scene
-        With `source`, that document is kept and only what baking concerns changes. Without, a new
-        document is made.
+        If it has a `source`, that document is extended; otherwise a new document is built.
     atlas : Atlas
         One layout for each instance, in order.
-    ao_png : dict of page to bytes, or None
-        AO pages as PNG files; they become occlusion textures on TEXCOORD_1.
+    ao_png : dict of int to bytes, or None
+        AO pages as PNG files by page number; they become occlusion textures on TEXCOORD_1.
 
     Returns
     -------
     GlbFile
+        The file.
 
     Raises
     ------
     InputError
-        If the source's data cannot be read or an image file it names is gone.
+        If the source's data cannot be read, or an image file no longer exists.
     """
     if scene.source is None:
         packer, uses, instance_mesh = new_document(scene, atlas)
     else:
         packer, uses, instance_mesh = _rewrite(scene, scene.source, atlas, ao=bool(ao_png))
     assign_materials(packer.document, uses, add_ao_textures(packer, ao_png or {}))
-    _sign(packer.document)
+    _write_version(packer.document)
     return GlbFile(packer.glb(), tuple(instance_mesh))
 
 
 def _rewrite(
     scene: Scene, source: SourceDocument, atlas: Atlas, *, ao: bool
 ) -> tuple[Packer, list[BakedUse], list[int]]:
-    """Return the source's document with lightmap uv; the AO is still to come."""
+    """Return the source's document with lightmap uv, without AO, its baked primitives and instance meshes."""
     document = copy.deepcopy(source.json)
     _decompress_views(document, source)
     instance_mesh = _own_meshes(document, source.json, scene.instances)
@@ -130,10 +142,10 @@ def _rewrite(
 
 
 def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -> list[int]:
-    """Give every baked node a mesh of its own and return the mesh of each instance.
+    """Assign a separate mesh to every baked node, and return the mesh index of each instance.
 
-    The first instance keeps the mesh's index; the others get appended copies. A mesh that is also used by
-    a node that is not baked (in another scene) stays as it is for that node.
+    The first instance of a mesh keeps its index; the others get appended copies. If a node that is not baked
+    (in another scene) uses the mesh, all baked instances get copies.
     """
     baked = {instance.node for instance in instances}
     if len(baked) < len(instances):
@@ -153,7 +165,7 @@ def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -
 
 
 def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[Json]) -> list[_Piece]:
-    """Cut an instance's lightmap mesh into the primitives it came from."""
+    """Split an instance's lightmap mesh by source primitive."""
     pieces = []
     for number in np.unique(mesh.primitive).tolist():
         used, corner = np.unique(layout.triangle[mesh.primitive == number], return_inverse=True)
@@ -167,7 +179,7 @@ def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[
 
 
 def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *, ao: bool) -> int | None:
-    """Write the primitive's vertices in lightmap order; return where an old TEXCOORD_1 went, if kept."""
+    """Write a primitive's vertices in lightmap order; return the new set number of an old TEXCOORD_1."""
     attributes = dict(piece.source["attributes"])
     moved = None
     old = attributes.pop("TEXCOORD_1", None)
@@ -183,11 +195,11 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
                 packer, source, index, piece.row, name == "POSITION", compressed
             )
         except InputError:
-            # The importer has told that this attribute cannot be read and is left out.
+            # Leave unreadable attributes out; the importer has added a warning.
             if name in ("POSITION", "NORMAL", "COLOR_0"):
                 raise
     written["TEXCOORD_1"] = packer.add_floats(piece.uv)
-    # glTF wants the sets numbered without a gap, so a primitive without uv gets the lightmap's twice.
+    # glTF requires consecutive numbers of the sets: without TEXCOORD_0 write the lightmap uv twice.
     written.setdefault("TEXCOORD_0", written["TEXCOORD_1"])
     piece.primitive["attributes"] = written
     piece.primitive["indices"] = packer.add_indices(piece.triangle)
@@ -196,7 +208,7 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
             {name: _rewrite_target(packer, source, index, piece.row, name) for name, index in target.items()}
             for target in piece.source["targets"]
         ]
-    # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
+    # Strips and fans are written as triangle lists, the default mode.
     if piece.primitive.get("mode", 4) != 4:
         del piece.primitive["mode"]
     if compressed:
@@ -220,7 +232,7 @@ def _rewrite_accessor(
 def _rewrite_target(
     packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], name: str
 ) -> int:
-    """Write one attribute of a morph target; one that cannot be read moves nothing."""
+    """Write an attribute of a morph target; zeros if it cannot be read."""
     bounds = name == "POSITION"
     try:
         return _rewrite_accessor(packer, source, index, row, bounds, False)
@@ -229,7 +241,7 @@ def _rewrite_target(
 
 
 def _decompress_views(document: Json, source: SourceDocument) -> None:
-    """Point views away from meshopt data, to the plain copy if there is one; what is baked has one."""
+    """Remove meshopt compression from the views that have an uncompressed fallback buffer."""
     for _, view in objects(document, "bufferViews"):
         for name in _COMPRESSED_VIEW:
             if name in view.get("extensions", {}):
@@ -244,14 +256,21 @@ def _decompress_views(document: Json, source: SourceDocument) -> None:
 
 
 def embed_images(packer: Packer, source: SourceDocument) -> None:
-    """Move image files and data URIs into the buffer, so that the GLB stands alone.
+    """Move image files and data URIs into the buffer, so that the GLB is self-contained.
 
-    An image that could not be read keeps its URI: nothing that is baked needs it.
+    An image that could not be read keeps its URI; it is not needed for baking.
+
+    Parameters
+    ----------
+    packer : Packer
+        The document; changed in place.
+    source : SourceDocument
+        The document that it was copied from.
 
     Raises
     ------
     InputError
-        If an image file has gone since the scene was read.
+        If an image file no longer exists.
     """
     for number, image in objects(packer.document, "images"):
         uri = image.get("uri")
@@ -274,8 +293,8 @@ def _mime_type(data: bytes) -> str | None:
     return next((mime for head, mime in _IMAGE_HEADS.items() if data.startswith(head)), None)
 
 
-def _sign(document: Json) -> None:
-    """Note the version in `asset.extras.baker`, if extras can take a key."""
+def _write_version(document: Json) -> None:
+    """Write the version to `asset.extras.baker`, if extras is an object."""
     extras = document.setdefault("asset", {"version": "2.0"}).setdefault("extras", {})
     if isinstance(extras, dict):
         extras["baker"] = {"version": version("baker")}

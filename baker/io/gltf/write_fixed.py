@@ -1,4 +1,4 @@
-"""Writes a glTF document with some of its primitives made anew; everything else is kept as it is."""
+"""Writes a glTF document with some primitives edited or replaced; everything else is unchanged."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ from baker.io.gltf.packer import COMPONENT, Json, Packer, primitive_accessors
 from baker.io.gltf.write_baked import embed_images
 
 
-def write_mended(
-    source: SourceDocument, mended: Mapping[tuple[int, int], EditedPrimitive | ReplacedPrimitive]
+def write_fixed(
+    source: SourceDocument, edits: Mapping[tuple[int, int], EditedPrimitive | ReplacedPrimitive]
 ) -> bytes:
-    """Return the document as GLB.
+    """Return the document with edited primitives as GLB.
 
     Parameters
     ----------
     source : SourceDocument
-        Not changed.
-    mended : mapping of (mesh, primitive) to EditedPrimitive or ReplacedPrimitive
-        The primitives that are made anew, by their places in the file.
+        The document; not changed.
+    edits : mapping of (int, int) to EditedPrimitive or ReplacedPrimitive
+        New primitives by index of the mesh and of the primitive in the mesh.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
 
     Raises
     ------
@@ -36,21 +41,21 @@ def write_mended(
     """
     document = copy.deepcopy(source.json)
     replaced: set[int] = set()
-    for mesh, number in mended:
+    for mesh, number in edits:
         primitive = document["meshes"][mesh]["primitives"][number]
         replaced.update(primitive_accessors(primitive))
         for key in ("attributes", "indices"):
             primitive.pop(key, None)
     packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
     packer.chunks = source.chunks
-    for (mesh, number), new in mended.items():
+    for (mesh, number), new in edits.items():
         primitive = document["meshes"][mesh]["primitives"][number]
         if isinstance(new, ReplacedPrimitive):
-            _remake(packer, primitive, new)
+            _replace(packer, primitive, new)
         else:
             _rewrite(packer, source, source.json["meshes"][mesh]["primitives"][number], primitive, new)
         primitive["indices"] = packer.add_indices(new.triangle)
-        # Strips and fans have become lists of triangles, which is what a primitive without a mode is.
+        # Strips and fans are written as triangle lists, the default mode.
         if primitive.get("mode", 4) != 4:
             del primitive["mode"]
     embed_images(packer, source)
@@ -60,14 +65,14 @@ def write_mended(
 def _rewrite(
     packer: Packer, source: SourceDocument, old: Json, primitive: Json, new: EditedPrimitive
 ) -> None:
-    """Write the vertices of one primitive."""
+    """Write the reordered vertices of an edited primitive."""
     own: dict[str, NDArray[np.float32]] = {}
     if new.normal is not None:
         own["NORMAL"] = new.normal
     if new.uv is not None:
         own["TEXCOORD_1"] = new.uv
         if "TEXCOORD_0" not in old["attributes"]:
-            # glTF wants the sets numbered without a gap.
+            # glTF requires consecutive numbers of the sets.
             own["TEXCOORD_0"] = new.uv
     row = new.row.astype(np.int32)
     attributes = {}
@@ -83,8 +88,8 @@ def _rewrite(
     primitive["attributes"] = attributes
 
 
-def _remake(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
-    """Write the vertices of one primitive, none of which is an old one."""
+def _replace(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
+    """Write the vertices of a replaced primitive."""
     attributes = {"POSITION": packer.add_floats(new.position, bounds=True)}
     if new.normal is not None:
         attributes["NORMAL"] = packer.add_floats(new.normal)
@@ -94,14 +99,14 @@ def _remake(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
 
 
 def _turn_handedness(data: NDArray[np.uint8], accessor: Json, turned: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return tangents, as raw bytes, with w of other sign where normals were turned, for the same bitangent.
+    """Negate w of tangents (V, B) whose normals were reversed (V,), which keeps their bitangents.
 
-    The bitangent is cross(normal, tangent.xyz) * tangent.w, glTF 2.0, 3.7.2.1.
+    The bitangent is cross(normal, tangent.xyz) * tangent.w (glTF 2.0, section 3.7.2.1).
     """
     tangent = (
         np.ascontiguousarray(data).view(COMPONENT[accessor["componentType"]]).reshape(len(data), 4).copy()
     )
-    # The lowest integer has no counterpart; it means the same as the one above it.
+    # Replace the lowest integer, which has no negative, by the next one; both have the same normalised value.
     lowest = -1.0 if tangent.dtype.kind == "f" else -np.iinfo(tangent.dtype).max
     tangent[turned, 3] = -np.maximum(tangent[turned, 3], lowest)
     return tangent.view(np.uint8).reshape(len(data), -1)

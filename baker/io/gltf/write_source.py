@@ -1,7 +1,7 @@
-"""Writes a scene from another format as GLB with all its triangles, bad ones included.
+"""Writes a scene of another format as GLB with all its triangles, including invalid ones.
 
-What mends glTF files then mends it, too. Colour, emission, transparency and their textures come along; what
-the importer does not read (bump maps, reflection) does not.
+So repairs of glTF files apply to it as well. Colour, emission, transparency and their textures are written;
+data that the importer does not read (bump maps, reflection) is lost.
 """
 
 from __future__ import annotations
@@ -21,8 +21,14 @@ def source_glb(scene: Scene, source: SourceScene) -> bytes:
     Parameters
     ----------
     scene : Scene
-        Its materials are used.
+        The scene with the materials.
     source : SourceScene
+        The meshes and instances.
+
+    Returns
+    -------
+    bytes
+        The content of the file.
 
     Raises
     ------

@@ -30,31 +30,31 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.build import build_mesh
 from baker.topology.triangle_check import LARGEST_COORDINATE
 
-# Smallest over largest stretch of a node: below it a mesh is squashed flat.
+# Smallest ratio of the singular values of a node's matrix; below it the mesh is flat.
 _FLATTEST = 1e-7
 
-
+# Mesh, and node if it is skinned.
 _Key = tuple[int, int | None]
 
 
 @dataclass(frozen=True)
 class _Built:
-    """A mesh of the file, in the pose of a skin if it has one.
+    """A mesh of the file, posed if it has a skin.
 
     Attributes
     ----------
-    number : int, in the order of reading
+    number : int, index of the source mesh
     mesh : int or None, index of the mesh that is baked
     source : SourceMesh
-    extent : (3,) float64, the largest coordinate of that mesh along each axis
-    place : (4, 4) float64 or None, world from the posed mesh
+    extent : (3,) float64, largest absolute coordinate of that mesh along each axis
+    world_from_posed : (4, 4) float64 or None
     """
 
     number: int
     mesh: int | None
     source: SourceMesh
     extent: NDArray[np.float64]
-    place: NDArray[np.float64] | None
+    world_from_posed: NDArray[np.float64] | None
 
 
 @IMPORTERS.register(".glb")
@@ -70,7 +70,7 @@ def import_gltf(source: SceneFile) -> Scene:
     Raises
     ------
     InputError
-        If the file is malformed, needs what is not understood, or holds nothing to bake.
+        If the file is malformed, requires an unknown extension, or holds nothing to bake.
     """
     document = open_document(source.path, source.data)
     warnings = list(document.warnings)
@@ -83,7 +83,7 @@ def import_gltf(source: SceneFile) -> Scene:
     meshes, instances, source_scene = _instances(document, placed, reader, warnings, lenient=source.lenient)
     lights = _lights(placed, document, warnings, lenient=source.lenient)
     cameras = read_cameras(placed, document, warnings)
-    warnings += [*reader.warnings, *unneeded_faults(document, reader.told)]
+    warnings += [*reader.warnings, *unneeded_faults(document, reader.reported)]
     if not instances and not source.lenient:
         where = f"scenes[{number}]" if number is not None else None
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
@@ -143,7 +143,7 @@ def _instances(
     *,
     lenient: bool,
 ) -> tuple[list[Mesh], list[Instance], SourceScene | None]:
-    """Return the meshes that are used, each once, and where they stand."""
+    """Return the meshes in use, each once, their instances, and the source scene if read leniently."""
     sources = document.root.children("meshes")
     poser = Poser(document)
     built: dict[_Key, _Built] = {}
@@ -156,13 +156,13 @@ def _instances(
         refuse_broken(document, node.json)
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
-        # A skinned mesh stands where its joints put it, whatever its node says.
+        # A skinned mesh is transformed by its joints; the matrix of its own node does not apply.
         key = number, node.index if "skin" in node.json else None
         if key not in built:
             arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
-            place = None
+            posed = None
             if key[1] is not None:
-                arrays, place = poser.pose(sources[number], arrays, node)
+                arrays, posed = poser.pose(sources[number], arrays, node)
             mesh, defects = build_mesh(name, arrays, reader.materials)
             warnings += found + defects
             if mesh is None:
@@ -171,31 +171,31 @@ def _instances(
                 )
             source_mesh = SourceMesh(name, tuple(arrays) if lenient else ())
             extent = np.zeros(3) if mesh is None else np.abs(mesh.position).max(axis=0).astype(np.float64)
-            built[key] = _Built(len(built), None if mesh is None else len(meshes), source_mesh, extent, place)
+            built[key] = _Built(len(built), None if mesh is None else len(meshes), source_mesh, extent, posed)
             meshes += [] if mesh is None else [mesh]
         made = built[key]
         label = node.json.string("name", name)
-        if made.place is not None:
-            node = Placed(node.index, node.json, made.place)
+        if made.world_from_posed is not None:
+            node = Placed(node.index, node.json, made.world_from_posed)
             message = "the mesh is skinned; it is baked in the pose that its joints have in the file"
             warnings.append(SceneWarning("skinned", message, label))
         shown.append(SourceInstance(node.index, label, made.number, node.matrix))
-        if made.mesh is not None and _stands(node, made.extent, label, warnings):
+        if made.mesh is not None and _is_usable(node, made.extent, label, warnings):
             instances.append(Instance(node.index, label, made.mesh, node.matrix))
     kept = SourceScene(tuple(made.source for made in built.values()), tuple(shown)) if lenient else None
     return *_drop_unused(meshes, instances), kept
 
 
-def _stands(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
-    """Tell whether an instance can be baked; `extent` is its mesh's largest coordinate along each axis."""
-    stretch = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
-    if not stretch[2] > _FLATTEST * stretch[0]:
+def _is_usable(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
+    """Return whether an instance can be baked; `extent` (3,) has its mesh's largest coordinates."""
+    singular = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
+    if not singular[2] > _FLATTEST * singular[0]:
         message = "the node's scale is zero along an axis; the instance is left out"
         warnings.append(SceneWarning("flat-instance", message, label))
         return False
     with np.errstate(over="ignore"):
-        reach = np.abs(node.matrix[:3, :3]) @ extent + np.abs(node.matrix[:3, 3])
-    if not (reach <= LARGEST_COORDINATE).all():
+        largest = np.abs(node.matrix[:3, :3]) @ extent + np.abs(node.matrix[:3, 3])
+    if not (largest <= LARGEST_COORDINATE).all():
         node.json.fail(f"the node places its mesh further than {LARGEST_COORDINATE:g} m away")
     return True
 

@@ -1,6 +1,6 @@
-"""Imports single meshes: PLY, STL and OFF; the only file that knows trimesh.
+"""Imports single meshes: PLY, STL and OFF, with the parsers of trimesh.
 
-Only its parsers are used, not its mesh class, which would merge, reorder and drop vertices.
+Its mesh class is not used: it would merge, reorder and drop vertices.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from baker.core.source_mesh import SourcePrimitive
 from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
-# It logs what it could not read with a traceback, which Python prints where no program asked for logs.
+# trimesh logs errors with a traceback, which Python prints to stderr unless a handler is set.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
@@ -48,7 +48,7 @@ def import_mesh_file(source: SceneFile) -> Scene:
         arrays = [_arrays(solid) for solid in solids]
     except MemoryError:
         raise
-    except Exception as error:  # the parsers raise nearly anything on broken data
+    except Exception as error:  # the parsers raise many kinds of exceptions on broken data
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:160]
         raise InputError(f"the file cannot be parsed as {kind.upper()} ({why})", file=file) from None
     name = source.path.name.split(".")[0]
@@ -86,16 +86,16 @@ def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
     else:
         found = load_off(stream)
     if found.get("geometry") == {} and b"facet" not in data:
-        # A binary file that is cut off is taken for text without a single solid.
+        # The parser takes a truncated binary file for a text file without a solid.
         raise ValueError("it is neither text nor as long as its header says; it may be cut off")
-    # A text STL with several solids comes as a dictionary of them.
+    # A text STL with several solids is returned as a dictionary of them.
     return list(found["geometry"].values()) if "geometry" in found else [found]
 
 
 def _arrays(
     solid: dict[str, Any],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64] | None, NDArray[np.float32] | None]:
-    """Return (position, face, normal, colour) of what a parser found."""
+    """Return position (V, 3), face (T, 3), normal (V, 3) and colour (V, 4) of a parsed solid."""
     position = np.array(solid["vertices"], np.float64).reshape(-1, 3)
     faces = solid.get("faces")
     face = np.zeros((0, 3), np.int64) if faces is None or not len(faces) else np.array(faces, np.int64)
@@ -107,6 +107,7 @@ def _arrays(
 
 
 def _colour(value: Any, count: int) -> NDArray[np.float32] | None:
+    """Return vertex colours (V, 4), linear Rec.709 and alpha, or None if there are none for each vertex."""
     if value is None or len(value) != count:
         return None
     stored = np.array(value)

@@ -1,7 +1,7 @@
-"""Imports Wavefront OBJ scenes with their MTL libraries; the only file that knows tinyobjloader.
+"""Imports Wavefront OBJ scenes with their MTL libraries, with the parser of tinyobjloader.
 
-Each object or group becomes a mesh with one instance, each material of it a primitive. OBJ's v = 0 is the
-last image row; it is turned over here, so that v = 0 is the first row as everywhere in baker.
+Each object or group becomes a mesh with one instance, and each of its materials a primitive. In OBJ v = 0 is
+the last image row; v is flipped here, so that v = 0 is the first row as everywhere in baker.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.mtl import read_mtl
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
-# Grey instead of the white of glTF: a white room would never let go of its light.
+# Albedo 0.8 instead of the white of glTF, which would absorb no light.
 GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
 _NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
@@ -33,7 +33,7 @@ _NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MUL
 
 @IMPORTERS.register(".obj")
 def import_obj(source: SceneFile) -> Scene:
-    """Read an OBJ file and the MTL files and images that it names.
+    """Read an OBJ file and the MTL files and images that it refers to.
 
     Parameters
     ----------
@@ -73,7 +73,19 @@ def import_obj(source: SceneFile) -> Scene:
 
 
 def obj_sha256(path: Path, data: bytes) -> str:
-    """Return the hash that `import_obj` would find, without looking at geometry or pixels.
+    """Return the hash that `import_obj` computes, without parsing geometry or decoding images.
+
+    Parameters
+    ----------
+    path : Path
+        The OBJ file.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal.
 
     Raises
     ------
@@ -100,18 +112,20 @@ def _read_libraries(
     warnings: list[SceneWarning],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
+    """Return the materials of all libraries; adds the bytes of their files to `digest`."""
+
     def read_file(file: Path) -> bytes:
         data = file.read_bytes()
         digest.update(data)
         return data
 
     materials: list[Material] = []
-    # The parser takes the first word after usemtl, some exporters mean the rest of the line.
+    # After usemtl the parser takes the first word; some exporters use the rest of the line as the name.
     named = re.findall(r"^[ \t]*usemtl[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
     used = {*named, *(name.split()[0] for name in named if name)}
     lines = re.findall(r"^[ \t]*mtllib[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
     for line in dict.fromkeys(lines):
-        # The rest of the line is one name with blanks, or several names.
+        # The rest of the line is either one name with blanks, or several names.
         names = [line] if (path.parent / line).is_file() else line.split()
         for name in names:
             file = path.parent / name.replace("\\", "/")
@@ -133,8 +147,8 @@ def _read_libraries(
 
 
 def _parse(text: str, materials: list[Material], file: str) -> Any:
-    """Return the parser with all faces cut to triangles and every index known to be in range."""
-    # Ear clipping reads vertices without a check and crashes on a wrong index: look at the faces first.
+    """Return the parser with triangulated faces; all indices are in range."""
+    # Check the indices before triangulation: the parser's ear clipping crashes on an index out of range.
     reader = _run_parser(text, materials, file, triangulate=False)
     attributes = reader.GetAttrib()
     counts = tuple(
@@ -154,7 +168,7 @@ def _run_parser(text: str, materials: list[Material], file: str, *, triangulate:
     config = tinyobjloader.ObjReaderConfig()
     config.triangulate = triangulate
     reader = tinyobjloader.ObjReader()
-    # The binding does not show `Ke`: our own reader takes the values, and this one only needs the names.
+    # Pass the names of the materials only: the binding does not provide `Ke`, so `read_mtl` reads the values.
     names = "".join(f"newmtl {material.name}\n" for material in materials)
     if not reader.ParseFromString(text, names, config):
         why = " ".join(reader.Error().split()).rstrip(".") or "it is not an OBJ file"
@@ -163,7 +177,8 @@ def _run_parser(text: str, materials: list[Material], file: str, *, triangulate:
 
 
 def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) -> None:
-    # The numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13), so lists it is.
+    """Raise if an index is out of range."""
+    # Use lists: the numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13).
     kinds = (
         (mesh.vertex_indices(), "vertex"),
         (mesh.normal_indices(), "normal"),
@@ -178,7 +193,7 @@ def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) ->
 
 
 def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Put NaN where a `v` line holds no numbers: the parser reads such words as 0 and says nothing."""
+    """Set positions to NaN where a `v` line holds no numbers; the parser silently reads such words as 0."""
     if _NOT_NUMBERS.search(data) is None:
         return position
     position = position.copy()
@@ -196,7 +211,7 @@ def _is_number(word: bytes) -> bool:
 
 
 def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
-    """Return the vertex colours if the file has any: the parser makes up white ones."""
+    """Return vertex colours (V, 4), or None if all are white, as the parser returns where there are none."""
     colour = np.array(attributes.colors, np.float32).reshape(-1, 3)
     if len(colour) != count or (colour == 1).all():
         return None
@@ -204,7 +219,7 @@ def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
 
 
 class _Corners:
-    """The arrays that all shapes of the file share."""
+    """The arrays that the indices of all shapes refer to."""
 
     def __init__(
         self,
@@ -220,15 +235,15 @@ class _Corners:
         self.colour = colour
 
 
-def _primitives(mesh: Any, corners: _Corners, grey: int) -> list[SourcePrimitive]:
-    """Split a shape by material and give each part its own vertices."""
+def _primitives(mesh: Any, corners: _Corners, default: int) -> list[SourcePrimitive]:
+    """Split a shape by material; `default` is the material of faces without a known one."""
     vertex, normal, texcoord = (
         np.array(values, np.int64)
         for values in (mesh.vertex_indices(), mesh.normal_indices(), mesh.texcoord_indices())
     )
     n = len(vertex) // 3
     material = np.array(mesh.material_ids, np.int64)[:n]
-    material = np.where((material < 0) | (material >= grey), grey, material)
+    material = np.where((material < 0) | (material >= default), default, material)
     primitives = []
     for number, used in enumerate(np.unique(material)):
         mine = np.repeat(material == used, 3)
@@ -253,7 +268,8 @@ def _primitive(
     texcoord: NDArray[np.int64],
     corners: _Corners,
 ) -> SourcePrimitive:
-    # One vertex for each combination of indices that occurs; two steps keep the key within 64 bits.
+    """Return the primitive of corners (3 T,) with indices of position, normal and texture coordinate."""
+    # Create one vertex for each combination of indices; two steps keep the keys within 64 bits.
     _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
     _, row, index = np.unique(
         first * (len(corners.normal) + 1) + normal + 1, return_index=True, return_inverse=True

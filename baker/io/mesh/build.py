@@ -1,6 +1,6 @@
-"""Makes a `Mesh` from the raw arrays of its primitives: bad triangles out, normals in, vertices compact.
+"""Builds a `Mesh` from source primitives: drops invalid triangles, computes normals, compacts vertices.
 
-Every importer ends here, so that all formats are held to the same rules.
+All importers use it, so that the same rules apply to all formats.
 """
 
 from __future__ import annotations
@@ -18,20 +18,22 @@ from baker.topology.triangle_check import duplicates, face_normal, in_range, usa
 def build_mesh(
     name: str, primitives: Sequence[SourcePrimitive], materials: Sequence[Material]
 ) -> tuple[Mesh | None, list[SceneWarning]]:
-    """Join primitives to a mesh that holds only good triangles.
+    """Concatenate primitives to a mesh with valid triangles only.
 
     Parameters
     ----------
     name : str
+        Name of the mesh.
     primitives : sequence of SourcePrimitive
+        The primitives of the file.
     materials : sequence of Material
-        The scene's; says which are double-sided and which texture coordinates they read.
+        Materials of the scene: sidedness, and texture coordinate sets that they read.
 
     Returns
     -------
     mesh : Mesh or None
-        None if no good triangle is left. A texture coordinate set that only some primitives have, or
-        that a material reads and its primitive lacks, is zero there.
+        None if no valid triangle is left. A texture coordinate set that only some primitives have, or
+        that a material reads and its primitive lacks, is 0 there.
     warnings : list of SceneWarning
         One for each kind of defect, with its count.
     """
@@ -39,7 +41,7 @@ def build_mesh(
     if not primitives:
         return None, []
     warnings: list[SceneWarning] = []
-    kept = _good_triangles(name, primitives, materials, warnings)
+    kept = _valid_triangles(name, primitives, materials, warnings)
     parts = [_Part(p, t) for p, t in zip(primitives, kept, strict=True) if len(t)]
     if not parts:
         return None, warnings
@@ -69,13 +71,13 @@ def build_mesh(
     return mesh, warnings
 
 
-def _good_triangles(
+def _valid_triangles(
     name: str,
     primitives: Sequence[SourcePrimitive],
     materials: Sequence[Material],
     warnings: list[SceneWarning],
 ) -> list[NDArray[np.int64]]:
-    """Return the triangles of each primitive that are worth baking, and count the others."""
+    """Return the valid triangles of each primitive; add a warning for each kind of others, with its count."""
     start = np.cumsum([0] + [len(p.position) for p in primitives])
     position = np.concatenate([p.position for p in primitives])
     triangle = np.concatenate([p.triangle + s for p, s in zip(primitives, start, strict=False)])
@@ -98,9 +100,9 @@ def _good_triangles(
             warnings.append(SceneWarning(code, f"{some} {what} left out", name))
 
     keep(~(stitched & repeats), "", "")
-    within = in_range(triangle, start[owner], start[owner + 1])
-    if not within.all():
-        keep(within, "index-range", "that name a vertex which does not exist")
+    inside = in_range(triangle, start[owner], start[owner + 1])
+    if not inside.all():
+        keep(inside, "index-range", "that name a vertex which does not exist")
     usable = usable_vertices(position)
     if not usable.all():
         keep(usable[triangle].all(axis=1), "bad-vertices", "with NaN, infinite or huge coordinates")
@@ -114,12 +116,12 @@ def _good_triangles(
 
 
 class _Part:
-    """The good triangles of a primitive with the rows of its arrays that they use."""
+    """The valid triangles of a primitive, and the rows of its arrays that they use."""
 
     def __init__(self, source: SourcePrimitive, triangle: NDArray[np.int64]) -> None:
         self.source = source
         if source.normal is None:
-            # Flat normals differ at each corner, so nothing is shared (glTF 2.0, section 3.7.2.1).
+            # Flat normals (glTF 2.0, section 3.7.2.1): each corner gets a vertex of its own.
             self.row = triangle.reshape(-1)
             self.triangle = np.arange(len(self.row)).reshape(-1, 3)
             return
@@ -140,7 +142,7 @@ class _Part:
         if bad.any():
             some = f"{int(bad.sum())} vertex normals"
             warnings.append(
-                SceneWarning("bad-normals", f"{some} of no length or not finite were made anew", name)
+                SceneWarning("bad-normals", f"{some} of no length or not finite were recomputed", name)
             )
             smooth = np.zeros_like(given)
             face = face_normal(position, self.triangle)
@@ -148,7 +150,7 @@ class _Part:
                 smooth[:, axis] = np.bincount(
                     self.triangle.reshape(-1), np.repeat(face[:, axis], 3), minlength=len(smooth)
                 )
-            # Faces that cancel out leave no direction: the vertex takes the normal of its first face.
+            # Where the face normals cancel out, take the normal of the vertex's first face.
             lost = bad & (np.abs(smooth).max(axis=1) == 0)
             first = np.zeros(len(smooth), np.int64)
             first[self.triangle.reshape(-1)[::-1]] = np.repeat(np.arange(len(face)), 3)[::-1]
@@ -172,7 +174,7 @@ class _Part:
 def _texcoord_sets(
     name: str, parts: Sequence[_Part], materials: Sequence[Material], warnings: list[SceneWarning]
 ) -> set[int]:
-    """Return the numbers of the sets that the mesh must have."""
+    """Return the numbers of the texture coordinate sets of the mesh."""
     sets: set[int] = set()
     for part in parts:
         sets.update(part.source.texcoord)
@@ -197,7 +199,8 @@ def _texcoord_sets(
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    # By the largest component first, so that squares of tiny or huge vectors stay in range.
+    """Normalise vectors (n, 3)."""
+    # Divide by the largest component first, so that squares of tiny or huge vectors stay in range.
     scaled: NDArray[np.float64] = vector / np.maximum(np.abs(vector).max(axis=1, keepdims=True), 1e-300)
     length = np.sqrt((scaled * scaled).sum(axis=1, keepdims=True))
     scaled /= np.maximum(length, 1e-300)

@@ -1,4 +1,4 @@
-"""Reads Wavefront material libraries: the few lines of them that matter to diffuse light.
+"""Reads Wavefront material libraries: the statements for diffuse reflection, emission and opacity.
 
 Reflectance = Kd x map_Kd, emission = Ke x map_Ke (cd/m2), opacity = d or 1 - Tr.
 
@@ -18,7 +18,7 @@ from baker.core.errors import InputError
 from baker.core.scene import Material, Texture
 from baker.io.images import decode_image
 
-# How many values follow each option of a map statement.
+# Number of values after each option of a map statement.
 _OPTION_VALUES = {
     "-blendu": 1,
     "-blendv": 1,
@@ -44,7 +44,7 @@ def read_mtl(
     used: Container[str],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
-    """Return the materials of one library, in its order.
+    """Read the materials of a library.
 
     Parameters
     ----------
@@ -53,20 +53,47 @@ def read_mtl(
     file : str
         Its name, for messages.
     folder : Path
-        Where its image names begin.
+        Folder that image names are relative to.
     read_file : callable
         Returns the content of a file; raises OSError or ValueError if it cannot.
     used : container of str
-        Names of the materials that faces have; others may be broken.
+        Names of the materials that faces use; errors in others are ignored.
     decode : callable
-        Makes pixels of an image file's content; see `decode_image`.
+        Decodes the content of an image file; see `decode_image`.
+
+    Returns
+    -------
+    list of Material
+        In the library's order.
 
     Raises
     ------
     InputError
         For a value that is not a number, or an image that is missing or cannot be decoded.
     """
-    images: dict[str, NDArray[np.uint8]] = {}
+    images = _Images(file, folder, read_file, decode)
+
+    def texture(material: str, words: list[str] | None) -> Texture | None:
+        if not words:
+            return None
+        names, transform, clamp = _map_options(words, file, material)
+        pixels = images.find(material, words, names)
+        return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
+
+    out = []
+    for statements in _parse(text):
+        name = " ".join(statements["name"])
+        try:
+            out.append(_material(statements, file, texture))
+        except InputError:
+            if name in used:
+                raise
+            out.append(Material(name=name))
+    return out
+
+
+def _parse(text: str) -> list[dict[str, list[str]]]:
+    """Return the statements of each material: the words after each keyword, and its name under "name"."""
     materials: list[dict[str, list[str]]] = []
     for line in text.splitlines():
         words = line.split("#", 1)[0].split()
@@ -76,47 +103,49 @@ def read_mtl(
             materials.append({"name": words[1:]})
         elif materials:
             materials[-1][words[0].lower()] = words[1:]
+    return materials
 
-    def image(material: str, words: list[str], names: list[str]) -> NDArray[np.uint8]:
+
+class _Images:
+    """The images of a library, each read once."""
+
+    def __init__(
+        self,
+        file: str,
+        folder: Path,
+        read_file: Callable[[Path], bytes],
+        decode: Callable[..., NDArray[np.uint8]],
+    ) -> None:
+        self._file = file
+        self._folder = folder
+        self._read_file = read_file
+        self._decode = decode
+        self._pixels: dict[str, NDArray[np.uint8]] = {}
+
+    def find(self, material: str, words: list[str], names: list[str]) -> NDArray[np.uint8]:
+        """Return the pixels of the first file that exists among `names`; `words` is the statement."""
         for name in names:
-            if name in images:
-                return images[name]
+            if name in self._pixels:
+                return self._pixels[name]
             try:
-                data = read_file(folder / name.replace("\\", "/"))
+                data = self._read_file(self._folder / name.replace("\\", "/"))
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
                 why = getattr(error, "strerror", None) or error
                 raise InputError(
-                    f"the image '{name}' cannot be read: {why}", file=file, object=material
+                    f"the image '{name}' cannot be read: {why}", file=self._file, object=material
                 ) from None
-            images[name] = decode(data, file=file, object=name)
-            return images[name]
+            self._pixels[name] = self._decode(data, file=self._file, object=name)
+            return self._pixels[name]
         message = f"the image '{' '.join(words)}' is missing; put it beside the scene"
-        raise InputError(message, file=file, object=material)
-
-    def texture(material: str, words: list[str] | None) -> Texture | None:
-        if not words:
-            return None
-        names, transform, clamp = _map_options(words, file, material)
-        pixels = image(material, words, names)
-        return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
-
-    out = []
-    for lines in materials:
-        name = " ".join(lines["name"])
-        try:
-            out.append(_material(lines, file, texture))
-        except InputError:
-            if name in used:
-                raise
-            out.append(Material(name=name))
-    return out
+        raise InputError(message, file=self._file, object=material)
 
 
 def _material(
     words: dict[str, list[str]], file: str, texture: Callable[[str, list[str] | None], Texture | None]
 ) -> Material:
+    """Return the material of some statements; `texture` returns the texture of a map statement."""
     name = " ".join(words["name"])
 
     def colour(key: str, default: float) -> tuple[float, float, float]:
@@ -124,11 +153,11 @@ def _material(
         if values[:1] and values[0].lower() in ("xyz", "spectral"):
             raise InputError(f"{key} is given as {values[0]}; only R G B is read", file=file, object=name)
         numbers = [_number(v, key, file, name) for v in values[:3]] or [default]
-        numbers += numbers[:1] * (3 - len(numbers))  # G and B follow R where they are left out
+        numbers += numbers[:1] * (3 - len(numbers))  # G and B default to R
         return (numbers[0], numbers[1], numbers[2])
 
     red, green, blue = colour("kd", 0.8)
-    glow = texture(name, words.get("map_ke"))
+    emission_texture = texture(name, words.get("map_ke"))
     opacity = 1.0
     if words.get("d"):
         opacity = _number(words["d"][-1], "d", file, name)
@@ -139,15 +168,15 @@ def _material(
         name=name,
         base_colour=(red, green, blue, opacity),
         base_colour_texture=texture(name, words.get("map_kd")),
-        emission=colour("ke", 1.0 if glow is not None and "ke" not in words else 0.0),
-        emission_texture=glow,
+        emission=colour("ke", 1.0 if emission_texture is not None and "ke" not in words else 0.0),
+        emission_texture=emission_texture,
         alpha_mode="OPAQUE" if opacity == 1.0 else "BLEND",
         metallic=0.0,
     )
 
 
 def _map_options(words: list[str], file: str, material: str) -> tuple[list[str], NDArray[np.float64], bool]:
-    """Return (possible file names, image uv from mesh uv, clamped) of a map statement."""
+    """Return the possible file names, (2, 3) image uv from mesh uv, and `-clamp` of a map statement."""
     shift, stretch, clamp = [0.0, 0.0], [1.0, 1.0], False
     k = 0
     while k < len(words) - 1 and words[k].lower() in (*_OPTION_VALUES, *_VECTOR_OPTIONS):
@@ -165,12 +194,12 @@ def _map_options(words: list[str], file: str, material: str) -> tuple[list[str],
             shift[: len(values[:2])] = values[:2]
         elif option == "-s":
             stretch[: len(values[:2])] = values[:2]
-    # OBJ's v points up and ours down, both from 0 to 1: v' = 1 - (s (1 - v) + o).
+    # v points up in OBJ and down here, both from 0 to 1: v' = 1 - (s (1 - v) + o).
     transform = np.array(
         [[stretch[0], 0.0, shift[0]], [0.0, stretch[1], 1.0 - stretch[1] - shift[1]]], np.float64
     )
     rest = words[k:]
-    # Exporters write names with blanks as they are; an old absolute path may still lie beside the scene.
+    # Names may contain blanks. Of an absolute path of another machine the file name is tried as well.
     name = " ".join(rest)
     return list(dict.fromkeys((name, name.replace("\\", "/").rsplit("/", 1)[-1]))), transform, clamp
 

@@ -1,4 +1,4 @@
-"""Makes a `Scene` of plain meshes for formats that have neither nodes nor metres nor a fixed up axis."""
+"""Builds a `Scene` from meshes of formats that define neither nodes nor a unit nor an up axis."""
 
 from __future__ import annotations
 
@@ -15,15 +15,21 @@ from baker.io.mesh.build import build_mesh
 
 
 def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.float32]:
-    """Return (N, 3) vectors with +Y up and times `scale`, float32.
+    """Transform vectors to +Y up and metres.
 
     Parameters
     ----------
     vector : (N, 3) float64
+        Positions or directions in the axes of the file.
     up : str
-        "z" turns the vectors by -90 degrees about x: (x, y, z) becomes (x, z, -y).
+        "z" rotates by -90 degrees about x: (x, y, z) becomes (x, z, -y).
     scale : float
         Metres per unit.
+
+    Returns
+    -------
+    (N, 3) float32
+        The transformed vectors.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         turned = np.stack([vector[:, 0], vector[:, 2], -vector[:, 1]], axis=1) if up == "z" else vector
@@ -38,7 +44,25 @@ def scene_of_meshes(
     warnings: Sequence[SceneWarning],
     sha256: str,
 ) -> Scene:
-    """Return a scene with one mesh and one instance for each named group, nodes numbered from 0.
+    """Build a scene with one mesh and one instance for each named group, nodes numbered from 0.
+
+    Parameters
+    ----------
+    source : SceneFile
+        The file; gives name and path.
+    groups : sequence of (str, sequence of SourcePrimitive)
+        Name and primitives of each mesh, in world space.
+    materials : sequence of Material
+        Materials that the primitives refer to by index.
+    warnings : sequence of SceneWarning
+        Warnings about the file so far.
+    sha256 : str
+        Hash of the file and of all files that it refers to.
+
+    Returns
+    -------
+    Scene
+        Meshes without a valid triangle are left out, with a warning.
 
     Raises
     ------
@@ -60,9 +84,8 @@ def scene_of_meshes(
             )
     if not meshes and not source.lenient:
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in found[:3])
-        message = (
-            f"there is nothing to bake: the file holds no usable triangle{f' ({detail})' if detail else ''}"
-        )
+        why = f" ({detail})" if detail else ""
+        message = f"there is nothing to bake: the file holds no usable triangle{why}"
         raise InputError(message, file=str(source.path))
     return Scene(
         name=source.path.name.split(".")[0],
@@ -78,5 +101,5 @@ def scene_of_meshes(
 
 def _source_scene(groups: Sequence[tuple[str, Sequence[SourcePrimitive]]]) -> SourceScene:
     meshes = tuple(SourceMesh(name, tuple(primitives)) for name, primitives in groups)
-    stand = tuple(SourceInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
-    return SourceScene(meshes, stand)
+    instances = tuple(SourceInstance(k, mesh.name, k, np.eye(4)) for k, mesh in enumerate(meshes))
+    return SourceScene(meshes, instances)

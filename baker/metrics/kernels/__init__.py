@@ -1,4 +1,4 @@
-"""Kernels that cut texels into the pieces that triangles take of them."""
+"""Kernels that clip triangles to the squares of texels."""
 
 from baker.trace.kernel_cache import keep_kernels
 

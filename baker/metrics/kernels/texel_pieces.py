@@ -1,7 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Pieces of triangles inside texels, for a judge who shares no code with the baker's own raster.
+"""Pieces of triangles inside texels, independent of the rasteriser of the bake.
 
-Triangles are cut to a texel's square one by one (Sutherland and Hodgman, 1974, by way of `clip`).
+Each triangle is clipped to the square of each texel that it may touch (`baker.kernels.clip`).
+Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 @inner
 def _box(corner, size):
-    """Return first column, last column, first row, last row of texels that a triangle (3, 2) may touch."""
+    """Return first column, last column, first row, last row of texels that a triangle may touch.
+
+    corner : (3, 2) float64, its uv in texels; size : int, width and height of the page in texels
+    """
     low_x = smaller(smaller(corner[0, 0], corner[1, 0]), corner[2, 0])
     high_x = larger(larger(corner[0, 0], corner[1, 0]), corner[2, 0])
     low_y = smaller(smaller(corner[0, 1], corner[1, 1]), corner[2, 1])
@@ -36,7 +40,13 @@ def _box(corner, size):
 
 @kernel
 def texel_owners(uv, triangle, page, instance, size, owner, most):
-    """Write to `owner` the instance that covers most of each pixel; `most` is that area, in texels."""
+    """Find the instance that covers most of each texel.
+
+    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32; page, instance : (T,) int32
+    size : int, width and height of a page in texels
+    owner : (N,) int32 output, the instance; unchanged where none covers more than `most`
+    most : (N,) float32 in and output, area that it covers in texels
+    """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
         for j in range(3):
@@ -54,7 +64,16 @@ def texel_owners(uv, triangle, page, instance, size, owner, most):
 
 @kernel
 def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):
-    """Count the pieces of triangles inside wanted texels (no `write`), or store them from `at` on."""
+    """Count the pieces of triangles inside wanted texels, or store them if `write` is not empty.
+
+    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32; page : (T,) int32
+    size : int, width and height of a page in texels
+    wanted : (N,) int32, row i of each texel in the list of n wanted ones, or -1
+    at : (n,) int64 in and output, first index at which pieces of row i are stored; incremented for each piece
+    piece, corners : (m,) int64 output, triangle and number of corners of each piece
+    polygon : (m, MAX_CORNERS, 2) float64 output, its corners in the texel's square
+    area : (m,) float64 output, its area in texels
+    """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
         for j in range(3):
@@ -82,11 +101,21 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
 def spread_pieces(
     uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):
-    """Choose places uniform in the area of a texel's pieces: their triangles, weights and area in all.
+    """Choose points uniformly in the area of each texel's pieces.
 
-    middle : (n, 2) float64 output, mean of the places in the texel's square, 0 to 1 (column, row)
+    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32
+    size : int, width and height of a page in texels
+    pixel : (n,) int64, (page * size + row) * size + column
+    start : (n + 1,) int64, first piece of each texel
+    piece, corners, polygon, area : pieces as `texel_pieces` stores them
+    random : (n, k, 3) float64, 0 to 1, numbers for the piece and for the point in it
+    found : (n, k) int64 output, triangle of each point
+    weight : (n, k, 3) float64 output, its barycentric coordinates
+    covered : (n,) float64 output, area of all pieces in texels
+    middle : (n, 2) float64 in and output, mean of the points in the texel's square, 0 to 1 (column, row)
     """
     for i in range(len(pixel)):
+        # Sum the area of the texel's pieces.
         first, last = start[i], start[i + 1]
         total = 0.0
         for e in range(first, last):
@@ -94,6 +123,7 @@ def spread_pieces(
         covered[i] = total
         rest = pixel[i] % (size * size)
         for k in range(random.shape[1]):
+            # Choose a piece in proportion to its area.
             left = random[i, k, 0] * total
             e = first
             while e < last - 1 and left >= area[e]:
@@ -101,11 +131,13 @@ def spread_pieces(
                 e += 1
             if e >= last:
                 continue
+            # Choose a point in it, uniformly.
             x, y = polygon_point(polygon[e], corners[e], random[i, k, 1], random[i, k, 2])
             middle[i, 0] += x / random.shape[1]
             middle[i, 1] += y / random.shape[1]
             x += rest % size
             y += rest // size
+            # Compute its barycentric coordinates.
             t = piece[e]
             a, b, c = triangle[t, 0], triangle[t, 1], triangle[t, 2]
             ax, ay = float(uv[a, 0]) * size, float(uv[a, 1]) * size

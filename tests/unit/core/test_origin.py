@@ -96,8 +96,8 @@ def test_the_origin_depends_on_the_scene_only():
 
 
 def test_lights_are_relative_to_the_origin():
-    lamp = PunctualLight("point", "p", 0, (1, 1, 1), (100_000.125, 1.5, 0.25), range=2.0)
-    scene = replace(room((1e5, 0, 0)), lights=(lamp,))
+    light = PunctualLight("point", "p", 0, (1, 1, 1), (100_000.125, 1.5, 0.25), range=2.0)
+    scene = replace(room((1e5, 0, 0)), lights=(light,))
     local = scene.local_lights[0]
-    assert tuple(np.array(local.position) + scene.origin) == lamp.position
-    assert replace(local, position=lamp.position) == lamp
+    assert tuple(np.array(local.position) + scene.origin) == light.position
+    assert replace(local, position=light.position) == light

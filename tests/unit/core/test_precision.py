@@ -56,7 +56,7 @@ def test_a_node_that_takes_far_vertices_back_does_not_help():
     assert "7.81 mm" in coarse_objects(scene, np.array([0.05])).text
 
 
-def test_a_level_in_millimetres_is_judged_in_metres():
+def test_a_level_in_millimetres_is_measured_in_metres():
     # Coordinates of 2000 and a scale of 1/1000: steps of a tenth of a micron.
     assert coarse_objects(floor(0, size=2000.0, scale=1e-3), np.array([0.01])) is None
 
@@ -70,6 +70,6 @@ def test_two_objects_far_apart_cannot_both_be_fine():
     assert coarse_objects(both(floor(0), floor(1e5, size=1e4)), np.array([0.05, 5.0])) is None
 
 
-def test_objects_without_texels_are_not_judged():
+def test_objects_without_texels_are_not_reported():
     assert coarse_objects(floor(1e5, "vertices"), np.array([np.inf])) is None
     assert coarse_objects(replace(floor(0), instances=()), np.zeros(0)) is None

@@ -298,7 +298,7 @@ def test_flipped_bytes_never_surprise(tmp_path):
 
 
 @pytest.mark.parametrize("strength", [1e16, 1e200])
-def test_an_emission_too_strong_to_reckon_with(tmp_path, strength):
+def test_an_emission_too_strong_to_compute_with(tmp_path, strength):
     more = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
     builder = quad_builder(name="lamp", emissiveFactor=[1, 1, 1], extensions=more)
     path = write(tmp_path / "a.glb", builder.glb())

@@ -13,7 +13,7 @@ from baker.io.load import load_for_bake
 
 @pytest.fixture
 def level(tmp_path):
-    """Return a file: Floor; House with Wall, UCX_Wall and a lamp; Shed with Wall."""
+    """Return a file: Floor; House with Wall, UCX_Wall and a light; Shed with Wall."""
     b = GltfBuilder()
     b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
 
@@ -23,8 +23,8 @@ def level(tmp_path):
 
     part("Floor", 0)
     inside = [part("Wall", 1), part("UCX_Wall", 2)]
-    lamp = b.node(name="Lamp", extensions={"KHR_lights_punctual": {"light": 0}})
-    b.node(name="House", children=[*inside, lamp])
+    bulb = b.node(name="Bulb", extensions={"KHR_lights_punctual": {"light": 0}})
+    b.node(name="House", children=[*inside, bulb])
     b.node(name="Shed", children=[part("Wall", 3)])
     return write(tmp_path / "level.glb", b)
 
@@ -44,7 +44,7 @@ def chosen(path, *, lenient=False, **patterns):
         ({"exclude": "Wall"}, [0, 2], 1),
         ({"exclude": "House/Wall"}, [0, 2, 3], 1),
         ({"exclude": "House"}, [0, 3], 0),
-        ({"exclude": "Lamp"}, [0, 1, 2, 3], 0),
+        ({"exclude": "Bulb"}, [0, 1, 2, 3], 0),
         ({"exclude": ["UCX_*", "Shed"]}, [0, 1], 1),
         ({"include": "House"}, [1, 2], 1),
         ({"include": "*/Wall"}, [1, 3], 1),

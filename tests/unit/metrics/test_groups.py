@@ -5,13 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from baker.metrics.groups import LEAST, Compared, bright_light, compare_group, z_needed
+from baker.metrics.groups import MIN_POINTS, ComparedPoints, bright_light, compare_group, z_needed
 
 
-def places(value, reference, noise=0.0, samples=256):
+def points(value, reference, noise=0.0, samples=256):
     value, reference = np.atleast_2d(value), np.atleast_2d(reference)
     error = np.full(reference.shape, noise)
-    return Compared(value, reference, error, (reference, reference), np.full(len(value), samples), error)
+    return ComparedPoints(
+        value, reference, error, (reference, reference), np.full(len(value), samples), error
+    )
 
 
 def noisy(rng, n, noise=0.05, colours=3):
@@ -21,7 +23,7 @@ def noisy(rng, n, noise=0.05, colours=3):
 
 
 def test_by_hand():
-    found = compare_group(places([[2.0, 1.0, 0.0], [2.0, 1.0, 3.0]], [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]), 2.0)
+    found = compare_group(points([[2.0, 1.0, 0.0], [2.0, 1.0, 3.0]], [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]), 2.0)
     assert (found.texels, found.light) == (2, 1.5)
     # Means over colours 1, 2 and 1, 2; shares of the colours 4, 2, 3 thirds and 1, 1, 1.
     assert found.bias == pytest.approx(0)
@@ -35,24 +37,24 @@ def test_the_error_of_the_bias_is_its_spread():
     found = []
     for _ in range(400):
         truth, reference = noisy(rng, 50)
-        found.append(compare_group(places(1.02 * truth, reference), 1.0))
+        found.append(compare_group(points(1.02 * truth, reference), 1.0))
     assert np.mean([f.bias for f in found]) == pytest.approx(0.02, abs=0.002)
     assert np.std([f.bias for f in found]) == pytest.approx(np.mean([f.bias_se for f in found]), rel=0.15)
     # What is sure is less than what is there, and nothing where nothing is: 3.6 standard errors.
     assert sum(f.sure_bias > 0.02 for f in found) == 0
-    exact = [compare_group(places(t, r), 1.0) for t, r in (noisy(rng, 50) for _ in range(400))]
+    exact = [compare_group(points(t, r), 1.0) for t, r in (noisy(rng, 50) for _ in range(400))]
     assert sum(f.sure_bias != 0 for f in exact) < 4
 
 
 def test_a_shift_of_colour_is_seen_through_noise():
     rng = np.random.default_rng(1)
     truth, reference = noisy(rng, 40, noise=0.3)
-    found = compare_group(places(truth * [1.04, 1, 1], reference), 1.0)
+    found = compare_group(points(truth * [1.04, 1, 1], reference), 1.0)
     assert found.sure_bias == 0
     assert found.sure_colour == pytest.approx(found.colour[0], abs=0.005)
     assert 0.02 < found.sure_colour < found.colour[0]
     assert found.colour[0] == pytest.approx(0.028, abs=0.01)
-    assert compare_group(places(truth, reference), 1.0).sure_colour == 0
+    assert compare_group(points(truth, reference), 1.0).sure_colour == 0
 
 
 def test_one_bright_place_decides_nothing():
@@ -60,17 +62,17 @@ def test_one_bright_place_decides_nothing():
     truth[0] = 500
     value = truth.copy()
     value[0] *= 0.8
-    found = compare_group(places(value, truth), 1.0)
+    found = compare_group(points(value, truth), 1.0)
     assert found.bias == pytest.approx(-0.19, abs=0.01)
     assert found.sure_bias == 0
     # Nor do two like ones, between which nothing varies.
     dark = np.full((30, 3), 1e-6)
     dark[:2] = 1.0
-    two = compare_group(places(0.75 * dark, dark), 1.0)
+    two = compare_group(points(0.75 * dark, dark), 1.0)
     assert two.bias == pytest.approx(-0.25)
     assert two.bias_se < 0.01
     assert two.effective == pytest.approx(2, rel=0.01)
-    assert two.effective < LEAST
+    assert two.effective < MIN_POINTS
     assert two.sure_bias == 0
 
 
@@ -78,11 +80,11 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
     rng = np.random.default_rng(5)
     truth = np.ones((200, 3))
     halves = tuple(truth + 0.02 * rng.standard_normal((200, 1)) for _ in range(2))
-    # A red path in a hundred places, all in one half: between places nothing varies.
+    # A red path in a hundred points, all in one half: between points nothing varies.
     halves[0][:, 0] += 0.2
     reference = 0.5 * (halves[0] + halves[1])
     found = compare_group(
-        Compared(truth, reference, 0.02 * truth, halves, np.full(200, 64), 0.02 * truth), 1.0
+        ComparedPoints(truth, reference, 0.02 * truth, halves, np.full(200, 64), 0.02 * truth), 1.0
     )
     assert found.sure_bias == 0
     assert found.sure_colour == 0
@@ -91,12 +93,12 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
 def test_light_where_none_should_be():
     dark = np.zeros((20, 3))
     # Fifty times what a path too few would explain.
-    leak = compare_group(places(dark + 0.05, dark, samples=4096), 100.0)
+    leak = compare_group(points(dark + 0.05, dark, samples=4096), 100.0)
     assert leak.bias == pytest.approx(0.05 / (1e-3 * 100))
     assert 0.4 < leak.sure_bias < leak.bias
-    few = compare_group(places(dark + 0.05, dark, samples=16), 100.0)
+    few = compare_group(points(dark + 0.05, dark, samples=16), 100.0)
     assert few.sure_bias == 0
-    assert compare_group(places(dark, dark), 100.0).sure_bias == 0
+    assert compare_group(points(dark, dark), 100.0).sure_bias == 0
 
 
 def test_noise_of_a_map_is_more_than_that_of_the_reference():
@@ -104,7 +106,7 @@ def test_noise_of_a_map_is_more_than_that_of_the_reference():
     truth = np.ones((60, 3))
     halves = tuple(truth * (1 + 0.1 * rng.standard_normal((60, 1))) for _ in range(2))
     reference = 0.5 * (halves[0] + halves[1])
-    good = Compared(truth, reference, 0.07 * truth, halves, np.full(60, 64), 0.07 * truth)
+    good = ComparedPoints(truth, reference, 0.07 * truth, halves, np.full(60, 64), 0.07 * truth)
     assert compare_group(good, 1.0).sure_noise == 0
     spoilt = good._replace(value=truth * (1 + 0.4 * rng.standard_normal((60, 1))))
     found = compare_group(spoilt, 1.0)
@@ -112,7 +114,7 @@ def test_noise_of_a_map_is_more_than_that_of_the_reference():
     assert 0.2 < found.sure_noise < found.spread.own
 
 
-def test_few_places_need_more():
+def test_few_points_need_more():
     assert z_needed(8) > z_needed(100) > 3
     assert bright_light(np.linspace(0, 1, 101)[:, None]) == pytest.approx(0.95)
 
@@ -125,7 +127,7 @@ def halved(rng, light, noise):
     )
 
 
-def test_bright_and_dark_places_in_one_group_are_no_noise_of_the_map():
+def test_bright_and_dark_points_in_one_group_are_no_noise_of_the_map():
     rng = np.random.default_rng(3)
     light, noise = np.repeat([2.0, 200.0], [12, 11]), np.repeat([0.5, 0.001], [12, 11])
     sure = apart = 0
@@ -133,7 +135,7 @@ def test_bright_and_dark_places_in_one_group_are_no_noise_of_the_map():
         halves = halved(rng, light, noise)
         reference = 0.5 * (halves[0] + halves[1])
         found = compare_group(
-            Compared(
+            ComparedPoints(
                 light[:, None],
                 reference,
                 noise[:, None] * reference,
@@ -150,14 +152,14 @@ def test_bright_and_dark_places_in_one_group_are_no_noise_of_the_map():
     assert sure == 0
 
 
-def test_noise_of_a_map_among_bright_and_dark_places_is_told():
+def test_noise_of_a_map_among_bright_and_dark_points_is_found():
     rng = np.random.default_rng(4)
     light, noise = np.repeat([2.0, 200.0], 50), np.full(100, 0.05)
     halves = halved(rng, light, noise)
     reference = 0.5 * (halves[0] + halves[1])
     map_ = (light * (1 + 0.5 * rng.standard_normal(100)))[:, None]
     found = compare_group(
-        Compared(
+        ComparedPoints(
             map_, reference, noise[:, None] * reference, halves, np.full(100, 256), noise[:, None] * reference
         ),
         1000.0,

@@ -3,14 +3,14 @@ from __future__ import annotations
 import pytest
 
 from baker.core.errors import SettingsError
-from baker.metrics.limits import judge, parse_limits
+from baker.metrics.limits import evaluate_limits, parse_limits
 
 CHANNELS, NAMES = ("irradiance", "ao"), ("median", "bias", "rmse", "p95")
 
 
 def verdicts(text, **values):
     table = {"irradiance": dict.fromkeys(NAMES, 0.0) | values, "ao": dict.fromkeys(NAMES)}
-    return [v.failed for v in judge(parse_limits(text, CHANNELS, NAMES), table)]
+    return [v.failed for v in evaluate_limits(parse_limits(text, CHANNELS, NAMES), table)]
 
 
 @pytest.mark.parametrize(

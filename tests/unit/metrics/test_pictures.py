@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from baker.metrics.fillings import misfilled_share
-from baker.metrics.groups import Compared
+from baker.metrics.dilation import misfilled_share
+from baker.metrics.groups import ComparedPoints
 from baker.metrics.levels import cut_off, few_levels
 from baker.metrics.misalignment import is_blurred
-from baker.metrics.suspects import steep_texels, suspect_texels, suspicion
+from baker.metrics.outliers import outlier_factor, outlier_texels, steep_texels
 
 SIZE = 96
 ALL = np.ones((1, SIZE, SIZE), bool)
@@ -49,7 +49,9 @@ def test_a_map_that_is_cut_off():
     truth = page.reshape(-1, 3)[pixel].astype(np.float64)
 
     def found(maps):
-        return cut_off(maps, ALL, Compared(truth, truth, 0 * truth, (truth, truth), pixel, 0 * truth), pixel)
+        return cut_off(
+            maps, ALL, ComparedPoints(truth, truth, 0 * truth, (truth, truth), pixel, 0 * truth), pixel
+        )
 
     assert found(page) == 0
     limit = np.float32(np.percentile(page, 95))
@@ -83,12 +85,12 @@ def test_texels_that_stand_out():
     page = hills()
     page[0, 20, 30], page[0, 50, 60, 1] = 40.0, 0.0
     page[0, 70, 80:82] = 40.0
-    found = suspect_texels(page, ALL, 2)
+    found = outlier_texels(page, ALL, 2)
     np.testing.assert_array_equal(found, [20 * SIZE + 30, 50 * SIZE + 60])
     # Two that are wrong side by side excuse each other; beside texels without value nothing is told.
     hole = ALL[0].copy()
     hole[21, 30] = False
-    score = suspicion(page[0, ..., 0].astype(np.float64), hole)
+    score = outlier_factor(page[0, ..., 0].astype(np.float64), hole)
     assert score[20, 30] == 1
     assert score[70, 80] < 1.1
 

@@ -26,27 +26,27 @@ def test_it_is_the_error_that_was_put_in(own, noise):
     # No error at all comes out above 0, as a square cannot be less; one below the noise comes out too small.
     off = 0.03 if own == 0 else 0.003 if noise <= own else 0.015
     assert np.mean([f.own for f in found]) == pytest.approx(own, abs=off)
-    assert np.mean([f.least <= own <= f.most for f in found]) > 0.97
+    assert np.mean([f.lower <= own <= f.upper for f in found]) > 0.97
 
 
-def test_noise_of_fifteen_percent_is_told_from_a_tenth_by_a_hundred_and_fifty_places():
+def test_noise_of_fifteen_percent_is_distinguished_from_a_tenth_by_a_hundred_and_fifty_points():
     rng = np.random.default_rng(1)
     for noise in (0.0, 0.05, 0.1):
-        assert np.mean([own_error(*drawn(rng, 150, 0.15, noise), 0.01, 3.2).least for _ in range(50)]) > 0.08
+        assert np.mean([own_error(*drawn(rng, 150, 0.15, noise), 0.01, 3.2).lower for _ in range(50)]) > 0.08
         for _ in range(50):
-            assert own_error(*drawn(rng, 150, 0.0, noise), 0.01, 3.2).least < 0.02
+            assert own_error(*drawn(rng, 150, 0.0, noise), 0.01, 3.2).lower < 0.02
 
 
-def test_places_of_different_light_and_noise():
+def test_points_of_different_light_and_noise():
     rng = np.random.default_rng(2)
     light, noise = np.repeat([1.0, 1000.0], 100), np.repeat([0.4, 0.001], 100)
     exact = [own_error(*drawn(rng, 200, 0.0, noise, light), 0.01, 3.0) for _ in range(50)]
-    assert max(f.least for f in exact) < 0.002
+    assert max(f.lower for f in exact) < 0.002
     wrong = [own_error(*drawn(rng, 200, 0.1, noise, light), 0.01, 3.0) for _ in range(50)]
     assert np.mean([f.own for f in wrong]) == pytest.approx(0.1, abs=0.015)
 
 
-def test_a_few_places_far_off_decide_little_and_a_common_shift_nothing():
+def test_a_few_points_far_off_decide_little_and_a_common_shift_nothing():
     rng = np.random.default_rng(3)
     value, reference, noise, apart = drawn(rng, 200, 0.05, 0.05)
     plain = own_error(value, reference, noise, apart, 0.01, 3.0).own
@@ -59,6 +59,6 @@ def test_a_few_places_far_off_decide_little_and_a_common_shift_nothing():
 def test_a_reference_noisier_than_its_passes_show_is_taken_at_its_halves():
     rng = np.random.default_rng(4)
     value, reference, noise, apart = drawn(rng, 200, 0.0, 0.1)
-    assert own_error(value, reference, 0.3 * noise, apart, 0.01, 3.0).least < 0.02
+    assert own_error(value, reference, 0.3 * noise, apart, 0.01, 3.0).lower < 0.02
     # Were the halves alike, it would be the map's.
-    assert own_error(value, reference, 0.3 * noise, 0 * apart, 0.01, 3.0).least > 0.05
+    assert own_error(value, reference, 0.3 * noise, 0 * apart, 0.01, 3.0).lower > 0.05

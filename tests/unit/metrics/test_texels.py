@@ -7,7 +7,7 @@ from baker.core.geometry import world_geometry
 from baker.kernels.surface import ROUNDING
 from baker.metrics.misalignment import best_shift, exponent
 from baker.metrics.sample_texels import choose_texels
-from baker.metrics.texel_area import instance_map, look_up, texel_places
+from baker.metrics.texel_area import instance_map, look_up, surface_points
 
 
 def two_quads():
@@ -26,11 +26,11 @@ def test_objects_of_texels_are_those_of_the_bake():
     assert (owner[rest] == -1).all()
 
 
-def test_places_lie_in_their_texel_and_fill_it_evenly():
+def test_points_lie_in_their_texel_and_fill_it_evenly():
     geometry = two_quads()
     size = round(np.sqrt(len(instance_map(geometry, 1, 32).reshape(-1))))
     pixel = np.flatnonzero(instance_map(geometry, 1, size).reshape(-1) == 0)
-    found = texel_places(geometry, pixel, size, 64, 1)
+    found = surface_points(geometry, pixel, size, 64, 1)
     # Quad 0 lies in the plane z = 0; its uv follows x and y.
     corner = geometry.triangle[geometry.instance == 0].reshape(-1)
     uv, position = geometry.uv[corner], geometry.position[corner]
@@ -58,40 +58,40 @@ def test_border_texels_are_looked_up_where_their_surface_is():
     geometry = two_quads()
     size = round(np.sqrt(len(instance_map(geometry, 1, 32).reshape(-1))))
     pixel = np.flatnonzero(instance_map(geometry, 1, size).reshape(-1) >= 0)
-    found = texel_places(geometry, pixel, size, 64, 1)
+    found = surface_points(geometry, pixel, size, 64, 1)
     whole = found.area > 0.999
-    np.testing.assert_array_equal(found.middle[whole], 0)
+    np.testing.assert_array_equal(found.offset[whole], 0)
     half = (found.area > 0.2) & (found.area < 0.8)
     assert half.any()
-    assert (np.abs(found.middle[half]).max(axis=1) > 0.1).all()
+    assert (np.abs(found.offset[half]).max(axis=1) > 0.1).all()
     # A page that is linear in the page: a bilinear lookup gives its value at that very place.
     row, column = np.mgrid[:size, :size]
     page = np.stack([row + 0.5, column + 0.5], axis=2)[None].astype(np.float32)
     inside = ((pixel % size) % (size - 1) > 0) & ((pixel // size) % (size - 1) > 0)
-    value = look_up(page, pixel[inside], found.middle[inside])
-    at = np.stack([pixel // size, pixel % size], axis=1) + 0.5 + found.middle[:, ::-1]
+    value = look_up(page, pixel[inside], found.offset[inside])
+    at = np.stack([pixel // size, pixel % size], axis=1) + 0.5 + found.offset[:, ::-1]
     np.testing.assert_allclose(value, at[inside], atol=1e-5)
 
 
 def test_every_object_and_every_brightness_is_chosen():
     owner = np.repeat([0, 1, 2, -1], [5000, 100, 3, 50]).astype(np.int32)
     light = np.random.default_rng(0).random(len(owner))
-    judged = np.ones(len(owner), bool)
-    judged[::7] = False
-    chosen = choose_texels(owner, judged, light, 300, 0)
+    eligible = np.ones(len(owner), bool)
+    eligible[::7] = False
+    chosen = choose_texels(owner, eligible, light, 300, 0)
     assert (np.diff(chosen) > 0).all()
-    assert judged[chosen].all()
+    assert eligible[chosen].all()
     count = np.bincount(owner[chosen], minlength=3)
     assert abs(len(chosen) - 300) < 20
     assert count[1] >= 6
     assert count[2] >= 1
     # Taken evenly over the order of brightness: the chosen ones' distribution is that of all.
-    mine, all_of = np.sort(light[chosen[owner[chosen] == 0]]), light[judged & (owner == 0)]
+    mine, all_of = np.sort(light[chosen[owner[chosen] == 0]]), light[eligible & (owner == 0)]
     rank = np.searchsorted(np.sort(all_of), mine) / len(all_of)
     assert np.abs(rank - (np.arange(len(mine)) + 0.5) / len(mine)).max() < 0.01
-    np.testing.assert_array_equal(choose_texels(owner, judged, light, 300, 0), chosen)
-    assert not np.array_equal(choose_texels(owner, judged, light, 300, 1), chosen)
-    assert len(choose_texels(owner, judged, light, 10**6, 0)) == (judged & (owner >= 0)).sum()
+    np.testing.assert_array_equal(choose_texels(owner, eligible, light, 300, 0), chosen)
+    assert not np.array_equal(choose_texels(owner, eligible, light, 300, 1), chosen)
+    assert len(choose_texels(owner, eligible, light, 10**6, 0)) == (eligible & (owner >= 0)).sum()
 
 
 def test_shift_and_curve_are_seen_and_nothing_else_is():

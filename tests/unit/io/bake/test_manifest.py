@@ -99,8 +99,8 @@ def test_lights_of_all_kinds(tmp_path: Path) -> None:
         PunctualLight("spot", "beam", 2, (1.0, 1.0, 1.0), inner_cone=0.1, outer_cone=0.2),
         PunctualLight("directional", "sun", 3, (9.0, 9.0, 9.0), direction=(0.0, -1.0, 0.0)),
     )
-    glowing = replace(result.scene.materials[0], emission=(7.0, 0.0, 0.0))
-    scene = replace(result.scene, lights=lights, materials=(glowing, *result.scene.materials[1:]))
+    emitting = replace(result.scene.materials[0], emission=(7.0, 0.0, 0.0))
+    scene = replace(result.scene, lights=lights, materials=(emitting, *result.scene.materials[1:]))
     found = bake(replace(result, scene=scene), tmp_path / "out")["lights"]
     assert [(x["kind"], x["name"], x["unit"]) for x in found] == [
         ("point", "bulb", "cd"), ("spot", "beam", "cd"), ("directional", "sun", "lx"),

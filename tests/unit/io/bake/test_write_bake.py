@@ -259,7 +259,7 @@ def test_the_current_folder_is_written_file_by_file(tmp_path: Path, monkeypatch:
 def test_what_a_killed_process_left_is_cleaned_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed_after: int, inside: bool
 ) -> None:
-    """Stop as a kill does, with no clean-up at all, after so many renames; one of the two bakes is there."""
+    """Stop like a kill, without clean-up, after `killed_after` renames; one of the two bakes is there."""
     out = tmp_path / "out"
     result = quad_result(tmp_path / "in")
     write_bake(result, out, created=NOON)

@@ -91,10 +91,10 @@ def test_materials_and_textures_read_back_as_they_were(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(make_glb(scene, make_atlas(split_layout(scene, 0)), None).data)
     again = load_scene(tmp_path / "a.glb")
     assert [m.name for m in again.materials] == ["paint", "lamp"]
-    paint, lamp = again.materials
+    paint, emitting = again.materials
     assert paint.base_colour == (0.5, 0.25, 1.0, 1.0)
     assert paint.double_sided
-    assert lamp.emission == pytest.approx((10.0, 20.0, 5.0), rel=1e-12)
+    assert emitting.emission == pytest.approx((10.0, 20.0, 5.0), rel=1e-12)
     texture = paint.base_colour_texture
     assert texture is not None
     assert np.array_equal(texture.image, TEXTURE.image)

@@ -183,10 +183,10 @@ def test_hidden_nodes_are_left_out_with_what_is_below_them(tmp_path, required):
     b = quad_builder()
     hidden = {"KHR_node_visibility": {"visible": False}}
     b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
-    lamp = b.node(extensions={"KHR_lights_punctual": {"light": 0}, **hidden})
+    light = b.node(extensions={"KHR_lights_punctual": {"light": 0}, **hidden})
     inner = b.node(mesh=0, name="inner", extensions={"KHR_node_visibility": {"visible": True}})
     outer = b.node(children=[inner], extensions=hidden)
-    b.json["scenes"] = [{"nodes": [0, lamp, outer]}]
+    b.json["scenes"] = [{"nodes": [0, light, outer]}]
     b.json["extensionsUsed"] = ["KHR_node_visibility"]
     if required:
         b.json["extensionsRequired"] = ["KHR_node_visibility"]

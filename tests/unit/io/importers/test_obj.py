@@ -49,19 +49,19 @@ def test_relative_indices_count_back_from_where_they_stand(tmp_path):
 
 def test_shapes_materials_and_primitives(tmp_path):
     (tmp_path / "room.mtl").write_text(
-        "newmtl red\nKd 0.5 0.25 0\n\nnewmtl lamp\n\tKd 0.78 0.78 0.78\n\tKe 17 12 4\n"
+        "newmtl red\nKd 0.5 0.25 0\n\nnewmtl bulb\n\tKd 0.78 0.78 0.78\n\tKe 17 12 4\n"
         "newmtl glass\nKd 1 1 1\nd 0.25\n"
     )
     scene = load(
         tmp_path,
-        "mtllib room.mtl\no floor\n" + SQUARE + "usemtl red\nf 1 2 3\nusemtl lamp\nf 1 3 4\n"
+        "mtllib room.mtl\no floor\n" + SQUARE + "usemtl red\nf 1 2 3\nusemtl bulb\nf 1 3 4\n"
         "g pane\nusemtl glass\nf 2 1 3 4\n",
     )
-    assert [m.name for m in scene.materials] == ["red", "lamp", "glass"]
-    red, lamp, glass = scene.materials
+    assert [m.name for m in scene.materials] == ["red", "bulb", "glass"]
+    red, bulb, glass = scene.materials
     assert red.base_colour == (0.5, 0.25, 0, 1)
     assert red.emission == (0, 0, 0)
-    assert lamp.emission == (17, 12, 4)
+    assert bulb.emission == (17, 12, 4)
     assert (glass.base_colour[3], glass.alpha_mode, red.alpha_mode) == (0.25, "BLEND", "OPAQUE")
     assert [m.name for m in scene.meshes] == ["floor", "pane"]
     assert [(i.node, i.mesh, i.name) for i in scene.instances] == [(0, 0, "floor"), (1, 1, "pane")]

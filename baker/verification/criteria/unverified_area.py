@@ -1,26 +1,27 @@
-"""How much of the surface was not judged, or hardly, by area."""
+"""The area of surface that was not compared, or compared with a noisy reference."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from baker.verification.judgements.judgement import Evidence, Judged, Judgement
+from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# A texel whose reference is noisier than this, or than asked for, was hardly judged.
+# Relative standard error of the reference, or the target if that is larger, above which a texel counts as
+# unresolved.
 NOISY = 0.1
 
 
-def judge(evidence: Evidence) -> Judged:
-    """Return areas and their shares."""
-    points, area = evidence.points, evidence.unjudged
-    mine = evidence.texels
+def evaluate(data: ChannelData) -> CriterionResult:
+    """Compute areas in m2 and their shares of the surface."""
+    points, area = data.points, data.unverified
+    mine = data.texels
     total = max(area.total, 1e-30)
-    stands_for = points.stands_for[mine]
-    judged = float(stands_for.sum())
-    noisy = float(stands_for[evidence.noisy[mine]].sum())
-    gap = float(stands_for[points.gap[mine]].sum())
-    tilted = float(stands_for[evidence.tilted[mine]].sum())
-    figures = {
+    texel_area = points.texel_area[mine]
+    compared = float(texel_area.sum())
+    noisy = float(texel_area[data.noisy[mine]].sum())
+    gap = float(texel_area[points.gap[mine]].sum())
+    tilted = float(texel_area[data.tilted[mine]].sum())
+    metrics = {
         "area": total,
         "invalid_area": area.invalid,
         "invalid_share": area.invalid / total,
@@ -28,27 +29,29 @@ def judge(evidence: Evidence) -> Judged:
         "uncovered_area": area.uncovered,
         "uncovered_share": area.uncovered / total,
         "unresolved_area": noisy,
-        "unresolved_share": noisy / max(judged, 1e-30),
+        "unresolved_share": noisy / max(compared, 1e-30),
         "gap_area": gap,
-        "gap_share": gap / max(judged, 1e-30),
+        "gap_share": gap / max(compared, 1e-30),
         "tilted_area": tilted,
-        "tilted_share": tilted / max(judged, 1e-30),
+        "tilted_share": tilted / max(compared, 1e-30),
     }
     remarks = {
-        "gap_share": f"{gap:.3g} m2 of {judged:.3g} lie in gaps of two texels, or inside of solids",
+        "gap_share": f"{gap:.3g} m2 of {compared:.3g} lie in gaps of two texels, or inside of solids",
         "invalid_share": f"{area.invalid:.3g} m2 of {total:.3g} hold no light of their own (invalid texels)",
         "visible_invalid_share": f"{area.visible:.3g} m2 of invalid texels can be seen",
         "uncovered_share": f"{area.uncovered:.3g} m2 of {total:.3g} lie on texels without a measured value",
         "unresolved_share": (
-            f"the reference of {evidence.channel} stayed too noisy to judge {noisy:.3g} m2 of {judged:.3g};"
+            f"the reference of {data.channel} stayed too noisy to compare {noisy:.3g} m2 of {compared:.3g};"
             " raise `time_limit`"
         ),
     }
-    return Judged(figures, {name: text for name, text in remarks.items() if np.isfinite(figures[name])})
+    return CriterionResult(
+        metrics, {name: text for name, text in remarks.items() if np.isfinite(metrics[name])}
+    )
 
 
-UNJUDGED = Judgement(
-    "unjudged",
+UNVERIFIED_AREA = Criterion(
+    "unverified area",
     (
         "area", "invalid_area", "invalid_share", "visible_invalid_share", "uncovered_area", "uncovered_share",
         "unresolved_area", "unresolved_share", "gap_area", "gap_share",
@@ -59,5 +62,5 @@ UNJUDGED = Judgement(
         " irradiance.uncovered_share > 0.02, irradiance.unresolved_share > 0.6, irradiance.gap_share > 0.3",
         "ao": "ao.unresolved_share > 0.2",
     },
-    judge,
+    evaluate,
 )  # fmt: skip

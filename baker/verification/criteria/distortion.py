@@ -1,4 +1,4 @@
-"""Maps or charts that were shifted, maps blurred, bent by a curve, rounded to few levels, or cut off."""
+"""Maps or charts that were shifted; maps that were blurred, gamma-encoded, quantised or clamped."""
 
 from __future__ import annotations
 
@@ -7,40 +7,41 @@ from typing import Any
 import numpy as np
 
 from baker.core.lightmap import TexelStatus
-from baker.metrics.fillings import misfilled_share
+from baker.metrics.dilation import misfilled_share
 from baker.metrics.levels import cut_off, few_levels
 from baker.metrics.misalignment import best_shift, exponent, is_blurred
-from baker.verification.judgements.judgement import Evidence, Judged, Judgement
+from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# A shifted chart fits this much better where it should be; there are many, and few texels tell of each.
+# Largest ratio of the misfits with and without a shift that indicates a shifted chart. It is smaller than for
+# a whole map, since there are many charts with few texels each.
 _CHART_BETTER = 0.5
 
 
-def judge(evidence: Evidence) -> Judged:
-    """Return what is wrong with the map as a picture."""
-    mine = evidence.texels
-    telling = (mine | evidence.steep) & ~evidence.points.gap
-    places = evidence.compared.of(mine)
-    page = evidence.stored.mean(axis=3, dtype="float64")
-    truth, error = (a[telling].mean(axis=1) for a in evidence.compared[1:3])
-    where = (page, evidence.pages.covered, evidence.points.pixel[telling], truth, error)
+def evaluate(data: ChannelData) -> CriterionResult:
+    """Compute the metrics of distortions of the map as an image."""
+    mine = data.texels
+    chosen = (mine | data.steep) & ~data.points.gap
+    compared = data.compared.of(mine)
+    page = data.stored.mean(axis=3, dtype="float64")
+    truth, error = (a[chosen].mean(axis=1) for a in data.compared[1:3])
+    where = (page, data.pages.covered, data.points.pixel[chosen], truth, error)
     down, right = best_shift(*where)
-    charts = _shifted_charts(evidence)
-    power = exponent(places.value.mean(axis=1), places.reference.mean(axis=1))
-    figures: dict[str, Any] = {
+    charts = _shifted_charts(data)
+    power = exponent(compared.value.mean(axis=1), compared.reference.mean(axis=1))
+    metrics: dict[str, Any] = {
         "shifted": int((down, right) != (0, 0)),
         "shifted_charts": len(charts),
         "exponent_error": None if power is None else power - 1.0,
         "blurred": int(is_blurred(*where[:4])),
-        "few_levels": int(few_levels(evidence.stored, evidence.pages.covered)),
-        "cut_off": cut_off(evidence.stored, evidence.pages.covered, places, evidence.points.pixel[mine]),
+        "few_levels": int(few_levels(data.stored, data.pages.covered)),
+        "cut_off": cut_off(data.stored, data.pages.covered, compared, data.points.pixel[mine]),
         "misfilled_share": misfilled_share(
-            evidence.stored, evidence.pages.covered, evidence.bake.status == TexelStatus.DILATED
+            data.stored, data.pages.covered, data.bake.status == TexelStatus.DILATED
         ),
         "shift": [down, right],
         "exponent": power,
     }
-    name = evidence.channel
+    name = data.channel
     remarks = {
         "shifted": f"{name} fits better {down} rows and {right} columns further: the page is shifted",
         "shifted_charts": f"{name} of {'; '.join(charts)}",
@@ -53,23 +54,23 @@ def judge(evidence: Evidence) -> Judged:
         remarks["exponent_error"] = (
             f"{name} follows the {power:.2f}th power of the truth: a curve was applied"
         )
-    return Judged(figures, remarks)
+    return CriterionResult(metrics, remarks)
 
 
-def _shifted_charts(evidence: Evidence) -> list[str]:
-    """Return what is said of each chart that fits better one texel further."""
-    points, size = evidence.points, evidence.bake.atlas.resolution
-    telling = np.flatnonzero((evidence.texels | evidence.steep | evidence.scarce) & ~points.gap)
-    page = evidence.stored.mean(axis=3, dtype="float64")
-    truth, error = (a.mean(axis=1) for a in evidence.compared[1:3])
+def _shifted_charts(data: ChannelData) -> list[str]:
+    """Return a sentence for each chart that fits better one texel further."""
+    points, size = data.points, data.bake.atlas.resolution
+    chosen = np.flatnonzero((data.texels | data.steep | data.scarce) & ~points.gap)
+    page = data.stored.mean(axis=3, dtype="float64")
+    truth, error = (a.mean(axis=1) for a in data.compared[1:3])
     found = []
-    for number in np.unique(points.chart[telling]):
-        mine = telling[points.chart[telling] == number]
-        where = (page, evidence.pages.covered, points.pixel[mine], truth[mine], error[mine])
+    for number in np.unique(points.chart[chosen]):
+        mine = chosen[points.chart[chosen] == number]
+        where = (page, data.pages.covered, points.pixel[mine], truth[mine], error[mine])
         down, right = best_shift(*where, _CHART_BETTER)
         if (down, right) != (0, 0):
             first, rest = divmod(int(points.pixel[mine[0]]), size * size)
-            owner = evidence.bake.scene.instances[int(points.owner[mine[0]])].name
+            owner = data.bake.scene.instances[int(points.owner[mine[0]])].name
             found.append(
                 f"the chart at row {rest // size}, column {rest % size} of page {first}, of '{owner}', fits"
                 f" better {down} rows and {right} columns further"
@@ -77,7 +78,7 @@ def _shifted_charts(evidence: Evidence) -> list[str]:
     return found
 
 
-DISTORTION = Judgement(
+DISTORTION = Criterion(
     "distortion",
     ("shifted", "shifted_charts", "exponent_error", "blurred", "few_levels", "cut_off", "misfilled_share"),
     {
@@ -86,5 +87,5 @@ DISTORTION = Judgement(
         " irradiance.few_levels > 0, irradiance.cut_off > 0.02, irradiance.misfilled_share > 0.05",
         "ao": "ao.shifted > 0, ao.shifted_charts > 0, ao.blurred > 0, ao.few_levels > 0",
     },
-    judge,
+    evaluate,
 )

@@ -1,4 +1,4 @@
-"""Which points of a bake are judged, in which room they are, and what lookups at edges are held against."""
+"""The compared points of a bake, their rooms, and the reference of lookups at edges."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_atlas, quad_scene
 
 from baker.core.geometry import world_geometry
-from baker.metrics.texel_area import instance_map, texel_places
+from baker.metrics.texel_area import instance_map, surface_points
 from baker.pathtracer.scene import build_reference
 from baker.verification.edges import border_texels, edge_points
 from baker.verification.points import chart_numbers
@@ -28,9 +28,9 @@ def surface(quads, size=SIZE):
     )
 
 
-def judged(geometry, owner, step=1):
+def points_of(geometry, owner, step=1):
     pixel = np.flatnonzero(owner.reshape(-1) >= 0)[::step]
-    return pixel, texel_places(geometry, pixel, SIZE, 16, 0)
+    return pixel, surface_points(geometry, pixel, SIZE, 16, 0)
 
 
 def two_rooms():
@@ -43,16 +43,16 @@ def two_rooms():
 def test_closed_rooms_are_told_apart():
     geometry, owner, reference = surface(two_rooms())
     with reference:
-        pixel, places = judged(geometry, owner, 3)
-        found = look_around(reference, places, 0)
-        again = look_around(reference, places, 0)
+        pixel, points = points_of(geometry, owner, 3)
+        found = look_around(reference, points, 0)
+        again = look_around(reference, points, 0)
     first = owner.reshape(-1)[pixel] < 6
     assert set(found.room[first]) | set(found.room[~first]) <= {-1, 0, 1}
     for side in (first & ~found.gap, ~first & ~found.gap):
         room = np.bincount(found.room[side] + 1, minlength=3)
         assert room.max() > 0.95 * side.sum()
     assert np.argmax(np.bincount(found.room[first] + 1)) != np.argmax(np.bincount(found.room[~first] + 1))
-    assert not found.buried.any()
+    assert not found.inside.any()
     np.testing.assert_array_equal(found.room, again.room)
 
 
@@ -61,17 +61,17 @@ def test_a_gap_is_no_room():
     plate = box_quads((0.3, 0.3, 0.002), (0.7, 0.7, 0.1), inward=False)
     geometry, owner, reference = surface([floor, *plate])
     with reference:
-        pixel, places = judged(geometry, owner)
-        found = look_around(reference, places, 0)
-        near = in_contact(reference, places, 0)
+        pixel, points = points_of(geometry, owner)
+        found = look_around(reference, points, 0)
+        near = in_contact(reference, points, 0)
     on_floor = owner.reshape(-1)[pixel] == 0
-    under = (np.abs(places.position[:, :, :2] - 0.5).max(axis=(1, 2)) < 0.2) & on_floor
-    out = (np.abs(places.position[:, :, :2] - 0.5).max(axis=2).min(axis=1) > 0.25) & on_floor
+    under = (np.abs(points.position[:, :, :2] - 0.5).max(axis=(1, 2)) < 0.2) & on_floor
+    out = (np.abs(points.position[:, :, :2] - 0.5).max(axis=2).min(axis=1) > 0.25) & on_floor
     assert under.sum() > 10
     assert found.gap[under].all()
     assert not found.gap[out].any()
     assert near[under].all()
-    assert not near[np.abs(places.position[:, 0, :2] - 0.5).max(axis=1) > 0.45].all()
+    assert not near[np.abs(points.position[:, 0, :2] - 0.5).max(axis=1) > 0.45].all()
 
 
 def test_nobody_looks_around_from_inside_of_solids():
@@ -81,8 +81,8 @@ def test_nobody_looks_around_from_inside_of_solids():
     quads = [quad for low, high in corners for quad in box_quads(low, high, inward=False)]
     geometry, owner, reference = surface([floor, *quads])
     with reference:
-        _, places = judged(geometry, owner)
-        found = look_around(reference, places, 0)
+        _, points = points_of(geometry, owner)
+        found = look_around(reference, points, 0)
     inside = [
         ((found.air > np.add(low, 1e-3)) & (found.air < np.subtract(high, 1e-3))).all(axis=1)
         for low, high in corners
@@ -113,17 +113,17 @@ def test_lookups_beside_a_wall_are_held_against_their_own_side():
         found = edge_points(reference, geometry, owner, covered, 400, 16, 0)
     mine = found.owner == 0
     # Where lookups take place: the floor's uv follows its x and y.
-    column = found.pixel % SIZE + 0.5 + found.places.middle[:, 0]
+    column = found.pixel % SIZE + 0.5 + found.surface.offset[:, 0]
     uv, position = geometry.uv[:4], geometry.position[:4]
     fit = np.polyfit(uv[:, 0] * SIZE, position[:, 0], 1)
     x = np.polyval(fit, column)
     width = fit[0]
     straddles = mine & (np.abs(x - 1.013) < width)
     assert straddles.sum() > 10
-    side = np.sign(found.places.position[..., 0] - 1.013)
+    side = np.sign(found.surface.position[..., 0] - 1.013)
     assert (side[straddles] == np.sign(x - 1.013)[straddles, None]).all()
     # Elsewhere they lie around the point, no further than a lookup reaches.
-    off = np.abs(found.places.position[..., 0] - x[:, None])[mine]
+    off = np.abs(found.surface.position[..., 0] - x[:, None])[mine]
     assert off.max() < 2.1 * width
 
 
@@ -134,12 +134,12 @@ def test_footprints_have_the_mean_of_a_lookup():
         found = edge_points(reference, geometry, owner, owner >= 0, 500, 256, 0)
     inside = np.flatnonzero(~border_texels(owner, owner >= 0).reshape(-1)[found.pixel])
     assert len(inside) > 40
-    at = np.stack([found.pixel % SIZE, found.pixel // SIZE], axis=1) + 0.5 + found.places.middle
+    at = np.stack([found.pixel % SIZE, found.pixel // SIZE], axis=1) + 0.5 + found.surface.offset
     fit = [np.polyfit(geometry.uv[:4, k] * SIZE, geometry.position[:4, k], 1) for k in (0, 1)]
     for k in (0, 1):
-        mean = found.places.position[inside, :, k].mean(axis=1)
+        mean = found.surface.position[inside, :, k].mean(axis=1)
         error = (mean - np.polyval(fit[k], at[inside, k])) / fit[k][0]
-        # Sixteen places of each texel stand for it: 0.07 texels each, and a lookup takes four.
+        # Sixteen points of each texel stand for it: 0.07 texels each, and a lookup takes four.
         assert np.abs(error).mean() < 0.05
         assert abs(error.mean()) < 0.02
 
@@ -178,4 +178,4 @@ def test_a_bake_without_edges_is_no_error(covered):
     geometry, owner, reference = surface([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0))])
     with reference:
         found = edge_points(reference, geometry, owner, (owner >= 0) & covered, 20, 4, 0)
-    assert len(found.pixel) == len(found.places.position)
+    assert len(found.pixel) == len(found.surface.position)

@@ -1,4 +1,4 @@
-"""Regions: the texels of a room, and among them those of like light, each judged against its own light."""
+"""Regions: the texels of a room, and its light levels; deviations are relative to their own light."""
 
 from __future__ import annotations
 
@@ -6,20 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.metrics.sample_texels import LEVELS, light_level
-from baker.verification.judgements.groups import make_groups, worst_figures
-from baker.verification.judgements.judgement import Evidence, Judged, Judgement
-from baker.verification.judgements.levels import level_light
+from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
+from baker.verification.criteria.groups import make_groups, worst_metrics
+from baker.verification.criteria.levels import level_light
 
-# Of `level_light`: what single texels of a sound map are off by, as a bias is looked for here, not noise.
-_KNOWN = 0.03
-_NAMED = 3
+# `equal_weight` of `level_light`: the error of single texels of a correct map, since bias is measured here.
+_EQUAL_WEIGHT = 0.03
+# Largest number of objects listed for a region.
+_LISTED = 3
 
 
-def judge(evidence: Evidence) -> Judged:
-    """Return the figures of the worst region, and of all."""
-    points, compared = evidence.points, evidence.compared
-    mine = evidence.texels & evidence.whole
-    level = light_level(level_light(compared, _KNOWN))
+def evaluate(data: ChannelData) -> CriterionResult:
+    """Compute the largest deviations of regions, and a table of all regions."""
+    points, compared = data.points, data.compared
+    mine = data.texels & data.interior
+    level = light_level(level_light(compared, _EQUAL_WEIGHT))
     members: list[tuple[str, NDArray[np.int64]]] = []
     keys: dict[str, tuple[int, list[float] | None]] = {}
     for room in np.unique(points.room[mine]):
@@ -33,33 +34,33 @@ def judge(evidence: Evidence) -> Judged:
             name = f"{whole}, light {low:.3g} to {high:.3g}"
             members.append((name, np.flatnonzero(inside & (level == number))))
             keys[name] = int(room), [low, high]
-    groups = make_groups(evidence, members)
-    # What cannot be seen from anywhere is told, but not held against limits.
+    groups = make_groups(data, members)
+    # Hidden surface is reported, but not compared with limits.
     in_rooms = [group for group in groups if keys[group.name][0] >= 0]
-    worst, remarks = worst_figures("region", in_rooms, evidence.channel)
-    position = points.position + evidence.geometry.origin
+    worst, remarks = worst_metrics("region", in_rooms, data.channel)
+    position = points.position + data.geometry.origin
     rows = []
     for group in groups:
         room, light = keys[group.name]
         owner, count = np.unique(points.owner[group.member], return_counts=True)
-        named = owner[np.argsort(-count, kind="stable")[:_NAMED]]
+        listed = owner[np.argsort(-count, kind="stable")[:_LISTED]]
         rows.append(
             {
                 "region": group.name,
-                "channel": evidence.channel,
+                "channel": data.channel,
                 "room": room,
                 "level": light,
-                "area": float(points.stands_for[group.member].sum()),
+                "area": float(points.texel_area[group.member].sum()),
                 "position": position[group.member].mean(axis=0).tolist(),
-                "objects": [evidence.bake.scene.instances[int(i)].name for i in named],
+                "objects": [data.bake.scene.instances[int(i)].name for i in listed],
                 **group.found.as_json(),
                 "deviation": group.badness,
             }
         )
-    return Judged(worst, remarks, rows)
+    return CriterionResult(worst, remarks, rows)
 
 
-REGIONS = Judgement(
+REGIONS = Criterion(
     "regions",
     ("region_bias", "region_colour", "region_noise"),
     {
@@ -67,5 +68,5 @@ REGIONS = Judgement(
         " irradiance.region_noise > 0.1",
         "ao": "ao.region_bias > 0.02, ao.region_noise > 0.06",
     },
-    judge,
+    evaluate,
 )

@@ -1,7 +1,7 @@
-"""Runs of the reference on scenes of closed form, and the bar that each has to pass.
+"""Runs of the reference on scenes of closed form, and the tests that each has to pass.
 
-A place is traced many times over: copies of it share no random numbers, so that their spread is what the
-standard errors that the reference tells of itself have to match.
+A point is traced many times: its copies have independent random numbers, so that their spread must match the
+standard errors that the reference reports.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from baker.pathtracer.scene import Reference, build_reference
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002
 COPIES = 256
-# Of some 190 places one in 370 is beyond three standard errors by chance. With seed 0 one was, by 3.2: over
-# 200 other seeds the same place is 0.003 % +- 0.003 % away.
+# Of some 190 points one in 370 is beyond three standard errors by chance. With seed 0 one was, by 3.2: over
+# 200 other seeds the same point is 0.003 % +- 0.003 % off.
 SEED = 1
 
 
-def copies_of(place: Any, normal: Any = UP, copies: int = COPIES) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and normal (n * copies, 1, 3) of n places (n, 3) that face `normal` (3,) or (n, 3)."""
-    place = np.atleast_2d(np.asarray(place, float))
-    normal = np.broadcast_to(np.asarray(normal, float), place.shape)
-    return np.repeat(place, copies, axis=0)[:, None], np.repeat(normal, copies, axis=0)[:, None]
+def copies_of(point: Any, normal: Any = UP, copies: int = COPIES) -> tuple[np.ndarray, np.ndarray]:
+    """Return position and normal (n * copies, 1, 3) of n points (n, 3) with normals (3,) or (n, 3)."""
+    point = np.atleast_2d(np.asarray(point, float))
+    normal = np.broadcast_to(np.asarray(normal, float), point.shape)
+    return np.repeat(point, copies, axis=0)[:, None], np.repeat(normal, copies, axis=0)[:, None]
 
 
 def spread_over(triangle: Any, samples: int, seed: int = 0, copies: int = COPIES) -> tuple[Any, Any]:
-    """Return position and normal (copies, samples, 3): random points, evenly many to a share of the area.
+    """Return position and normal (copies, samples, 3) of random points, stratified by area.
 
     triangle : (t, 3, 3), the surface
     """
@@ -57,12 +57,14 @@ def traced(
     threads: int = 2,
     **how: Any,
 ) -> PointEstimate:
-    """Return path-traced irradiance: `where` is position and normal, or a function of the pass that tells."""
+    """Return path-traced irradiance; `where` is position and normal, or a function of the pass number."""
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
         return _passes(irradiance_pass, reference, where, 3, passes, samples, {"seed": SEED, **how})
 
 
-def opened(scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64) -> PointEstimate:
+def traced_ao(
+    scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64
+) -> PointEstimate:
     """Return the ambient occlusion of the reference, 1 = open."""
     with build_reference(scene, threads=2) as reference:
         return _passes(
@@ -84,23 +86,22 @@ def _passes(
 
 
 def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, rounding: float = 1e-5) -> None:
-    """Check each place, n of them in equally many copies, against its truth (n,).
+    """Check n points, each in the same number of copies, against their truth (n,).
 
-    Away by at most three of the standard errors that the reference itself tells, and by 0.2 %; the errors
-    small enough that three of them are below 0.2 %; and as large as the spread of the copies is.
-    rounding : share of the truth that is no noise: float32, and rays that leave surfaces by 1e-5 of the scene
-    Seeds are fixed. After a change of random numbers a place may be beyond three errors by chance: one that
-    stays there with other seeds is wrong.
+    The error is at most three of the reported standard errors, and at most 0.2 %; three standard errors are
+    below 0.2 %; and they match the spread of the copies. rounding : relative error that is no noise: float32,
+    and rays that leave surfaces by 1e-5 of the scene Seeds are fixed. After a change of random numbers a
+    point may be beyond three standard errors by chance; it is wrong if it stays there with other seeds.
     """
     truth = np.atleast_1d(np.asarray(truth, float))
     mean = found.mean[:, channel].reshape(len(truth), -1)
     error = found.standard_error[:, channel].reshape(len(truth), -1)
     copies = mean.shape[1]
-    told = np.sqrt((error**2).sum(axis=1)) / copies
+    reported = np.sqrt((error**2).sum(axis=1)) / copies
     value = mean.mean(axis=1)
-    away, noise = value / truth - 1, told / truth
+    away, noise = value / truth - 1, reported / truth
     report = "\n".join(
-        f"place {k}: found {v:.6g}, truth {t:.6g}: {100 * a:+.4f} %, standard error {100 * s:.4f} %"
+        f"point {k}: found {v:.6g}, truth {t:.6g}: {100 * a:+.4f} %, standard error {100 * s:.4f} %"
         for k, (v, t, a, s) in enumerate(zip(value, truth, away, noise, strict=True))
     )
     print(report)  # noqa: T201, shown by pytest -rP
@@ -111,16 +112,16 @@ def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, ro
 
 
 def _assert_believable(mean: Any, error: Any, report: str) -> None:
-    """Check that copies spread as their standard errors tell, by an F-test over all places."""
-    real, told = mean.var(axis=1, ddof=1), (error**2).mean(axis=1)
-    noisy = told > 0
+    """Check that the spread of the copies matches their standard errors, by an F-test over all points."""
+    real, reported = mean.var(axis=1, ddof=1), (error**2).mean(axis=1)
+    noisy = reported > 0
     if not noisy.any():
         return
     n = mean.shape[1]
-    ratio = float((real[noisy] / told[noisy]).mean())
+    ratio = float((real[noisy] / reported[noisy]).mean())
     degrees = noisy.sum() * (n - 1)
-    # Told errors come from a few passes of each copy: about as many degrees again.
+    # The reported errors come from a few passes of each copy: they have about as many degrees of freedom.
     low, high = stats.f.ppf([5e-5, 1 - 5e-5], degrees, degrees)
     assert low < ratio < high, (
-        f"copies vary {ratio:.3f} times as told (from {low:.3f} to {high:.3f})\n{report}"
+        f"copies vary {ratio:.3f} times as reported (from {low:.3f} to {high:.3f})\n{report}"
     )

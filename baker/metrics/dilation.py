@@ -1,0 +1,44 @@
+"""A check of dilation: texels beyond the borders of charts should hold light like that at the borders."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+
+# A dilated texel is wrong if it is outside the range of its covered neighbours by more than this factor ...
+_FACTOR = 4.0
+# ... and by more than this share of the map's mean.
+_SLACK = 0.02
+
+
+def misfilled_share(
+    maps: NDArray[np.float32], covered: NDArray[np.bool_], dilated: NDArray[np.bool_]
+) -> float:
+    """Return the share of dilated texels next to covered ones that are far outside the range of these.
+
+    Parameters
+    ----------
+    maps : (P, H, W, C) float32
+        Pages of a channel.
+    covered : (P, H, W) bool
+        Texels with a measured value.
+    dilated : (P, H, W) bool
+        Texels filled by dilation.
+
+    Returns
+    -------
+    float, 0 to 1
+        0 if no dilated texel has a covered neighbour.
+    """
+    wrong = total = 0
+    for page, on, beyond in zip(maps.mean(axis=3, dtype=np.float64), covered, dilated, strict=True):
+        if not on.any():
+            continue
+        slack = _SLACK * float(page[on].mean())
+        high = maximum_filter(np.where(on, page, -np.inf), 3)
+        low = minimum_filter(np.where(on, page, np.inf), 3)
+        near = beyond & np.isfinite(high)
+        far = (page > _FACTOR * high + slack) | (page < low / _FACTOR - slack)
+        wrong, total = wrong + int((far & near).sum()), total + int(near.sum())
+    return wrong / max(total, 1)

@@ -1,0 +1,1 @@
+"""Criteria of a verification: one kind of fault a file, all with the interface of `criterion`."""

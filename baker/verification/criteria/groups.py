@@ -1,0 +1,85 @@
+"""Shared by criteria of groups: the comparison of groups, and the largest significant deviations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.metrics.groups import MIN_POINTS, GroupMetrics, bright_light, compare_group
+from baker.verification.criteria.criterion import ChannelData
+
+# Smallest light that differences are relative to, by channel: one percent of the AO in a corner is invisible.
+MIN_LIGHT = {"irradiance": 0.0, "ao": 0.2}
+# Fewest points of a group whose own error is significant.
+MIN_NOISE_POINTS = 40
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of points with its metrics.
+
+    Attributes
+    ----------
+    name : str
+        Name in a sentence.
+    member : (m,) int64
+        Indices of its points.
+    found : GroupMetrics
+        Its deviations.
+    """
+
+    name: str
+    member: NDArray[np.int64]
+    found: GroupMetrics
+
+    @property
+    def badness(self) -> float:
+        """Return the largest significant deviation, by which groups are sorted."""
+        return max(abs(self.found.sure_bias), abs(self.found.sure_colour), self.noise)
+
+    @property
+    def noise(self) -> float:
+        """Return the significant part of the own error, 0 for a group that is too small."""
+        return self.found.sure_noise if self.found.texels >= MIN_NOISE_POINTS else 0.0
+
+
+def make_groups(data: ChannelData, members: list[tuple[str, NDArray[np.int64]]]) -> list[Group]:
+    """Compare the groups of at least `MIN_POINTS` points, given by name and indices (m,); worst first."""
+    mine = data.texels
+    bright = bright_light(data.compared.reference[mine])
+    groups = [
+        Group(name, member, compare_group(data.compared.of(member), bright, MIN_LIGHT[data.channel]))
+        for name, member in members
+        if len(member) >= MIN_POINTS
+    ]
+    return sorted(groups, key=lambda group: -group.badness)
+
+
+def worst_metrics(prefix: str, groups: list[Group], channel: str) -> tuple[dict[str, float], dict[str, str]]:
+    """Return the largest significant PREFIX_bias, PREFIX_colour and PREFIX_noise, and remarks on them."""
+    metrics = {f"{prefix}_{kind}": 0.0 for kind in ("bias", "colour", "noise")}
+    remarks = {}
+    for group in groups:
+        found, where = group.found, f"{channel} of {group.name}"
+        if abs(found.sure_bias) > abs(metrics[f"{prefix}_bias"]):
+            metrics[f"{prefix}_bias"] = found.sure_bias
+            remarks[f"{prefix}_bias"] = (
+                f"{where} is off by {found.bias:+.1%} +- {found.bias_se:.1%} on the whole"
+                f" ({found.texels} texels)"
+            )
+        if abs(found.sure_colour) > abs(metrics[f"{prefix}_colour"]):
+            metrics[f"{prefix}_colour"] = found.sure_colour
+            shares = ", ".join(
+                f"{name} {shift:+.1%}"
+                for name, shift in zip(("red", "green", "blue"), found.colour, strict=True)
+            )
+            remarks[f"{prefix}_colour"] = f"the colour of {where} is off: {shares}"
+        if group.noise > metrics[f"{prefix}_noise"]:
+            metrics[f"{prefix}_noise"] = group.noise
+            remarks[f"{prefix}_noise"] = (
+                f"{where} is typically off by {found.typical:.1%}, of which {found.typical_noise:.1%} is"
+                " noise of the reference"
+            )
+    return metrics, remarks

@@ -1,1 +1,0 @@
-"""One kind of fault a file, all with the interface of `judgement`."""
