@@ -69,7 +69,7 @@ class Surface(NamedTuple):
     sobol_points : (16, 2) uint32
         Bit-reversed, of the points of a texel.
     min_offset_scale : float32
-        Metres. Offsets are computed as if no largest coordinate were smaller.
+        Metres, lower bound of the largest coordinate in `offset_step`.
     """
 
     position: NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""Packs what kernels look up at a hit into one cache line a triangle."""
+"""Builds the triangle table of a bake: one cache line a triangle."""
 
 from __future__ import annotations
 
@@ -23,14 +23,29 @@ from baker.kernels.triangle_lookup import (
 
 
 def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emitters) -> TriangleLookup:
-    """Return the table for `kernels.triangle_lookup`."""
+    """Build the triangle table of a bake.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Triangles.
+    texels : TexelBuffer
+        Their texels.
+    emitters : Emitters
+        Made from the same triangles.
+
+    Returns
+    -------
+    TriangleLookup
+        One row a triangle.
+    """
     row = np.zeros((len(geometry.triangle), ROW_LENGTH), np.float32)
     uv = geometry.uv[geometry.triangle]
     row[:, UV : UV + 2] = uv[:, 0]
     row[:, UV_EDGE_1 : UV_EDGE_1 + 2] = uv[:, 1] - uv[:, 0]
     row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, PAGE] = geometry.page
-    # Slivers that own no texel may be all that has two sides: then there is no back to look up.
+    # If only slivers without texels are double-sided there are no back entries: treat them as one-sided.
     row[:, DOUBLE_SIDED] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, FACE_NORMAL : FACE_NORMAL + 3] = geometry.face_normal
     row[:, FACE_AREA] = geometry.area

@@ -56,7 +56,7 @@ def build_alpha(
         The triangles that let light through.
     """
     mode = np.array([m.alpha_mode for m in scene.materials])
-    # Alpha above which a material blocks: the cutoff of MASK, 1 for BLEND.
+    # Alpha from which a material blocks: the cutoff of MASK, 1 for BLEND.
     blocks = np.array(
         [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
     )

@@ -29,8 +29,8 @@ from baker.topology.winding_number import MANY, Enclosure
 NOWHERE, BEHIND, BEFORE = 0, 1, 2
 # Triangle centres that are tested: a part is inside another one if most of them are and none is outside.
 _WITNESSES = 8
-# A point is inside above these winding numbers (of a closed part, of one without a lid), outside below the
-# last.
+# Winding numbers: a point is inside a closed part above _INSIDE, inside one without a lid above _WITHOUT_LID,
+# and outside below _OUTSIDE.
 _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
 # A part that holds more than this share of the other parts' area is a room.
 _MOST_OF_SCENE = 0.5
