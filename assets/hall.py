@@ -12,7 +12,7 @@ from shapes import Surface, ball, box, join, lathe, rooms, rounded_box, torus
 
 REST = 0.002
 LENGTH, WIDTH, HEIGHT = 24.0, 12.0, 6.0
-# Columns stand this far apart along the hall, in two rows at +-AISLE.
+# Distance of columns along the hall, in two rows at +-AISLE.
 SPACING, AISLE = 3.0, 3.2
 
 

@@ -9,7 +9,7 @@ from glb import GlbBuilder
 from numpy.typing import NDArray
 from shapes import Surface, ball, box, join, lathe, rooms, rounded_box, torus
 
-# Gap under whatever stands or hangs, metres: surfaces that coincide are neither lit nor dark.
+# Gap between objects that touch, metres: the light of coincident surfaces is undefined.
 REST = 0.002
 HEIGHT = 2.6
 
@@ -118,7 +118,7 @@ def _study(glb: GlbBuilder) -> None:
         (0.0, 0.008),
     ]
     handle = torus(0.026, 0.006, 24, 10)
-    # A torus lies flat; the handle stands: y and z change places, which turns its faces over.
+    # A torus lies flat and the handle is upright: swapping y and z reverses the winding.
     upright = Surface(handle.position[:, [0, 2, 1]], handle.normal[:, [0, 2, 1]], handle.triangle[:, ::-1])
     cup = join(lathe(mug, 32), upright.moved((0.069, 0.05, 0.0)))
     glb.place("mug", glb.mesh("mug", [(cup, "enamel")]), (6.5, 0.757, 0.55), turn=35.0)

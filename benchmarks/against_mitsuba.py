@@ -1,4 +1,4 @@
-"""Puts the reference path tracer beside Mitsuba 3: path segments and occlusion rays a second, in turn.
+"""Compares the reference path tracer with Mitsuba 3: path segments and occlusion rays a second, alternating.
 
     pip install -e '.[mitsuba]'        llvm_ad_rgb needs LLVM 17 or newer, Debian: libllvm19
     python benchmarks/against_mitsuba.py --into docs/PERFORMANCE.md
@@ -40,7 +40,7 @@ OPEN_SAMPLES = 64
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Measure in turn and print a table."""
+    """Measure both alternately and print a table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -30,7 +30,7 @@ def describe() -> dict[str, str | float | int]:
 
 
 def load() -> float:
-    """Return how many processes want a core, averaged over the last minute; 0 where it is unknown."""
+    """Return the load average of the last minute; 0 where it is unknown."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else 0.0
 
 
@@ -43,7 +43,7 @@ def _processor() -> str:
             facts.setdefault(key.strip(), value.strip())
     name = facts.get("model name") or platform.processor() or "unknown"
     if "model" in facts and "cpu family" in facts:
-        # Virtual machines often tell no more than the maker's name; family and model say the generation.
+        # Virtual machines often report only the maker's name; family and model identify the generation.
         name += f" (family {facts['cpu family']}, model {facts['model']})"
     if "avx512f" in facts.get("flags", ""):
         name += ", AVX-512"

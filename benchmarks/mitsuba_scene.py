@@ -66,7 +66,7 @@ def mitsuba_scene(scene: Scene, reference: Reference, **more: Any) -> Any:
             }
         else:
             raise ValueError("Mitsuba's spots fall off in another way than glTF's")
-    # Else equal parts of a dictionary become one, and a meter can stand in one place only.
+    # Otherwise Mitsuba merges equal parts of a dictionary, but a meter can have only one parent.
     return mi.load_dict(parts, optimize=False)
 
 

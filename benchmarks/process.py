@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-# Seconds between two looks at the memory of all processes of a bake.
+# Seconds between two measurements of the memory of all processes of a bake.
 _LOOK = 0.05
 
 

@@ -1,4 +1,4 @@
-"""Rates of the bake's ray stages beside those of the loops of `bare`, measured in turn in one process."""
+"""Ray rates of the bake's stages and of the loops of `bare`, measured alternately in one process."""
 
 from __future__ import annotations
 

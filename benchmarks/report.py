@@ -18,7 +18,7 @@ Row = Sequence[str | float | int]
 
 
 def table(head: Sequence[str], rows: Sequence[Row], *, markdown: bool) -> str:
-    """Return a table; numbers stand to the right."""
+    """Return a table; numbers are aligned right."""
     cells = [[_text(cell) for cell in row] for row in rows]
     right = [all(isinstance(row[k], int | float) for row in rows) for k in range(len(head))] if rows else []
     if markdown:
@@ -50,7 +50,7 @@ def report(result: dict[str, Any], *, markdown: bool) -> str:
 
 
 def put_into(path: Path, script: str, tables: str) -> None:
-    """Replace what stands between the two marks of a script in a document."""
+    """Replace the text between the two marks of a script in a document."""
     begin, end = f"<!-- tables by benchmarks/{script} -->", "<!-- end of tables -->"
     before, found, rest = path.read_text(encoding="utf-8").partition(begin)
     _, closed, after = rest.partition(end)

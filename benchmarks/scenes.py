@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-# Blobs stand in a square of this many on a side; each is a cube's six faces blown up to a ball.
+# Blobs form a square grid of this many on a side; each is a cube whose six faces are projected onto a ball.
 ROWS = 3
 HALF, HEIGHT = 5.0, 5.0
 # Lightmap cells on a side: 54 blob faces, 6 walls, 1 ceiling light.

@@ -1,8 +1,8 @@
-"""Draws the pictures of CHECKS.md from the scenes that the tests check: the bad one left, its twin right.
+"""Draws the pictures of CHECKS.md from scenes of the tests: the faulty one left, the correct one right.
 
 python docs/make_check_pictures.py
 
-Lightmap uv is drawn as the page sees it, geometry from a corner above; fronts are grey, backs red.
+Lightmap uv is drawn in page coordinates, geometry from a corner above; fronts are grey, backs red.
 """
 
 from __future__ import annotations

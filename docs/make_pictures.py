@@ -1,4 +1,4 @@
-"""Makes the pictures of the docs: bakes the project's scenes and looks at them through their cameras.
+"""Makes the pictures of the docs: bakes the project's scenes and renders them through their cameras.
 
     python docs/make_pictures.py            needs baker and nothing else
 

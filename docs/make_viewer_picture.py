@@ -1,4 +1,4 @@
-"""Makes the picture of the viewer: bakes the interior scene and looks at its page in headless Chromium.
+"""Makes the picture of the viewer: bakes the interior scene and captures its page in headless Chromium.
 
 python docs/make_viewer_picture.py      needs `pip install '.[engines]'` and Chromium
 """

@@ -33,13 +33,13 @@ def point_irradiance(light: Any, point: Any, normal: Any) -> np.ndarray:
     return np.maximum(arm @ np.asarray(normal, float), 0.0) / square**1.5
 
 
-def wall_open_share(distance: Any, height: float) -> np.ndarray:
+def wall_ao(distance: Any, height: float) -> np.ndarray:
     """Return the open share of a floor at `distance` from an endless wall of that height."""
     distance = np.asarray(distance, float)
     return 0.5 * (1 + distance / np.hypot(distance, height))
 
 
-def limited_wall_open_share(distance: Any, reach: float) -> np.ndarray:
+def limited_wall_ao(distance: Any, reach: float) -> np.ndarray:
     """Return the open share of a floor at `distance` from an endless, tall wall for rays of length `reach`.
 
     Cosine-weighted directions project to a disc evenly; those that meet the wall in time are the
@@ -81,7 +81,7 @@ def perpendicular_squares() -> float:
     return (1 - parallel_squares()) / 4
 
 
-def walled_open_share(distance: Any, height: float, reach: float) -> np.ndarray:
+def walled_ao(distance: Any, height: float, reach: float) -> np.ndarray:
     """Return the open share of a floor at `distance` from an endless wall of that height, within `reach`.
 
     Cosine-weighted directions project to a disc evenly. A ray (x, y, z) meets the wall's plane after
@@ -98,7 +98,7 @@ def walled_open_share(distance: Any, height: float, reach: float) -> np.ndarray:
     return 1 - (segment(c) - a * segment(np.minimum(c / a, 1.0))) / np.pi
 
 
-def cornered_open_share(x: Any, y: Any, reach: float) -> np.ndarray:
+def cornered_ao(x: Any, y: Any, reach: float) -> np.ndarray:
     """Return the open share of a floor at x and y from two endless, tall walls that meet at right angles.
 
     Blocked is what lies beyond either of two chords of the disc: two segments, less what they share.

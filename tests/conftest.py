@@ -64,7 +64,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Any:
         return (yield)
     alone = item.get_closest_marker("timed") is not None
     with contextlib.ExitStack() as room:
-        # Who waits for the room to be empty stands in the door: nobody slips in meanwhile.
+        # A process that waits for exclusive use blocks new ones from starting.
         with held(folder / "door", shared=not alone):
             room.enter_context(held(folder / "room", shared=not alone))
         return (yield)

@@ -82,7 +82,7 @@ class GltfBuilder:
         return self.add("textures", {"source": source, **texture})
 
     def document(self, *, embed: bool = False) -> dict[str, Any]:
-        """Return the JSON; without scenes, one is made of all nodes that are nobody's child."""
+        """Return the JSON; without scenes, one is made of all nodes without a parent."""
         out = dict(self.json)
         if "scenes" not in out:
             children = {c for n in out.get("nodes", []) for c in n.get("children", [])}

@@ -1,4 +1,4 @@
-"""Scenes in which everything that the path tracer knows is at work, small enough for many passes."""
+"""Scenes that use all features of the path tracer, small enough for many passes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def smooth_ball(scene: Scene, centre, radius, material, level=1) -> Scene:
 
 
 def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
-    """Return a room with textured, glossy and mirroring walls, a two-sided lamp and two balls."""
+    """Return a room with textured, glossy and mirroring walls, a two-sided emitter and two balls."""
     walls = box_quads((0, 0, 0), (2, 2, 2), inward=True)
     tiles = texture([[[230, 60, 60], [90, 160, 90]], [[90, 90, 200], [220, 220, 220]]])
     # Green scales the roughness, blue the metal.
@@ -60,11 +60,14 @@ def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
     ]
     quads = [replace(quad, material=kind) for quad, kind in zip(walls, kinds, strict=True)]
     quads[5] = replace(quads[5], colour=[[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]])
-    glow = texture([[[255, 255, 255], [120, 60, 20]]])
-    lamp = Material(
-        base_colour=(0.3, 0.3, 0.3, 1.0), emission=(6.0, 6.0, 6.0), emission_texture=glow, double_sided=True
+    emission = texture([[[255, 255, 255], [120, 60, 20]]])
+    emitter = Material(
+        base_colour=(0.3, 0.3, 0.3, 1.0),
+        emission=(6.0, 6.0, 6.0),
+        emission_texture=emission,
+        double_sided=True,
     )
-    quads.append(Quad((0.8, 0.7, 1.5), (0.5, 0, 0), (0, 0.5, 0.1), lamp))
+    quads.append(Quad((0.8, 0.7, 1.5), (0.5, 0, 0), (0, 0.5, 0.1), emitter))
     fin = glossy((0.7, 0.7, 0.2), 0.3, 0.4, double_sided=True)
     quads.append(Quad((0.5, 1.2, 0.0), (0.3, 0.3, 0), (0, 0, 0.7), fin))
     scene = replace(quad_scene(quads), lights=lights)
@@ -83,7 +86,7 @@ def open_yard() -> Scene:
     spot = PunctualLight("spot", "spot", 1, (3.0, 4.0, 5.0), (0.8, -0.5, 2.0), (0.0, 0.6, -0.8), 0.2, 0.5)
     bulb = PunctualLight("point", "bulb", 2, (0.5, 0.4, 0.3), (-0.8, 0.6, 1.0), range=1.6)
     scene = replace(quad_scene(quads), lights=(sun, spot, bulb))
-    # No smoother: from the eye, what a narrow lobe throws of a lamp without area is met by rare luck only.
+    # No smoother: paths from the eye rarely find light of a point that a narrow lobe reflects.
     return smooth_ball(scene, (0.6, 0.2, 0.5), 0.45, glossy((0.9, 0.9, 0.9), 1.0, 0.5))
 
 

@@ -1,4 +1,4 @@
-"""Slow, obvious twins of kernels, and the statistics that judge samplers."""
+"""Slow, obvious twins of kernels, and the statistics that test samplers."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def chi_square_chance(observed, expected):
 
 
 def sidak(n, significance=1e-3):
-    """Return the level of one of n tests that lets all of them together fail with chance `significance`."""
+    """Return the level of each of n tests for which any of them fails with probability `significance`."""
     return 1.0 - (1.0 - significance) ** (1.0 / n)
 
 
 def assert_uniform(tables):
-    """Every table of counts is uniform, as far as a chi-square test of them all can tell."""
+    """Check that every table of counts is uniform, by chi-square tests with a Sidak bound."""
     tables = [np.asarray(t) for t in tables]
     chance = [chi_square_chance(t, np.full(t.size, t.sum() / t.size)) for t in tables]
     assert min(chance) > sidak(len(tables)), f"{min(chance):.2e} at table {int(np.argmin(chance))}"

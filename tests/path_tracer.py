@@ -18,7 +18,7 @@ LIFT = 1e-4
 
 
 class PathTracer:
-    """Knows a scene's triangles, colours and lamps in world space."""
+    """Holds a scene's triangles, colours and emitters in world space."""
 
     def __init__(self, scene: Scene) -> None:
         corner, material = [], []
@@ -36,8 +36,8 @@ class PathTracer:
         self.albedo = np.array([m.base_colour[:3] for m in scene.materials])
         self.emission = np.array([m.emission for m in scene.materials])
         self.double_sided = np.array([m.double_sided for m in scene.materials])
-        self.lamp = np.flatnonzero(self.emission[self.material].max(axis=1) > 0)
-        power = self.area[self.lamp] * self.emission[self.material[self.lamp]].sum(axis=1)
+        self.emitter = np.flatnonzero(self.emission[self.material].max(axis=1) > 0)
+        power = self.area[self.emitter] * self.emission[self.material[self.emitter]].sum(axis=1)
         self.chance = power / power.sum()
         self.embree = EmbreeScene()
         self.mesh = TriangleMesh(self.embree, self.corner.astype(np.float32))
@@ -48,7 +48,7 @@ class PathTracer:
         result = np.zeros((len(point), 3))
         path, weight = np.arange(len(point)), np.ones((len(point), 3))
         for step in range(depth):
-            result[path] += weight * self._lamps(point, normal, rng)
+            result[path] += weight * self._emitters(point, normal, rng)
             direction = _cosine(normal, rng)
             hit, where = self._closest(point + LIFT * normal, direction)
             front = (self.normal[hit] * direction).sum(axis=1) < 0
@@ -66,17 +66,17 @@ class PathTracer:
                 break
         return result
 
-    def buried(self, point: Any, normal: Any) -> np.ndarray:
+    def inside_geometry(self, point: Any, normal: Any) -> np.ndarray:
         """Tell which points (n, 3) lie under the back of a one-sided surface."""
         normal = np.asarray(normal, float)
         hit, _ = self._closest(np.asarray(point, float) + LIFT * normal, normal)
         back = (self.normal[hit] * normal).sum(axis=1) > 0
         return (hit >= 0) & back & ~self.double_sided[self.material[hit]]
 
-    def _lamps(self, point: np.ndarray, normal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the irradiance from one point of one lamp triangle for each surface point."""
-        pick = rng.choice(len(self.lamp), len(point), p=self.chance)
-        triangle = self.lamp[pick]
+    def _emitters(self, point: np.ndarray, normal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return the irradiance from one point of one emitter triangle for each surface point."""
+        pick = rng.choice(len(self.emitter), len(point), p=self.chance)
+        triangle = self.emitter[pick]
         root, share = np.sqrt(rng.random((len(point), 1))), rng.random((len(point), 1))
         a, b, c = (self.corner[triangle, k] for k in range(3))
         target = (1 - root) * a + root * (1 - share) * b + root * share * c

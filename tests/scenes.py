@@ -90,7 +90,7 @@ class SceneBuilder:
     ) -> int:
         """Add a material; `texture` is a linear (H, W, 3) emission image read with texcoord 0."""
         rgba = (*np.broadcast_to(albedo, 3).tolist(), 1.0)
-        glow = tuple(np.broadcast_to(emission, 3).tolist())
+        radiance = tuple(np.broadcast_to(emission, 3).tolist())
         image = None
         if texture is not None:
             ones = np.ones((*texture.shape[:2], 1))
@@ -98,7 +98,7 @@ class SceneBuilder:
                 np.concatenate([texture, ones], axis=2).astype(np.float32), wrap=("clamp", "clamp")
             )
         self.materials.append(
-            Material("", rgba, emission=glow, emission_texture=image, double_sided=double_sided)
+            Material("", rgba, emission=radiance, emission_texture=image, double_sided=double_sided)
         )
         return len(self.materials) - 1
 
@@ -244,7 +244,7 @@ def moved(scene: Scene, matrices: list[np.ndarray]) -> Scene:
 
 
 def prepared(builder: SceneBuilder, **settings: Any) -> tuple[PreparedScene, Record]:
-    """Return what a bake knows before the first ray of light: texels, ray tree, tables."""
+    """Return the state of a bake before the first light ray: texels, ray tree, tables."""
     given = {"resolution": builder.size, "uv": "keep", "padding": GAP, "threads": 2, **settings}
     scene, chosen = builder.build(), make_settings(given)
     record = Record(silent)

@@ -119,7 +119,7 @@ def test_pillow_has_one_reader_and_one_writer():
 
 def test_numba_lives_low():
     homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
-    # The path tracer's paths are kernels of its own: it shares none with the bake that it judges.
+    # The path tracer's paths are kernels of its own: it shares none with the bake that is compared with it.
     assert homes <= {"kernels", "lights", "trace", "pathtracer"}
 
 

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 GLOSSARY = ROOT / "docs" / "CONVENTIONS.md"
 SUFFIXES = {".py", ".md", ".js", ".html", ".toml"}
 # Quoted names of objects in scenes are data of these files, such as "lamp", "lamp 3" or f"lamp {k}".
-OBJECT_NAME = re.compile(r"""(["'])(?:(?:floor_)?lamp(?: (?:\d+|\{\w+\}))?|\{name\} glow)\1""")
+OBJECT_NAME = re.compile(r"""(["'])(?:(?:floor_)?lamp(?: (?:\d+|\{\w+\}))?|(?:\{name\} )?glow)\1""")
 WITH_OBJECTS = ("assets", "benchmarks", "tests")
 PENDING = {path.name for path in (ROOT / "tests" / "pending_words").glob("*")}
 # Names of glTF extensions are given by others.
@@ -44,7 +44,7 @@ def retired_names():
 def pattern_of(word):
     """Return a pattern for a word, alone or as part of a name; `*` is any letters."""
     body = re.escape(word).replace(r"\*", "[A-Za-z]*").replace(r"\ ", r"\s+")
-    before = "" if word.startswith("*") else "(?<![a-z])"
+    before = "" if word.startswith("*") else "(?<![A-Za-z])"
     capital = re.escape(word[0].upper() + word[1:]).replace(r"\*", "[A-Za-z]*").replace(r"\ ", r"\s+")
     return re.compile(rf"{before}{body}(?![a-z])|{capital}(?![a-z])|\b{re.escape(word.upper().strip('*'))}\b")
 
@@ -130,7 +130,7 @@ def test_the_search_sees_words_in_names():
     assert {"way", "Subject", "plain"} <= set(retired_names())
     for text in ("lamp", "n_lamps", "LampTable", "LAMP", "cast_to_lamps", "Lamps"):
         assert pattern_of("lamp*").search(text), text
-    for text in ("clamp", "stamp"):
+    for text in ("clamp", "stamp", "Clamp"):
         assert not pattern_of("lamp*").search(text), text
     assert pattern_of("*bakery").search("ClusterBakery") or pattern_of("*bakery").search("clusterbakery")
     assert not pattern_of("matt").search("matter")

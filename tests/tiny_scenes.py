@@ -49,7 +49,7 @@ class World:
 
     @property
     def free(self):
-        """Masks that say that no point is buried."""
+        """Masks for scenes in which no point is inside geometry."""
         return np.full(self.texels.n, 0xFFFF, np.uint16)
 
     def job(self, valid=None, threads=1, seed=0):

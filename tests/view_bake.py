@@ -1,4 +1,4 @@
-"""A bake without rays whose every texel, pixel and click can be told beforehand.
+"""A bake without rays in which every texel, pixel and click has a known value.
 
 A camera at z = 5 looks at the plane z = 0, four metres high in the picture. Left, a painted square on page 0;
 right, a plain one on page 1, its uv transposed; before that, a leaf whose left half is a hole.
@@ -117,8 +117,8 @@ def _maps(half: bool) -> dict[str, Lightmap]:
     light = np.stack([10.03125 + row, 10.5 + column, 12 + 6 * page], axis=-1).astype(np.float32)
     if not half:
         light *= np.float32(1.1)  # no half any more
-    openness = ((column + 0.5) / SIZE)[..., None].astype(np.float32)
-    return {"irradiance": Lightmap("irradiance", "lx", light), "ao": Lightmap("ao", "1", openness)}
+    occlusion = ((column + 0.5) / SIZE)[..., None].astype(np.float32)
+    return {"irradiance": Lightmap("irradiance", "lx", light), "ao": Lightmap("ao", "1", occlusion)}
 
 
 def _status(layouts) -> np.ndarray:

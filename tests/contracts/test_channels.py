@@ -88,7 +88,7 @@ def test_irradiance_is_the_sum_of_all_light(transport):
     np.testing.assert_allclose(error, np.sqrt(direct.variance[:N_FRONT] + gathered.variance), rtol=1e-5)
 
 
-def test_ao_is_the_open_share_with_a_binomial_error(transport):
+def test_ao_is_the_unoccluded_share_with_a_binomial_error(transport):
     (layer,) = CHANNELS.get("ao").layers(transport)
     np.testing.assert_array_equal(layer.value[:, 0], transport.open)
     binomial = np.sqrt(transport.open * (1 - transport.open) / 64)

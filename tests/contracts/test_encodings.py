@@ -1,4 +1,4 @@
-"""What every encoding promises: its files hold what it says, within the tolerance it states."""
+"""The contract of every encoding: decoding its files gives the values, within the stated tolerance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ CASES = [
 
 
 def names_of(number):
-    """Return names for so many components."""
+    """Return names of `n` components."""
     return {1: ("Y",), 3: ("R", "G", "B")}.get(number, tuple(f"layer.{k:02}" for k in range(number)))
 
 

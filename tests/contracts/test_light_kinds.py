@@ -252,8 +252,8 @@ def test_an_unknown_kind_is_an_error_also_of_a_light_that_is_off(name):
     REFUSERS[name](lit_by(shining("point"), shining("spot", 0.0)))
 
 
-@pytest.mark.parametrize("judge", ["verify", "check", "render"])
-def test_a_file_with_an_unknown_kind_is_refused(judge, tmp_path):
+@pytest.mark.parametrize("command", ["verify", "check", "render"])
+def test_a_file_with_an_unknown_kind_is_refused(command, tmp_path):
     out = tmp_path / "out"
     bake(lit_by(shining("point")), settings=SETTINGS, out=out)
     path = out / "scene.glb"
@@ -266,7 +266,7 @@ def test_a_file_with_an_unknown_kind_is_refused(judge, tmp_path):
         "render": lambda: render(path, RenderSettings(camera="0,1,2,0,0,0,50", width=8, height=8, spp=2)),
     }
     with pytest.raises(InputError, match="'laser' is none of directional, point, spot"):
-        work[judge]()
+        work[command]()
 
 
 @pytest.mark.parametrize("change", [{"emission": None}, {"delta": False}], ids=["shape", "area"])

@@ -208,7 +208,7 @@ def test_rays_end_just_before_the_light(kind):
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
 def test_a_candela_a_metre_and_a_lux(kind):
-    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, whatever the kind."""
+    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, for every kind."""
     light = PunctualLight(kind, "", 0, (1, 1, 1), (0, 1, 0), (0, -1, 0), 0.2, 0.5)
     up = np.zeros((1, 16, 3), np.float32)
     up[..., 1] = 1

@@ -1,4 +1,4 @@
-"""The project's own scenes: made anew byte for byte, closed, right way out, and of the promised size."""
+"""The project's own scenes: made again byte for byte, closed, right way out, and of the promised size."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def directed_edges(corner):
     return triangle[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
 
-def test_scenes_are_made_anew_byte_for_byte(tmp_path):
+def test_scenes_are_made_again_byte_for_byte(tmp_path):
     subprocess.run(
         [sys.executable, str(ASSETS / "make_scenes.py"), str(tmp_path)], check=True, capture_output=True
     )

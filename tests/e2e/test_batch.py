@@ -52,7 +52,7 @@ def states(found):
 
 
 def content(folder):
-    """Hash every file of all bakes, without what tells of the hour."""
+    """Hash every file of all bakes, without times."""
     found = {}
     for path in sorted(folder.rglob("*")):
         if path.is_file():

@@ -47,7 +47,7 @@ def _alive(process: int) -> bool:
     except ProcessLookupError:
         return False
     state = Path(f"/proc/{process}/stat")
-    # A zombie has ended; whoever adopted it has only not looked yet.
+    # A zombie has ended; its parent has not read the exit code yet.
     return not state.exists() or state.read_text().rpartition(")")[2].split()[0] != "Z"
 
 

@@ -181,13 +181,13 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("words", "needle"), WRONG)
-def test_wrong_use_is_exit_2_with_one_sentence(words, needle, pipeline, command, capsys):
+@pytest.mark.parametrize(("words", "expected"), WRONG)
+def test_wrong_use_is_exit_2_with_one_sentence(words, expected, pipeline, command, capsys):
     assert command("bake", *words) == (2, "")
     plain = capsys.readouterr().err
     assert plain.startswith("baker: ")
     assert plain.count("\n") == 1
-    assert needle in plain
+    assert expected in plain
     code, out = command("bake", *words, "--json")
     assert code == 2
     assert set(json.loads(out)["error"]) == {"kind", "message", "file", "object"}

@@ -22,13 +22,13 @@ from baker.metrics.texel_area import instance_map
 from baker.pipeline.bake import bake
 
 ROOM = box_quads((0, 0, 0), (2, 3, 2), inward=True, material=grey(0.6))
-LAMP = Quad((0.5, 1.9, 1.95), (0.8, 0, 0), (0, -0.6, 0), grey(0, 8.0))
+EMITTER = Quad((0.5, 1.9, 1.95), (0.8, 0, 0), (0, -0.6, 0), grey(0, 8.0))
 BULB = PunctualLight("point", "bulb", 0, (0.4, 0.4, 0.5), (1.6, 0.5, 1.2))
 SHELF = Quad((0.2, 0.4, 0.9), (0.9, 0, 0), (0, 0.8, 0), grey(0.4))
 
 
 def bake_room(out, *quads, **settings):
-    scene = replace(quad_scene([*ROOM, LAMP, *quads]), lights=(BULB,))
+    scene = replace(quad_scene([*ROOM, EMITTER, *quads]), lights=(BULB,))
     values = {"resolution": 96, "samples": 64, "ao_distance": "0.7", "denoise": False, **settings}
     bake(scene, settings=make_settings(values), out=out)
     return out
@@ -165,7 +165,7 @@ def test_what_is_no_bake(first, tmp_path):
 
 
 def test_a_room_that_was_joined_into_one_object_is_found(first, tmp_path):
-    scene = joined(quad_scene([*ROOM, LAMP]), np.random.default_rng(1).permutation(14))
+    scene = joined(quad_scene([*ROOM, EMITTER]), np.random.default_rng(1).permutation(14))
     settings = make_settings({"resolution": 96, "samples": 64, "ao_distance": "0.7", "denoise": False})
     bake(replace(scene, lights=(BULB,)), settings=settings, out=tmp_path / "joined")
     for pair in ((tmp_path / "joined", first), (first, tmp_path / "joined")):

@@ -25,7 +25,7 @@ pytest.importorskip("distributed")
 
 ASSETS = Path(__file__).parents[2] / "assets"
 SETTINGS = {"resolution": 64, "samples": 8, "ao_samples": 4, "denoise": False, "threads": 1}
-# A worker that says it is another version of baker.
+# A worker that reports another version of baker.
 OTHER = """
 import importlib.metadata as metadata
 import sys
@@ -101,7 +101,7 @@ def same(first, second):
 
 
 def content(folder):
-    """Hash the files of a bake, without what tells of the hour."""
+    """Hash the files of a bake, without times."""
     found = {}
     for path in sorted(folder.iterdir()):
         data = path.read_bytes()

@@ -47,7 +47,7 @@ def crate(low, high):
 
 
 def spoiled_room() -> GltfBuilder:
-    """Return a floor with a crate under a lamp, each with defects that a bake survives.
+    """Return a floor with a crate under a light, each with defects that a bake survives.
 
     The floor has doubled and flat faces and no normals; the crate is a heap of triangles whose lightmap uv
     all lie upon each other.
@@ -64,8 +64,8 @@ def spoiled_room() -> GltfBuilder:
         box[corner], NORMAL=normal[corner], TEXCOORD_0=box[corner][:, :2].copy(), TEXCOORD_1=uv, material=0
     )
     b.node(name="crate", mesh=b.mesh(heap))
-    lamp = {"type": "point", "intensity": 100.0}
-    b.json["extensions"] = {"KHR_lights_punctual": {"lights": [lamp]}}
+    light = {"type": "point", "intensity": 100.0}
+    b.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
     b.json["extensionsUsed"] = ["KHR_lights_punctual"]
     b.node(name="lamp", translation=[1.2, 2.5, 1.0], extensions={"KHR_lights_punctual": {"light": 0}})
     return b

@@ -42,7 +42,7 @@ def light(probe, places):
     return np.array([probe.at(place[:3], place[3]) for place in places])
 
 
-def test_levels_are_made_anew_byte_for_byte(tmp_path):
+def test_levels_are_made_again_byte_for_byte(tmp_path):
     command = [sys.executable, str(ASSETS / "make_levels.py"), str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True)
     for name in KEPT:
@@ -135,15 +135,15 @@ def test_signs_of_a_few_lit_pixels_shine_with_their_power():
     assert found == pytest.approx(1, abs=0.1)
 
 
-def test_a_hundred_lamps_add_up():
+def test_a_hundred_lights_add_up():
     probe = bake("warehouse", 192, 16, bounces=0)
     k = np.arange(100)
-    lamp = np.stack([-13.5 + 3 * (k % 10), 6.0 + 0.1 * (k % 7), -18.0 + 4 * (k // 10)], axis=1)
-    # Above the racks, where every lamp is seen.
+    point = np.stack([-13.5 + 3 * (k % 10), 6.0 + 0.1 * (k % 7), -18.0 + 4 * (k // 10)], axis=1)
+    # Above the racks, where every light is seen.
     places = [(-15, 3.2, z, EAST) for z in (-15.0, -3.0, 7.0)] + [(15, 4.1, z, WEST) for z in (-9.0, 2.0)]
     places += [(x, 3.4, 20, NORTH) for x in (-8.0, 0.0, 9.0)]
     truth = []
     for *place, normal in places:
-        arm = lamp - np.array(place)
+        arm = point - np.array(place)
         truth.append(((40.0 + k) * (arm @ np.array(normal)) / (arm * arm).sum(axis=1) ** 1.5).sum())
     assert light(probe, places) == pytest.approx(np.array(truth)[:, None].repeat(3, axis=1), rel=0.01)

@@ -14,14 +14,14 @@ import yaml
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
-# As quick as can be: the bake is coarse, and its judgement not a strict one.
+# As quick as can be: the bake is coarse, and its verification not a strict one.
 QUICK = "--texels 20 --spp 4"
 LIMITS = "irradiance.median > 0.5"
 
 
 @pytest.fixture(scope="module")
 def game(tmp_path_factory):
-    """Return a folder as the recipes want it, baked by the Makefile."""
+    """Return a folder with the layout of the recipes, baked by the Makefile."""
     folder = tmp_path_factory.mktemp("recipes") / "game"
     (folder / "levels").mkdir(parents=True)
     shutil.copy(ROOT / "assets" / "cornell.glb", folder / "levels")
@@ -65,14 +65,14 @@ def test_the_makefile(game):
     assert code == 0, text
     assert [told(game, f"{name}.xml") for name in ("batch", "verify-cornell")] == [(1, 0), (1, 0)]
 
-    # Then there is nothing to do, whatever the clock says of the scene.
+    # Then there is nothing to do, although the scene's file time changed.
     (game / "levels" / "cornell.glb").touch()
     code, text = make(game)
     assert code == 0, text
     assert "0 baked, 1 unchanged" in text
     assert "baker verify" not in text
 
-    # Another setting: another bake, and a judgement, which this time nothing could pass.
+    # Another setting: another bake, and a verification, which this time nothing could pass.
     write_jobs(game, 32)
     code, text = make(game, "irradiance.median > 0.000001")
     assert code != 0
@@ -122,7 +122,7 @@ def test_the_lines_of_a_pipeline(game, tmp_path, recipe):
     assert "0 baked, 1 unchanged" in text
     found = sorted(path.name for path in (folder / "reports").iterdir())
     assert found == ["batch.xml", "check.xml", "verify-cornell.xml"]
-    # Whatever a judgement ends with counts for the job, here a limit that baker does not know.
+    # The exit code of a verification counts for the job, here a limit with an unknown name.
     code, said = shell(folder, steps[-1], limits="irradiance.nothing > 1")
     assert code != 0
     assert "nothing" in said

@@ -42,7 +42,7 @@ def planes(path):
 
 
 @pytest.fixture(scope="module")
-def glowing(tmp_path_factory) -> Path:
+def emissive(tmp_path_factory) -> Path:
     """The unit square: albedo 0.6, 0.4, 0.2, emission `LIGHT`."""
     colours = {"pbrMetallicRoughness": {"baseColorFactor": [0.6, 0.4, 0.2, 1], "metallicFactor": 0}}
     strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 3.0}}
@@ -59,10 +59,10 @@ def baked(tmp_path_factory) -> Path:
     return out
 
 
-def test_a_lamp_and_its_layers_are_exact(glowing, tmp_path):
+def test_an_emitter_and_its_layers_are_exact(emissive, tmp_path):
     out = tmp_path / "a.exr"
     code, said = told(
-        glowing, "-o", out, "--camera", FRONT, *SMALL, "--aov", "albedo,normal,depth", "--max-depth", 1
+        emissive, "-o", out, "--camera", FRONT, *SMALL, "--aov", "albedo,normal,depth", "--max-depth", 1
     )
     assert code == 0
     found, header = planes(out)
@@ -87,12 +87,12 @@ def test_a_lamp_and_its_layers_are_exact(glowing, tmp_path):
     assert said["camera"]["position"] == [0.5, 0.5, 2]
 
 
-def test_the_back_is_black_and_the_sky_shines_behind(glowing, tmp_path):
+def test_the_back_is_black_and_the_sky_shines_behind(emissive, tmp_path):
     out = tmp_path / "a.exr"
     sky = ("--sky", "2,4,6", "--sky-strength", "0.5")
-    assert told(glowing, "-o", out, "--camera", "0.5,0.5,-2,0.5,0.5,0,20", *SMALL, *sky)[0] == 0
+    assert told(emissive, "-o", out, "--camera", "0.5,0.5,-2,0.5,0.5,0,20", *SMALL, *sky)[0] == 0
     assert planes(out)[0]["R"].max() == 0
-    assert told(glowing, "-o", out, "--camera", "0.5,0.5,2,0.5,0.5,9,20", *SMALL, *sky)[0] == 0
+    assert told(emissive, "-o", out, "--camera", "0.5,0.5,2,0.5,0.5,9,20", *SMALL, *sky)[0] == 0
     assert [float(planes(out)[0][c].mean()) for c in "RGB"] == pytest.approx([1, 2, 3])
 
 
@@ -109,7 +109,7 @@ def test_the_files_camera_is_that_of_the_flag(tmp_path):
 
 
 def test_a_turned_camera_of_the_file(tmp_path):
-    # Turned by 90 degrees about +Y it looks along -X, onto a lamp that faces it.
+    # Turned by 90 degrees about +Y it looks along -X, onto an emitter that faces it.
     builder = quad_builder(emissiveFactor=[1, 1, 1])
     half = math.sqrt(0.5)
     builder.json["nodes"][0]["rotation"] = [0, half, 0, half]
@@ -161,20 +161,20 @@ def test_an_unknown_camera_is_told_what_there_is(watched, tmp_path, text, senten
     assert not (tmp_path / "a.exr").exists()
 
 
-def test_a_name_where_the_file_has_no_camera(glowing, tmp_path):
-    code, said = told(glowing, "-o", tmp_path / "a.exr", *SMALL, "--camera", "eye")
+def test_a_name_where_the_file_has_no_camera(emissive, tmp_path):
+    code, said = told(emissive, "-o", tmp_path / "a.exr", *SMALL, "--camera", "eye")
     assert code == 2
     assert "no camera of its own; give seven numbers" in said["error"]["message"]
 
 
-def test_no_camera_is_one_sentence_with_a_view_that_works(glowing, tmp_path):
-    code, said = told(glowing, "-o", tmp_path / "a.exr", *SMALL)
+def test_no_camera_is_one_sentence_with_a_view_that_works(emissive, tmp_path):
+    code, said = told(emissive, "-o", tmp_path / "a.exr", *SMALL)
     assert code == 3
     message = said["error"]["message"]
     assert "no perspective camera" in message
-    assert said["error"]["file"] == str(glowing)
+    assert said["error"]["file"] == str(emissive)
     hint = message.split("--camera ")[1]
-    assert told(glowing, "-o", tmp_path / "a.exr", *SMALL, "--camera", hint)[0] == 0
+    assert told(emissive, "-o", tmp_path / "a.exr", *SMALL, "--camera", hint)[0] == 0
     seen = planes(tmp_path / "a.exr")[0]["R"]
     assert seen[4:8, 6:10].min() > 0
     # All of it is in view: nothing is lit at the picture's edge.
@@ -266,7 +266,7 @@ def test_variance_is_that_of_the_mean():
     assert np.median(spread[seen] / said[seen]) == pytest.approx(1, abs=0.25)
 
 
-def test_depth_one_shows_lamps_and_their_direct_light_only(tmp_path):
+def test_depth_one_shows_emitters_and_their_direct_light_only(tmp_path):
     one, all_of_it = (
         render(CORNELL, RenderSettings(width=16, height=12, spp=64, max_depth=depth)) for depth in (1, None)
     )
@@ -276,7 +276,7 @@ def test_depth_one_shows_lamps_and_their_direct_light_only(tmp_path):
 
 
 def test_ambient_occlusion_of_known_places(tmp_path):
-    # Two squares at a right angle: at y above the edge the wall's openness is 1 - (1 - y / hypot(y, 1)) / 2
+    # Two squares at a right angle: at y above the edge the wall's AO is 1 - (1 - y / hypot(y, 1)) / 2
     # for an endless floor one metre deep.
     builder = GltfBuilder()
     wall = np.float32([[-50, 0, 0], [50, 0, 0], [50, 1, 0], [-50, 1, 0]])
@@ -300,9 +300,9 @@ def test_ambient_occlusion_of_known_places(tmp_path):
     assert text["tone mapping"] == said["tone"] == "none, 0 to 1 is 0 to 255"
 
 
-def test_a_png_is_mapped_as_it_says(glowing, tmp_path):
+def test_a_png_is_mapped_as_it_says(emissive, tmp_path):
     out, stream = tmp_path / "a.png", StringIO()
-    assert run(["render", str(glowing), "-o", str(out), "--camera", FRONT, *SMALL], out=stream) == 0
+    assert run(["render", str(emissive), "-o", str(out), "--camera", FRONT, *SMALL], out=stream) == 0
     pixels, text = decode_png(out)
     assert text["tone mapping"] == "L / (L + median luminance), then the sRGB curve"
     assert text["tone mapping"] in stream.getvalue()
@@ -328,7 +328,7 @@ def test_a_bake_shows_what_path_tracing_shows(baked, tmp_path):
     shown = render(CORNELL, RenderSettings(**size, spp=64, lightmap=baked))
     assert shown.warnings == []
     found, expected = shown.colour.mean(axis=2), truth.colour.mean(axis=2)
-    # The lamp is the same in both, but few pixels at its edge would decide.
+    # The emitter is the same in both, but few pixels at its edge would decide.
     seen = (expected > 0) & (expected < 0.1 * expected.max())
     assert seen.sum() > 1000
     assert found[seen].mean() == pytest.approx(expected[seen].mean(), rel=0.03)
@@ -336,21 +336,21 @@ def test_a_bake_shows_what_path_tracing_shows(baked, tmp_path):
     assert render(baked / "scene.glb", RenderSettings(**size, spp=2, lightmap=baked)).warnings == []
 
 
-def test_another_scene_than_the_baked_one_is_told(baked, glowing, tmp_path, capsys):
-    code, said = told(glowing, "-o", tmp_path / "a.exr", *SMALL, "--lightmap", baked)
+def test_another_scene_than_the_baked_one_is_told(baked, emissive, tmp_path, capsys):
+    code, said = told(emissive, "-o", tmp_path / "a.exr", *SMALL, "--lightmap", baked)
     assert code == 0
     assert [w["code"] for w in said["warnings"]] == ["other-scene"]
     stream = StringIO()
-    argv = ["render", str(glowing), "-o", str(tmp_path / "a.exr"), *SMALL, "--lightmap", str(baked)]
+    argv = ["render", str(emissive), "-o", str(tmp_path / "a.exr"), *SMALL, "--lightmap", str(baked)]
     assert run(argv, out=stream) == 0
     assert "[other-scene]" in stream.getvalue()
 
 
-def test_a_picture_by_a_bake_has_the_sky_it_was_baked_under(glowing, tmp_path):
+def test_a_picture_by_a_bake_has_the_sky_it_was_baked_under(emissive, tmp_path):
     settings = make_settings({"resolution": 32, "samples": 16, "sky": "2,4,6", "sky_strength": 0.5})
-    bake(glowing, settings=settings, out=tmp_path / "out")
+    bake(emissive, settings=settings, out=tmp_path / "out")
     argv = ("--lightmap", tmp_path / "out", "--camera", "0.5,0.5,2,0.5,0.5,9,20")
-    assert told(glowing, "-o", tmp_path / "a.exr", *SMALL, *argv)[0] == 0
+    assert told(emissive, "-o", tmp_path / "a.exr", *SMALL, *argv)[0] == 0
     assert [float(planes(tmp_path / "a.exr")[0][c].mean()) for c in "RGB"] == pytest.approx([1, 2, 3])
 
 
@@ -375,9 +375,9 @@ def test_progress_rises_to_the_end_and_can_cancel(tmp_path):
             render(CORNELL, RenderSettings(width=64, height=48, **more), lambda _, f, __="": f > 0.1)
 
 
-def test_a_picture_is_whole_or_as_it_was(glowing, tmp_path, monkeypatch):
+def test_a_picture_is_whole_or_as_it_was(emissive, tmp_path, monkeypatch):
     out = tmp_path / "deep" / "a.exr"
-    argv = (glowing, "-o", out, "--camera", FRONT, *SMALL)
+    argv = (emissive, "-o", out, "--camera", FRONT, *SMALL)
     assert told(*argv)[0] == 0
     before = out.read_bytes()
 
@@ -399,6 +399,6 @@ def test_a_tampered_bake_is_shown_as_it_is(baked, tmp_path):
     size = {"width": 16, "height": 12, "spp": 4}
     once, twice = (render(CORNELL, RenderSettings(**size, lightmap=folder)) for folder in (baked, out))
     assert [w.object for w in twice.warnings] == ["irradiance_0.exr"]
-    # Lamps themselves stay as they are.
+    # Emitters themselves stay as they are.
     lit = once.colour > 0
     assert np.median(twice.colour[lit] / once.colour[lit]) == pytest.approx(2, rel=1e-3)

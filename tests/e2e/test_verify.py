@@ -88,7 +88,7 @@ def test_a_sound_bake_passes(sound):
     assert light["texels"] == ao["texels"] == pytest.approx(400, abs=20)
     assert abs(light["bias"]) < 0.01
     assert light["median"] < 0.03
-    # Most of that is the reference's own noise, and it says so.
+    # Most of that is the reference's own noise, which is reported.
     assert 0.3 * light["median"] < light["noise_floor"] < light["median"] * 1.2
     assert ao["rmse"] < 0.02
     assert light["shift"] == [0, 0]
@@ -214,7 +214,7 @@ def test_a_time_limit_ends_it(sound):
 
 
 def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
-    """The first call of a kernel on a machine takes long; a good bake must not fail for want of paths."""
+    """The first call of a kernel compiles it; a good bake must not fail because fewer paths are traced."""
     passes, real = [], tracing.irradiance_pass
 
     def slow_at_first(*args, **options):
@@ -226,7 +226,7 @@ def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
     monkeypatch.setattr(tracing, "irradiance_pass", slow_at_first)
     found = verify(sound, VerifySettings(texels=40, target_se=1e-4, time_limit=1.0))
     assert len(passes) > 3
-    # It is told apart.
+    # The time is reported separately.
     assert found.compile_seconds > 1.5
 
 

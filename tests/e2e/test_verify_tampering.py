@@ -246,7 +246,7 @@ def test_the_sound_bake_passes(first):
     assert found.passed, found.problems
     assert failed(found) == set()
     assert len(found.verdicts) > 40
-    # Each room is a region, held against its own light, and its levels are regions, too.
+    # Each room is a region, compared with its own light, and its levels are regions, too.
     rows = [row for row in found.regions if row["channel"] == "irradiance"]
     light = {row["room"]: row["light"] for row in rows if row["level"] is None}
     bright, dim = light[0], light[1]

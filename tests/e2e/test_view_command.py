@@ -1,4 +1,4 @@
-"""`baker view` from the command line: says where, answers, and ends with Ctrl-C."""
+"""`baker view` from the command line: prints its address, answers requests, and ends with Ctrl-C."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def _whole(scene: baker.Scene, index: int) -> InstanceLayout:
 
 
 def room_builder() -> GltfBuilder:
-    """Return a closed box of 2 x 2 x 2 seen from inside, all walls of one grey that glows."""
+    """Return a closed box of 2 x 2 x 2 seen from inside, all walls of one grey that emits."""
     builder = GltfBuilder()
     grey = builder.add(
         "materials",

@@ -1,4 +1,4 @@
-"""Draws exports in the browser and says whether the pixels are right."""
+"""Draws exports in the browser and checks the pixels."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     project = tmp_path / "project"
     shutil.copytree(PROJECT, project)
     shutil.copytree(folder, project / "godot")
-    # What the README tells a user of Godot 3 to do.
+    # The steps of the README for Godot 3.
     for path in sorted((project / "godot" / "godot3").glob("lightmap*")):
         path.replace(project / "godot" / path.name)
     (project / "godot" / "import_scene.gd").unlink()
@@ -69,7 +69,7 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     assert result.exists(), told[-3000:]
     assert "SCRIPT ERROR" not in told, told[-3000:]
     code = np.array(json.loads(result.read_text("utf-8")), float).reshape(-1, 64, 64, 3)
-    # A code stands for the step above it: Godot cuts off, it does not round.
+    # Godot truncates: a code represents the interval above it.
     level = (code + 0.5) / 255.0
     linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     good = (code >= 120) & (code <= 250)

@@ -38,7 +38,7 @@ def test_exposure_multiplies(browser, probe):
 
 
 def test_a_room_of_known_radiosity(browser, room):
-    """In a closed room of one colour radiance is L / (1 - albedo) everywhere, light and own glow together."""
+    """In a closed room of one colour the radiance is L / (1 - albedo) everywhere, emission included."""
     picture = draw(browser, room / "three", camera="inside")
     assert shows_the_room(picture)
 

@@ -209,9 +209,9 @@ def lit_pixels(page):
         spots.append(page.spot(*world(PAINTED_AT, s, t)))
         expected.append(srgb(paint_at(s, t) * page.light[0, row, column] * page.exposure))
         row, column = texel_at(plain_uv(s, t))
-        glow = np.array([0, 0, 0.5]) * np.pi
+        emission = np.array([0, 0, 0.5]) * np.pi
         spots.append(page.spot(*world(PLAIN_AT, s, t)))
-        expected.append(srgb((np.array(PLAIN[:3]) * page.light[1, row, column] + glow) * page.exposure))
+        expected.append(srgb((np.array(PLAIN[:3]) * page.light[1, row, column] + emission) * page.exposure))
     return page.pixels(spots), np.array(expected)
 
 
@@ -337,9 +337,9 @@ def test_the_checker_has_squares_of_eight_texels(page):
         [True, False, False, True, True, False],
         [False, True, True, False, False, True],
     )
-    # Each object in its own hue: the tints differ by more than light and dark of one tint do.
-    tints = page.pixels([page.spot(*world(at, s, 0.25)) for at in (PAINTED_AT, PLAIN_AT) for s in (0.1, 0.9)])
-    ratios = [np.argsort(tint).tolist() for tint in tints]
+    # Each object in its own hue: the hues differ by more than light and dark of one hue do.
+    hues = page.pixels([page.spot(*world(at, s, 0.25)) for at in (PAINTED_AT, PLAIN_AT) for s in (0.1, 0.9)])
+    ratios = [np.argsort(hue).tolist() for hue in hues]
     assert ratios[0] == ratios[1] != ratios[2] == ratios[3]
 
 

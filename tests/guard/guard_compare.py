@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-# Differences told of one file.
+# Differences reported for one file.
 MOST = 8
 _NOTHING = object()
 
@@ -17,7 +17,7 @@ Record = dict[str, Any]
 def compare(old: Record, new: Record) -> list[str]:
     """Return a line for each difference; empty if the records are equal."""
     if old["format"] != new["format"]:
-        return ["the records are of different formats: record both anew"]
+        return ["the records are of different formats: record both again"]
     found: list[str] = []
     for name in dict.fromkeys([*old["runs"], *new["runs"]]):
         if name not in old["runs"] or name not in new["runs"]:

@@ -46,7 +46,7 @@ def normal_text(text: str, places: dict[str, str]) -> str:
     ----------
     text : str
     places : dict
-        Absolute paths, and what stands for each; the first that is found wins.
+        Absolute paths and their placeholders; the first match is used.
     """
     for path, name in places.items():
         text = text.replace(path, name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 # Run one after another, and before all others: they are the first to need most kernels, and two processes
 # should not compile the same kernel at once.
-FIRST = ("cornell", "holes", "glass", "judge", "pictures")
+FIRST = ("cornell", "holes", "glass", "verify", "pictures")
 
 _TINY = "--resolution 32 --samples 4"
 _EXPORTS = "gltf,three,babylon,godot,unity,unreal,bevy,blender,unlit"
@@ -31,7 +31,7 @@ RUNS: dict[str, tuple[str, ...]] = {
         f"bake scenes/glass.glb -o two --sky 10,12,15 {_TINY} --threads 2 --quiet",
         f"render scenes/glass.glb -o glass.exr {_PICTURE}",
     ),
-    "judge": (
+    "verify": (
         f"bake scenes/cornell.glb -o out {_TINY}",
         "verify out --texels 60 --spp 32 --json --report report.html --junit report.xml --threads 1",
         "verify out --texels 60 --spp 32 --threads 2",

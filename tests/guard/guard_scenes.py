@@ -108,11 +108,11 @@ def _window(*, glass: bool) -> GlbBuilder:
 
 
 def _crates() -> GlbBuilder:
-    """Return copies of a crate and a ball on a floor under a spot, a lamp and a sun."""
+    """Return copies of a crate and a ball on a floor under a spot, an emitter and a sun."""
     builder = GlbBuilder()
     wood = builder.material("wood", (0.5, 0.3, 0.2))
     grey = builder.material("grey", (0.5, 0.5, 0.5), roughness=0.4)
-    glow = builder.material("glow", (0.0, 0.0, 0.0), emission=(90.0, 60.0, 30.0))
+    emissive = builder.material("glow", (0.0, 0.0, 0.0), emission=(90.0, 60.0, 30.0))
     floor = quads([[(-2.0, 0.0, 2.0), (2.0, 0.0, 2.0), (2.0, 0.0, -2.0), (-2.0, 0.0, -2.0)]])
     builder.place("floor", builder.mesh("floor", [(floor, grey)]))
     crate, marble = (
@@ -123,7 +123,7 @@ def _crates() -> GlbBuilder:
         builder.place(f"crate {k}", crate, (1.2 * k - 1.2, 0.0, -0.5), turn=25.0 * k, scale=1.0 + 0.2 * k)
     builder.place("marble 0", marble, (-0.6, 0.3, 0.8))
     builder.place("marble 1", marble, (0.7, 0.6, 0.7), scale=2.0)
-    builder.place("lamp", builder.mesh("lamp", [(box((0.3, 0.1, 0.3)), glow)]), (0.0, 1.6, 0.0))
+    builder.place("lamp", builder.mesh("lamp", [(box((0.3, 0.1, 0.3)), emissive)]), (0.0, 1.6, 0.0))
     builder.light("spot", "spot", 200.0, at=(1.5, 2.0, 1.5), towards=(-1.0, -1.2, -1.0))
     builder.light("sun", "directional", 300.0, colour=(1.0, 0.9, 0.7), towards=(0.3, -1.0, -0.2))
     builder.camera((0.0, 1.5, 3.5), (0.0, 0.4, 0.0), 50.0)

@@ -1,4 +1,4 @@
-"""What the guard calls equal, and what it says of what is not; no run of `baker` here."""
+"""Equality and the report of differences of the guard; these tests do not run `baker`."""
 
 from __future__ import annotations
 

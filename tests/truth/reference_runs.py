@@ -90,7 +90,7 @@ def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, ro
 
     The error is at most three of the reported standard errors, and at most 0.2 %; three standard errors are
     below 0.2 %; and they match the spread of the copies. rounding : relative error that is no noise: float32,
-    and rays that leave surfaces by 1e-5 of the scene Seeds are fixed. After a change of random numbers a
+    and rays that leave surfaces by 1e-5 of the scene. Seeds are fixed. After a change of random numbers a
     point may be beyond three standard errors by chance; it is wrong if it stays there with other seeds.
     """
     truth = np.atleast_1d(np.asarray(truth, float))

@@ -1,4 +1,4 @@
-"""Light through MASK and BLEND surfaces: holes where the uv says, shares of alpha, nothing more."""
+"""Light through MASK and BLEND surfaces: holes at the right uv, shares of alpha, nothing else."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def test_sky_through_blend_and_its_own_reflection():
 
 @pytest.mark.parametrize("mode", ["MASK", "BLEND"])
 def test_what_is_not_there_does_not_shine(mode):
-    """Half a lamp, as a hole or as glass of alpha 0.5, lights half as much as a whole one."""
+    """Half an emitter, as a hole or as glass of alpha 0.5, lights half as much as a whole one."""
     image = np.repeat(np.array([[0.0, 1.0]]), 2, axis=0)
     half = masked(image=image, emission=10.0) if mode == "MASK" else blended(0.5, emission=10.0)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import cornered_open_share, limited_wall_open_share, wall_open_share, walled_open_share
+from closed_forms import cornered_ao, limited_wall_ao, wall_ao, walled_ao
 from scenes import SceneBuilder, icosphere
 from ztest import assert_unbiased
 
@@ -35,23 +35,23 @@ def test_closed_forms_agree_with_quadrature():
     x, z = np.where(toward, x, 1e-9), z
     for d, h in ((0.7, 1.0), (0.2, 3.0)):
         blocked = toward & (d * z / x < h)
-        assert 1 - blocked.mean() == pytest.approx(wall_open_share(d, h), abs=1e-3)
+        assert 1 - blocked.mean() == pytest.approx(wall_ao(d, h), abs=1e-3)
         blocked = toward & (d / x < h)
-        assert 1 - blocked.mean() == pytest.approx(limited_wall_open_share(d, h), abs=1e-3)
+        assert 1 - blocked.mean() == pytest.approx(limited_wall_ao(d, h), abs=1e-3)
     for d, h, r in ((0.3, 1.0, 0.5), (0.1, 0.2, 0.5), (0.3, 0.2, 0.33), (0.4, 3.0, 1.0)):
         blocked = toward & (d * z / x < h) & (d / x < r)
-        assert 1 - blocked.mean() == pytest.approx(walled_open_share(d, h, r), abs=1e-3)
+        assert 1 - blocked.mean() == pytest.approx(walled_ao(d, h, r), abs=1e-3)
     y = y[inside]
     for a, b, r in ((0.1, 0.1, 0.5), (0.3, 0.4, 0.5), (0.2, 0.45, 0.5), (0.01, 0.02, 1.0), (0.3, 0.7, 0.5)):
         blocked = (x * r > a) | (y * r > b)
-        assert 1 - blocked.mean() == pytest.approx(cornered_open_share(a, b, r), abs=1e-3)
-    assert wall_open_share(0.7, 1.0) == pytest.approx(0.7867, abs=1e-4)
+        assert 1 - blocked.mean() == pytest.approx(cornered_ao(a, b, r), abs=1e-3)
+    assert wall_ao(0.7, 1.0) == pytest.approx(0.7867, abs=1e-4)
 
 
 @pytest.mark.parametrize("height", [0.3, 1.0])
 def test_floor_beside_a_long_wall_without_limit(height):
     builder, floor = wall_and_floor(height)
-    truth = floor.texel_mean(lambda p: wall_open_share(p[..., 0], height))[:, 0]
+    truth = floor.texel_mean(lambda p: wall_ao(p[..., 0], height))[:, 0]
     found = [ao_rows(builder, floor, seed, ao_distance="inf") for seed in range(SEEDS)]
     # Slack: origins are lifted by 5e-7 of the 400 m scene, 0.2 mm of 0.3 m height.
     assert_unbiased(found, truth, least=0.002, slack=3e-4)
@@ -60,7 +60,7 @@ def test_floor_beside_a_long_wall_without_limit(height):
 @pytest.mark.parametrize("reach", [0.5, 1.5])
 def test_floor_beside_a_long_wall_within_a_distance(reach):
     builder, floor = wall_and_floor(10.0)
-    truth = floor.texel_mean(lambda p: limited_wall_open_share(p[..., 0], reach), 8)[:, 0]
+    truth = floor.texel_mean(lambda p: limited_wall_ao(p[..., 0], reach), 8)[:, 0]
     found = [ao_rows(builder, floor, seed, ao_distance=str(reach)) for seed in range(SEEDS)]
     assert_unbiased(found, truth, least=0.002, slack=1e-3)
     assert truth[-1] == 1.0
@@ -70,7 +70,7 @@ def test_floor_beside_a_long_wall_within_a_distance(reach):
 def test_limited_ao_from_gather_rays_is_the_same_as_alone():
     """With light baked too, AO comes from the gather's rays: the same numbers in another way."""
     builder, floor = wall_and_floor(10.0)
-    truth = floor.texel_mean(lambda p: limited_wall_open_share(p[..., 0], 1.5), 8)[:, 0]
+    truth = floor.texel_mean(lambda p: limited_wall_ao(p[..., 0], 1.5), 8)[:, 0]
     found = []
     for seed in range(SEEDS):
         result = builder.bake(

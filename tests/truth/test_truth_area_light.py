@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def square_over(height, half=0.5):
-    """Corners counter-clockwise from below: the lamp shines down."""
+    """Corners counter-clockwise from below: the emitter shines down."""
     return np.array(
         [(-half, height, -half), (half, height, -half), (half, height, half), (-half, height, half)]
     )
@@ -53,7 +53,7 @@ def test_parallel_square_at_every_texel(denoise):
 
 @pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.3, 1.0, 2.0])
 def test_close_up_there_is_neither_bias_nor_a_spark(height):
-    """A lamp that nearly touches a wall: pi L under its middle, the closed form at its rim."""
+    """An emitter that nearly touches a wall: pi L under its middle, the closed form at its rim."""
     found, worst = [], 0.0
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -62,7 +62,7 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
         value = floor.values(builder.bake(seed=seed, samples=64))[..., 0]
         worst = max(worst, value.max())
         found.append(value)
-    # Texels at the rim of a lamp at 1 cm see E change within their 5 cm: average over 24 x 24 points.
+    # Texels at the rim of an emitter at 1 cm see E change within their 5 cm: average over 24 x 24 points.
     truth = floor.texel_mean(lambda p: polygon_irradiance(square_over(height), p, UP), 24)
     assert worst < 1.25 * np.pi
     middle = slice(8, 16)
@@ -73,7 +73,7 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
 
 
 def test_penumbra_from_its_first_to_its_last_hair():
-    """A screen hides the lamp's half with x < s: every texel sees a rectangle of it, from none to all."""
+    """A screen hides the emitter's half with x < s: every texel sees a rectangle of it, from none to all."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -83,7 +83,7 @@ def test_penumbra_from_its_first_to_its_last_hair():
         found.append(floor.values(builder.bake(seed=seed, denoise=False))[..., 0])
 
     def visible(p):
-        # The screen's edge lies half way up: it hides lamp points with x < -p_x.
+        # The screen's edge lies half way up: it hides emitter points with x < -p_x.
         edge = np.clip(-p[..., 0], -0.5, 0.5)
         corners = np.broadcast_to(square_over(1.0), (*p.shape[:-1], 4, 3)).copy()
         corners[..., [0, 3], 0] = edge[..., None]
@@ -95,7 +95,7 @@ def test_penumbra_from_its_first_to_its_last_hair():
     assert_unbiased(profile, expected, least=0.004)
 
 
-def test_wall_that_touches_a_lamp():
+def test_wall_that_touches_an_emitter():
     """Perpendicular squares with a common edge: E rises to pi L / 2 at the edge, without a spark."""
     found = []
     for seed in range(SEEDS):
@@ -118,8 +118,8 @@ def test_textured_emission_conserves_its_flux():
     for seed in range(SEEDS):
         builder = SceneBuilder(128)
         walls = list(builder.box((0, 0, 0), (2, 2, 2), builder.material(0.0), 20, inward=True).values())
-        glow = builder.material(0.0, (2.0, 2.0, 2.0), texture=image)
-        builder.quad((0.5, 1.9, 0.5), (1, 0, 0), (0, 0, 1), glow, (12, 12))
+        emissive = builder.material(0.0, (2.0, 2.0, 2.0), texture=image)
+        builder.quad((0.5, 1.9, 0.5), (1, 0, 0), (0, 0, 1), emissive, (12, 12))
         result = builder.bake(seed=seed)
         absorbed.append(sum(w.values(result).mean(axis=(0, 1)) * w.area for w in walls))
     # Clamped bilinear lookups average to the mean of the image.
@@ -128,17 +128,17 @@ def test_textured_emission_conserves_its_flux():
 
 
 def test_texture_lies_the_right_way_round():
-    """One bright corner of the image: the wall behind that corner of the lamp is the brightest."""
+    """One bright corner of the image: the wall behind that corner of the emitter is the brightest."""
     image = np.zeros((8, 8, 3))
     image[0:2, 6:8] = 10.0
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
-    lamp = builder.quad(
+    emitter = builder.quad(
         (-1, 0.3, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 1.0, texture=image), (12, 12)
     )
     value = floor.values(builder.bake())[..., 0]
-    # Image row 0 is v = 0, columns run along u: the spot is at u = 7 / 8, v = 1 / 8 of the lamp.
-    bright = lamp.at(7 / 8, 1 / 8)
+    # Image row 0 is v = 0, columns run along u: the spot is at u = 7 / 8, v = 1 / 8 of the emitter.
+    bright = emitter.at(7 / 8, 1 / 8)
     row, column = np.unravel_index(value.argmax(), value.shape)
     assert np.abs((floor.points(1)[row, column, 0] - bright)[[0, 2]]).max() < 0.15
 

@@ -1,4 +1,4 @@
-"""Pictures of everything at once: estimators against each other, mirrored lamps, where connections win."""
+"""Pictures of everything at once: estimators against each other, mirrored lights, where connections win."""
 
 from __future__ import annotations
 
@@ -81,19 +81,19 @@ def test_both_ends_agree_at_each_part_of_a_room():
     assert np.abs(z).max() < critical(z.size)
 
 
-def mirrored_lamp():
+def mirrored_light():
     """Return a floor beside a perfect mirror under a point light, and a camera that sees the floor only."""
     floor = Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), glossy((0.6, 0.6, 0.6), 0.0, 1.0))
     mirror = Quad((1, 2, 0), (0, -4, 0), (0, 0, 3), glossy((1.0, 1.0, 1.0), 1.0, 0.0))
-    lamp = PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0.4, 0.1, 0.8))
-    return replace(quad_scene([floor, mirror]), lights=(lamp,)), look_at((0, -0.4, 1.5), (0.1, 0.1, 0), 46.0)
+    light = PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0.4, 0.1, 0.8))
+    return replace(quad_scene([floor, mirror]), lights=(light,)), look_at((0, -0.4, 1.5), (0.1, 0.1, 0), 46.0)
 
 
-def test_a_lamp_behind_a_mirror_lights_as_its_image_does():
-    # No path from the eye can find a point light by way of a mirror: only paths from the lamp do.
-    scene, camera = mirrored_lamp()
+def test_a_light_behind_a_mirror_lights_as_its_image_does():
+    # No path from the eye can find a point light by way of a mirror: only paths from the light do.
+    scene, camera = mirrored_light()
     mean, error, _ = picture(scene, camera, "bdpt", 180, size=4, samples=1024)
-    # The closed form: the lamp and its image, through the floor's f, averaged over each pixel.
+    # The closed form: the light and its image, through the floor's f, averaged over each pixel.
     fine = (np.arange(64) + 0.5) / 64 * 2 - 1
     x, y = np.meshgrid(fine, -fine)
     high = math.tan(0.5 * camera.fov)
@@ -103,13 +103,13 @@ def test_a_lamp_behind_a_mirror_lights_as_its_image_does():
     row, value = np.zeros((5, 16)), np.zeros(3)
     row[:, 0] = (0.6, 0.6, 0.6, 0.0, 1.0)
     light = np.zeros((64, 64))
-    for lamp in ((0.4, 0.1, 0.8), (1.6, 0.1, 0.8)):
-        to_lamp = np.array(lamp) - place
-        square = (to_lamp**2).sum(axis=-1)
-        to_lamp /= np.sqrt(square)[..., None]
+    for position in ((0.4, 0.1, 0.8), (1.6, 0.1, 0.8)):
+        to_light = np.array(position) - place
+        square = (to_light**2).sum(axis=-1)
+        to_light /= np.sqrt(square)[..., None]
         to_eye = -way / np.linalg.norm(way, axis=-1, keepdims=True)
         for i in np.ndindex(64, 64):
-            bsdf_eval(row, 0, *to_eye[i], *to_lamp[i], value)
+            bsdf_eval(row, 0, *to_eye[i], *to_light[i], value)
             light[i] += value[0] / square[i]
     truth = light.reshape(4, 16, 4, 16).mean(axis=(1, 3))
     z = (mean[..., 0] - truth) / error[..., 0]
@@ -123,14 +123,14 @@ def test_a_lamp_behind_a_mirror_lights_as_its_image_does():
 
 
 def gap_room():
-    """Return two rooms and a gap between: a lamp shines at the ceiling of one, the other is dark."""
+    """Return two rooms and a gap between: an emitter shines at the ceiling of one, the other is dark."""
     walls = box_quads((0, 0, 0), (4, 2, 2), inward=True, material=grey(0.7))
     screen = [
         Quad((2, 0, 0), (0, 0.95, 0), (0, 0, 2), grey(0.7, double_sided=True)),
         Quad((2, 1.05, 0), (0, 0.95, 0), (0, 0, 2), grey(0.7, double_sided=True)),
     ]
-    lamp = Quad((1.4, 0.85, 1.9), (0.3, 0, 0), (0, 0.3, 0), grey(0, 20.0))
-    return quad_scene([*walls, *screen, lamp])
+    emitter = Quad((1.4, 0.85, 1.9), (0.3, 0, 0), (0, 0.3, 0), grey(0, 20.0))
+    return quad_scene([*walls, *screen, emitter])
 
 
 def test_connections_win_where_light_comes_through_a_gap():
@@ -150,7 +150,7 @@ def test_connections_win_where_light_comes_through_a_gap():
 
 
 def test_connections_win_on_a_caustic():
-    # A small lamp over a mirror, seen on the wall above: from the eye only luck finds it.
+    # A small emitter over a mirror, seen on the wall above: from the eye only luck finds it.
     quads = [
         Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), glossy((0.95, 0.95, 0.95), 1.0, 0.0)),
         Quad((0, 1, 0), (1, 0, 0), (0, 0, 1), glossy((0.7, 0.7, 0.7), 0.0, 1.0)),
@@ -165,10 +165,10 @@ def test_connections_win_on_a_caustic():
 
 
 def test_same_bytes_whatever_the_threads_and_blocks(monkeypatch):
-    lamp = PunctualLight("point", "p", 0, (0.4, 0.4, 0.4), (0.4, 1.6, 1.2))
+    light = PunctualLight("point", "p", 0, (0.4, 0.4, 0.4), (0.4, 1.6, 1.2))
     how = {"size": 48, "samples": 2}
-    one = picture(glossy_room((lamp,)), ROOM_CAMERA, "bdpt", 2, threads=1, **how)
+    one = picture(glossy_room((light,)), ROOM_CAMERA, "bdpt", 2, threads=1, **how)
     monkeypatch.setattr(bidirectional_pass, "_BLOCK", 1024)
-    other = picture(glossy_room((lamp,)), ROOM_CAMERA, "bdpt", 2, threads=3, **how)
+    other = picture(glossy_room((light,)), ROOM_CAMERA, "bdpt", 2, threads=3, **how)
     assert one[0].tobytes() == other[0].tobytes()
     assert one[1].tobytes() == other[1].tobytes()

@@ -135,7 +135,7 @@ def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
     builder.materials[material] = replace(builder.materials[material], emission_texture=texture)
     builder.quad((-0.3, 0.1, -0.3), (0.6, 0, 0), (0, 0, 0.6), material, (4, 4))
     value = floor.values(builder.bake(samples=256, bounces=0))[..., 0]
-    # Nine square lamps of 3.75 cm; a bilinear one is a tent of the same volume, a little softer.
+    # Nine square emitters of 3.75 cm; a bilinear one is a tent of the same volume, a little softer.
     axis = (np.arange(4, 12, 3) + 0.5) / 16 * 0.6 - 0.3
     step = (np.arange(8) + 0.5) / 8 * 0.0375 - 0.01875
     place = (axis[:, None] + step).reshape(-1)

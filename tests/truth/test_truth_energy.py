@@ -13,7 +13,7 @@ from baker.radiosity.solve import solve_radiosity
 
 
 def open_room(albedo=0.7, texels=12):
-    """A room without a ceiling, a lamp, a one-sided screen and a double-sided one."""
+    """A room without a ceiling, an emitter, a one-sided screen and a double-sided one."""
     builder = SceneBuilder(64)
     walls = builder.material((albedo, 0.5 * albedo, 0.1))
     quads = builder.box((0, 0, 0), (3, 2, 2), walls, texels, inward=True)
@@ -38,7 +38,7 @@ def test_what_is_emitted_is_absorbed_or_escapes(albedo, sky):
     assert solve["residual"] < 1e-4
 
 
-def test_closed_black_room_absorbs_the_flux_of_its_lamps():
+def test_closed_black_room_absorbs_the_flux_of_its_lights():
     """The audit's emitted flux is that of the lights: 4 pi I and pi L A."""
     emitted = []
     for seed in range(6):
@@ -51,7 +51,7 @@ def test_closed_black_room_absorbs_the_flux_of_its_lamps():
         energy = builder.bake(seed=seed).solve["energy"]
         emitted.append(energy["emitted"])
         assert energy["absorbed"] == pytest.approx(energy["emitted"], rel=1e-6)
-    # Per texel, 16 points stand for a point light 30 cm away: 0.3 %.
+    # 16 points a texel sample the light of a point 30 cm away: 0.3 %.
     assert_unbiased(emitted, 4 * np.pi * 3.0 + 2 * np.pi * 8.0, least=0.01, slack=0.003)
 
 

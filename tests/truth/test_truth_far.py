@@ -1,4 +1,4 @@
-"""Rooms far from the world's origin are lit as they are at it, in the bake, the judge, pictures and diff."""
+"""Rooms far from the origin are lit as at the origin, in the bake, the reference, pictures and diff."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SETTINGS = make_settings({
 
 
 def room(at=None):
-    """Return a lit room with a crate; `at`: where its nodes stand."""
+    """Return a lit room with a crate; `at`: translation of its nodes."""
     builder = SceneBuilder(64)
     white = builder.material(0.6)
     builder.box((-1, 0, -1), (1, 2, 1), white, 12, inward=True)
@@ -72,7 +72,7 @@ def test_the_maps_are_the_same(folders):
         assert np.quantile(away, 0.99) < 0.02, name
 
 
-def test_the_judge_finds_the_far_bake_right_and_says_where(folders):
+def test_the_reference_finds_the_far_bake_right_and_says_where(folders):
     found = verify(folders["far"], VerifySettings(texels=200, spp=64))
     figures = found.channels["irradiance"].metrics
     assert abs(figures["bias"]) < 0.03
@@ -130,7 +130,7 @@ def test_a_wall_of_a_centimetre_shades_the_floor_whatever_is_around(around):
     np.testing.assert_allclose(found, truth, atol=0.012)
 
 
-def test_the_judge_sees_the_same_wall_below_a_sky_of_100_km():
+def test_the_reference_sees_the_same_wall_below_a_sky_of_100_km():
     h, builder = 0.01, SceneBuilder(64)
     black = builder.material(0.0)
     builder.quad((0, 0, -h), (0, 0, 2 * h), (3 * h, 0, 0), black, (4, 16))

@@ -1,4 +1,4 @@
-"""Furnaces: where everything glows, E = pi L / (1 - rho) everywhere; under an even sky, E = pi L."""
+"""Furnaces: where everything emits, E = pi L / (1 - rho) everywhere; under an even sky, E = pi L."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def covered(result, channel="irradiance"):
     ("albedo", "denoise"),
     [(0.2, False), (0.5, False), (0.8, False), (0.95, False), (0.5, True), (0.95, True)],
 )
-def test_closed_box_glows_everywhere_alike(albedo, denoise):
+def test_closed_box_emits_the_same_everywhere(albedo, denoise):
     builder, quads = furnace_box(albedo)
     truth = np.pi / (1 - albedo)
     means = []
@@ -37,16 +37,16 @@ def test_closed_box_glows_everywhere_alike(albedo, denoise):
         # Noise of 64 rays a texel: the emitters' half of the estimate has under 2 % (the rest is even).
         assert value.std() < 0.02 * truth
         assert np.abs(value - truth).max() < 0.12 * truth
-        # The three colours see the same rays; the denoiser, a network, tints texels by a hair.
-        tint = np.ptp(value, axis=1) / value.mean(axis=1)
-        assert np.median(tint) < (0.003 if denoise else 1e-6)
-        assert tint.max() < (0.02 if denoise else 1e-5)
+        # The three colours see the same rays; the denoiser, a network, shifts the colour of texels slightly.
+        spread = np.ptp(value, axis=1) / value.mean(axis=1)
+        assert np.median(spread) < (0.003 if denoise else 1e-6)
+        assert spread.max() < (0.02 if denoise else 1e-5)
     # 0.5 % of the truth: the direct light of all patches shares no sample, so six bakes average well.
     assert_unbiased(means, truth, least=0.005)
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_inward_sphere_glows_everywhere_alike(smooth):
+def test_inward_sphere_emits_the_same_everywhere(smooth):
     corner = icosphere(1, inward=True)
     means = []
     for seed in range(SEEDS):
@@ -61,14 +61,14 @@ def test_inward_sphere_glows_everywhere_alike(smooth):
 
 
 def test_coloured_furnace_keeps_colours_apart():
-    albedo, glow = np.array([0.2, 0.5, 0.8]), np.array([3.0, 0.0, 1.0])
+    albedo, emission = np.array([0.2, 0.5, 0.8]), np.array([3.0, 0.0, 1.0])
     means = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
-        quads = builder.box((0, 0, 0), (1, 1, 1), builder.material(albedo, glow), 12, inward=True)
+        quads = builder.box((0, 0, 0), (1, 1, 1), builder.material(albedo, emission), 12, inward=True)
         result = builder.bake(seed=seed)
         means.append(np.mean([q.values(result).mean(axis=(0, 1)) for q in quads.values()], axis=0))
-    assert_unbiased(means, np.pi * glow / (1 - albedo), least=0.005)
+    assert_unbiased(means, np.pi * emission / (1 - albedo), least=0.005)
 
 
 @pytest.mark.parametrize("shape", ["box", "sphere"])

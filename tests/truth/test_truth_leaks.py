@@ -74,7 +74,7 @@ def test_dark_inside_a_hull_however_bright_outside(name):
 
 
 def test_dark_in_a_room_of_separate_walls():
-    """Six quads that only share edges, the lamp outside: their texels at edges and corners stay dark."""
+    """Six quads that only share edges, the emitter outside: their texels at edges and corners stay dark."""
     builder = SceneBuilder(128)
     quads = builder.box((0, 0, 0), (4, 3, 2), builder.material(0.9), 20, inward=True)
     builder.quad((1, 3.5, 0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 1.0e4), (6, 6))

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from closed_forms import (
-    cornered_open_share,
+    cornered_ao,
     parallel_squares,
     perpendicular_squares,
     polygon_irradiance,
     solid_angle,
     spot_flux,
-    walled_open_share,
+    walled_ao,
 )
 from reference_runs import UP, assert_closed_form, copies_of, spread_over, traced, traced_ao
 from scenes import icosphere
@@ -44,8 +44,8 @@ FURNACE = {
 def test_furnace(estimator):
     # Every wall emits 1 / pi: E = 1 / (1 - albedo) everywhere.
     albedo, passes = FURNACE[estimator]
-    glow = Material(base_colour=(*albedo, 1.0), emission=(1 / math.pi,) * 3)
-    walls = box_quads((0, 0, 0), (1, 2, 3), inward=True, material=glow)
+    emissive = Material(base_colour=(*albedo, 1.0), emission=(1 / math.pi,) * 3)
+    walls = box_quads((0, 0, 0), (1, 2, 3), inward=True, material=emissive)
     places = np.random.default_rng(1).uniform((0.1, 0.1, 0), (0.9, 1.9, 0), (256, 3))
     found = traced(quad_scene(walls), copies_of(places, copies=1), estimator=estimator, passes=passes)
     for c in range(3):
@@ -63,11 +63,11 @@ def test_furnace_in_a_sphere_by_aiming(albedo, passes):
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_under_a_parallel_square(estimator):
     corners = [(-0.5, 0.5, 1), (0.5, 0.5, 1), (0.5, -0.5, 1), (-0.5, -0.5, 1)]
-    lamp = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 2.0))
+    emitter = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 2.0))
     places = [(0, 0, 0), (0.6, 0.2, 0)]
     truth = [2.0 * polygon_irradiance(corners, p, UP) for p in places]
     found = traced(
-        quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
+        quad_scene([emitter]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
     )
     assert_closed_form(found, truth)
 
@@ -75,11 +75,11 @@ def test_under_a_parallel_square(estimator):
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_beside_a_perpendicular_square(estimator):
     corners = [(0, 0.5, 0), (0, 0.5, 1), (0, -0.5, 1), (0, -0.5, 0)]
-    lamp = Quad((0, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1.0))
+    emitter = Quad((0, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1.0))
     places = [(0.4, 0.1, 0), (0.9, 0.5, 0)]
     truth = [polygon_irradiance(corners, p, UP) for p in places]
     found = traced(
-        quad_scene([lamp]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
+        quad_scene([emitter]), copies_of(places), estimator=estimator, samples=RAYS[estimator], passes=6
     )
     assert_closed_form(found, truth)
 
@@ -101,13 +101,13 @@ def test_form_factors_agree_with_quadrature():
 @pytest.mark.parametrize("perpendicular", [False, True])
 def test_form_factor_of_unit_squares(perpendicular, estimator):
     """Over the whole square, E / (pi L) is the form factor: 0.19982 face to face, 0.20004 at an edge."""
-    lamp = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 1 / math.pi))
+    emitter = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 1 / math.pi))
     truth, passes = parallel_squares(), 6
     if perpendicular:
-        lamp = Quad((-0.5, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1 / math.pi))
+        emitter = Quad((-0.5, -0.5, 0), (0, 1, 0), (0, 0, 1), grey(0, 1 / math.pi))
         truth, passes = perpendicular_squares(), 16
     found = traced(
-        quad_scene([lamp]),
+        quad_scene([emitter]),
         lambda k: spread_over(SQUARE, 512, k),
         estimator=estimator,
         samples=512,
@@ -117,14 +117,14 @@ def test_form_factor_of_unit_squares(perpendicular, estimator):
 
 
 def polyhedron(corner, light=(), albedo=0.5, emission=None):
-    """Return a scene of flat triangles (t, 3, 3) and their normals; `emission` (t,) bool: those that glow."""
+    """Return a scene of flat triangles (t, 3, 3) and their normals; `emission` (t,) bool: those that emit."""
     n = len(corner)
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     face /= np.linalg.norm(face, axis=1, keepdims=True)
-    glows = np.zeros(n, np.int32) if emission is None else np.asarray(emission, np.int32)
+    emits = np.zeros(n, np.int32) if emission is None else np.asarray(emission, np.int32)
     mesh = Mesh(
         "sphere", corner.reshape(-1, 3).astype(np.float32), np.repeat(face, 3, axis=0).astype(np.float32),
-        np.arange(3 * n, dtype=np.int32).reshape(n, 3), glows, np.zeros(n, np.int32),
+        np.arange(3 * n, dtype=np.int32).reshape(n, 3), emits, np.zeros(n, np.int32),
         np.zeros(3 * n, np.int32), np.arange(3 * n, dtype=np.int32),
     )  # fmt: skip
     white = Material(base_colour=(albedo, albedo, albedo, 1.0))
@@ -160,22 +160,22 @@ def faded_flux(corner, light):
 
 
 @pytest.mark.parametrize(
-    ("lamp", "estimator", "albedo", "passes"),
+    ("kind", "estimator", "albedo", "passes"),
     [
         *(("point", "light", 0.5, 8), ("point", "mis", 0.7, 12), ("point", "bdpt", 0.5, 4)),
         *(("spot", "mis", 0.5, 16), ("area", "mis", 0.5, 8)),
         *(("faded", "light", 0.5, 8), ("faded", "mis", 0.5, 16), ("faded", "bdpt", 0.5, 6)),
     ],
 )
-def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
+def test_flux_in_a_closed_room(kind, estimator, albedo, passes):
     """Whatever its shape, the mean over all walls is flux / area / (1 - albedo): here of 80 triangles."""
     corner = icosphere(1, inward=True)
     area = areas(corner)
-    glows = corner[:, :, 2].mean(axis=1) > 0.6
-    flux = {"point": 4 * math.pi, "spot": spot_flux(0.8, 1.4), "area": math.pi * area[glows].sum()}
-    flux = faded_flux(corner, FADED) if lamp == "faded" else flux[lamp]
-    light = {"point": (POINT,), "spot": (SPOT,), "faded": (FADED,), "area": ()}[lamp]
-    scene, _ = polyhedron(corner, light, albedo, glows if lamp == "area" else None)
+    emits = corner[:, :, 2].mean(axis=1) > 0.6
+    flux = {"point": 4 * math.pi, "spot": spot_flux(0.8, 1.4), "area": math.pi * area[emits].sum()}
+    flux = faded_flux(corner, FADED) if kind == "faded" else flux[kind]
+    light = {"point": (POINT,), "spot": (SPOT,), "faded": (FADED,), "area": ()}[kind]
+    scene, _ = polyhedron(corner, light, albedo, emits if kind == "area" else None)
     found = traced(
         scene, lambda k: spread_over(corner, 256, k), estimator=estimator, samples=256, passes=passes
     )
@@ -189,7 +189,7 @@ def test_flux_in_a_closed_room(lamp, estimator, albedo, passes):
 def test_integrating_sphere(estimator, albedo, passes):
     """E = D + flux / (4 pi) albedo / (1 - albedo), at each place of the wall.
 
-    The sphere is made of 20,480 triangles. What that changes is reckoned here: the first bounce from each
+    The sphere is made of 20,480 triangles. The effect of that is computed here: the first bounce from each
     triangle by Lambert's formula, the others spread over the polyhedron's own area. It is below 0.03 %.
     """
     corner = icosphere(5, inward=True)
@@ -257,7 +257,7 @@ def test_a_point_light_over_a_square_half_in_shadow(estimator):
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_half_hidden_sky(estimator):
-    # Askew: a wall along an axis hides exactly half of a stratified square, and leaves no noise to judge.
+    # Askew: a wall along an axis hides exactly half of a stratified square, and leaves no noise to test.
     wall = Quad((-150, -500, 0), (300, 1000, 0), (0, 0, 1000), grey(0.0, double_sided=True))
     found = traced(
         quad_scene([wall]),
@@ -290,7 +290,7 @@ def floor_places(x, y=0.0):
 
 
 @pytest.mark.parametrize(("height", "reach"), [(1.0, np.inf), (0.05, np.inf)])
-def test_openness_beside_a_wall(height, reach):
+def test_ao_beside_a_wall(height, reach):
     wall = Quad((0, -2, 0), (0, 4, 0), (0, 0, height), grey(0.5, double_sided=True))
     corners = np.array([(0, 2, 0), (0, 2, height), (0, -2, height), (0, -2, 0)], float)
     truth = [1 - polygon_irradiance(corners, (x, 0.5, 0), UP) / math.pi for x in NEAR]
@@ -298,14 +298,14 @@ def test_openness_beside_a_wall(height, reach):
 
 
 @pytest.mark.parametrize(("height", "reach"), [(10.0, 0.5), (0.2, 0.5), (1.0, 0.9)])
-def test_openness_beside_a_wall_within_a_distance(height, reach):
+def test_ao_beside_a_wall_within_a_distance(height, reach):
     wall = Quad((0, -2, 0), (0, 4, 0), (0, 0, height), grey(0.5, double_sided=True))
-    truth = walled_open_share(NEAR, height, reach)
+    truth = walled_ao(NEAR, height, reach)
     assert_closed_form(traced_ao(quad_scene([wall]), floor_places(NEAR), reach, samples=256), truth)
 
 
 @pytest.mark.parametrize("reach", [0.5, np.inf])
-def test_openness_where_two_walls_meet(reach):
+def test_ao_where_two_walls_meet(reach):
     a = Quad((0, 0, 0), (0, 3, 0), (0, 0, 3), grey(0.5, double_sided=True))
     b = Quad((0, 0, 0), (3, 0, 0), (0, 0, 3), grey(0.5, double_sided=True))
     x, y = np.array([0.002, 0.01, 0.01, 0.1, 0.3, 0.45]), np.array([0.002, 0.02, 0.3, 0.1, 0.4, 0.2])
@@ -315,5 +315,5 @@ def test_openness_where_two_walls_meet(reach):
         place = np.stack([x, y, 0 * x], axis=1)
         truth = 1 - (polygon_irradiance(first, place, UP) + polygon_irradiance(second, place, UP)) / math.pi
     else:
-        truth = cornered_open_share(x, y, reach)
+        truth = cornered_ao(x, y, reach)
     assert_closed_form(traced_ao(quad_scene([a, b]), floor_places(x, y), reach, samples=256), truth)

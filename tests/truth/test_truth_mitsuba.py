@@ -74,21 +74,21 @@ def test_pictures(mi, name, estimator):
         path = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": 8})
         shape = (BATCHES, HEIGHT // BLOCK, BLOCK, WIDTH // BLOCK, BLOCK, 3)
         seen = [np.array(mi.render(theirs, integrator=path, spp=96, seed=1 + k)) for k in range(BATCHES)]
-        judge = batches(np.stack(seen).astype(float).reshape(shape).mean(axis=(2, 4)))
+        expected = batches(np.stack(seen).astype(float).reshape(shape).mean(axis=(2, 4)))
         own = []
         for k in range(BATCHES):
             estimate = new_estimate(WIDTH * HEIGHT, 3, 32)
             for _ in range(2):
                 radiance_pass(reference, estimate, camera, WIDTH, HEIGHT, estimator=estimator, seed=k)
             own.append(estimate.mean)
-    compare(batches(np.stack(own).reshape(shape).mean(axis=(2, 4))), judge, 0.01)
+    compare(batches(np.stack(own).reshape(shape).mean(axis=(2, 4))), expected, 0.01)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_irradiance(mi, name):
     from mitsuba_scene import mitsuba_scene
 
-    # A meter's rays never meet lights without area: lamps alone.
+    # A meter's rays never meet lights without area: emitters only.
     scene, reference = opened(name, lights=())
     camera, side, n_places = scene.cameras[0], 0.02, 64
     with reference:
@@ -101,7 +101,7 @@ def test_irradiance(mi, name):
         hits = first_hits(reference, np.array(camera.position), way / np.linalg.norm(way, axis=1)[:, None])
         flat = [i for i in np.flatnonzero(hits.lit) if _clear(reference, hits, i, side)]
         assert len(flat) >= 3
-        judge, own = [], []
+        expected, own = [], []
         sensors = {}
         place = np.zeros((len(flat), n_places, 3))
         normal = np.zeros_like(place)
@@ -134,12 +134,12 @@ def test_irradiance(mi, name):
                 np.array(mi.render(theirs, sensor=k, integrator=path, spp=20_000, seed=seed)).reshape(3)
                 for k in range(len(flat))
             ]
-            judge.append(seen)
+            expected.append(seen)
             estimate = new_estimate(len(flat), 3, n_places)
             for _ in range(128):
                 irradiance_pass(reference, estimate, place, normal, normal, seed=seed)
             own.append(estimate.mean)
-    compare(batches(np.array(own)), batches(np.array(judge, float)), 0.02)
+    compare(batches(np.array(own)), batches(np.array(expected, float)), 0.02)
 
 
 def _clear(reference, hits, i, side):

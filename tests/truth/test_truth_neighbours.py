@@ -10,23 +10,23 @@ from scenes import SceneBuilder
 from ztest import assert_unbiased
 
 
-def room_and_ground(sun, lamp=(1.0, 1.0, 1.0)):
+def room_and_ground(sun, bulb=(1.0, 1.0, 1.0)):
     """A closed room with a point light inside, beside a sunlit ground."""
     builder = SceneBuilder(96)
     white = builder.material(0.8)
     room = builder.box((0, 0, 0), (4, 2.5, 3), white, 12, inward=True)
-    builder.light("point", lamp, position=(1.0, 2.0, 1.2))
+    builder.light("point", bulb, position=(1.0, 2.0, 1.2))
     ground = builder.quad((8, 0, -3), (0, 0, 6), (6, 0, 0), white, (20, 20))
     builder.light("directional", sun, direction=(0.0, -1.0, 0.0))
     return builder, list(room.values()), ground
 
 
-@pytest.mark.parametrize("lamp", [(1.0, 1.0, 1.0), (1.0, 1e-5, 1e-2)])
-def test_the_sun_outside_does_not_end_the_solve_of_a_room(lamp):
+@pytest.mark.parametrize("bulb", [(1.0, 1.0, 1.0), (1.0, 1e-5, 1e-2)])
+def test_the_sun_outside_does_not_end_the_solve_of_a_room(bulb):
     """A closed room has the same light beside a ground a million million times as bright."""
     light = []
     for sun in (0.0, 1e3, 1e12):
-        builder, room, ground = room_and_ground(sun, lamp)
+        builder, room, ground = room_and_ground(sun, bulb)
         result = builder.bake()
         light.append(np.concatenate([wall.values(result).reshape(-1, 3) for wall in room]))
         np.testing.assert_allclose(ground.values(result), sun, rtol=1e-5)
@@ -35,19 +35,19 @@ def test_the_sun_outside_does_not_end_the_solve_of_a_room(lamp):
     for other in light[1:]:
         # The solve estimates the error of each patch at 3e-5; the estimate is no bound.
         np.testing.assert_allclose(other, light[0], rtol=2e-4)
-    colours = np.divide(light[0], lamp)
+    colours = np.divide(light[0], bulb)
     np.testing.assert_allclose(colours, colours[:, :1].repeat(3, axis=1), rtol=2e-4)
 
 
 def boxes(radiance):
-    """Closed rooms in a row, each with a lamp of this radiance."""
+    """Closed rooms in a row, each with an emitter of this radiance."""
     builder = SceneBuilder(96)
     floors = []
-    for k, glow in enumerate(radiance):
+    for k, emission in enumerate(radiance):
         white, at = builder.material(0.5), 2.5 * k
         walls = builder.box((at, 0, 0), (at + 2, 2, 2), white, 10, inward=True)
-        lamp = builder.material(0.0, glow)
-        builder.quad((at + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), lamp, (4, 4))
+        emitter = builder.material(0.0, emission)
+        builder.quad((at + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), emitter, (4, 4))
         floors.append(walls["-y"])
     return builder, floors
 
@@ -60,8 +60,8 @@ def noise(radiance, room, **settings):
 
 
 @pytest.mark.parametrize("bright", [1e4, 1e6])
-def test_bright_lamps_next_door_take_no_samples(bright):
-    """Noise and light of a room are those that it has alone, whatever shines behind its walls."""
+def test_bright_lights_next_door_take_no_samples(bright):
+    """Noise and light of a room do not depend on lights behind its walls."""
     alone, light = noise((1.0,), 0)
     for radiance, room in (((1.0, bright), 0), ((bright, 1.0, bright), 1)):
         beside, same = noise(radiance, room)
@@ -72,7 +72,7 @@ def test_bright_lamps_next_door_take_no_samples(bright):
 
 
 def test_light_through_a_keyhole_is_found():
-    """A hole of 8 cm lets the light of a lamp 10,000 times as bright into a room with a lamp of its own."""
+    """A hole of 8 cm lets light of an emitter 10,000 times as bright into a room with its own emitter."""
     builder = SceneBuilder(96)
     grey = builder.material(0.5)
     dim = builder.box((0, 0, 0), (2, 2, 2), grey, 12, inward=True)
@@ -90,9 +90,9 @@ def test_light_through_a_keyhole_is_found():
             up, along = (0, high[0] - low[0], 0), (0, 0, high[1] - low[1])
             edges = (along, up) if x == 2.0 else (up, along)
             builder.quad((x, *low), *edges, grey, (4, 4))
-    for k, glow in enumerate((1.0, 1e4)):
+    for k, emission in enumerate((1.0, 1e4)):
         builder.quad(
-            (2.6 * k + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), builder.material(0.0, glow), (4, 4)
+            (2.6 * k + 0.75, 1.9, 0.75), (0.5, 0, 0), (0, 0, 0.5), builder.material(0.0, emission), (4, 4)
         )
     for k, instance in enumerate(builder.instances):
         builder.instances[k] = replace(instance, mesh=k)

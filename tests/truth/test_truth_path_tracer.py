@@ -44,7 +44,7 @@ def barycentric(corner, point):
 
 
 def test_furnace_of_the_path_tracer_itself():
-    """The reference against a closed form: E = pi L / (1 - rho) in a glowing box."""
+    """The reference against a closed form: E = pi L / (1 - rho) in an emissive box."""
     builder = SceneBuilder(64)
     builder.box((0, 0, 0), (1, 2, 3), builder.material(0.5, 1.0), 8, inward=True)
     rng = np.random.default_rng(1)
@@ -83,7 +83,7 @@ def compared():
         face *= np.sign(np.linalg.det(matrix[:3, :3])) / np.linalg.norm(face)
         point, normal = weight @ world, np.tile(face, (PATHS, 1))
         # The floor under the boxes is dark; a bake fills it from around, and so the free part of a texel.
-        free[k] = not tracer.buried(point, normal).any()
+        free[k] = not tracer.inside_geometry(point, normal).any()
         value = tracer.irradiance(point, normal, rng)
         mean[k], error[k] = value.mean(axis=0), value.std(axis=0) / PATHS**0.5
     assert free.sum() > 45

@@ -20,9 +20,9 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 def room():
     walls = box_quads((0, 0, 0), (2, 2, 2), inward=True, material=grey(0.6))
-    lamp = Quad((0.7, 1.3, 1.9), (0.6, 0, 0), (0, -0.6, 0), grey(0, 5.0))
+    emitter = Quad((0.7, 1.3, 1.9), (0.6, 0, 0), (0, -0.6, 0), grey(0, 5.0))
     block = box_quads((0.3, 0.3, 0), (0.8, 0.8, 0.6), inward=False, material=grey(0.4))
-    scene = quad_scene([*walls, lamp, *block])
+    scene = quad_scene([*walls, emitter, *block])
     return replace(scene, lights=(PunctualLight("point", "p", 0, (0.3, 0.3, 0.3), (1.6, 0.4, 1.0)),))
 
 
@@ -36,7 +36,7 @@ def test_estimators_agree_pairwise():
     bound = critical(len(pairs), 23 * 16)
     for a, b in pairs:
         assert abs(mean[a] - mean[b]) < bound * math.hypot(error[a], error[b]), f"{a} and {b}"
-    # The test can see one percent with all those that aim at lamps.
+    # The test can see one percent with all those that aim at emitters.
     for name, how in ESTIMATORS.items():
         assert error[name] < (0.01 if how.aim else 0.04) * mean[name], name
 
@@ -44,15 +44,15 @@ def test_estimators_agree_pairwise():
 @pytest.mark.parametrize("power", ["mis", "mis-power"])
 @pytest.mark.parametrize(("half", "height"), [(0.5, 0.1), (0.05, 1.9), (0.5, 0.6)])
 def test_mis_is_never_much_worse_than_either_part(power, half, height):
-    # A large lamp close by favours rays by chance, a small one far away aiming. Half of it is hidden: without
-    # any variance of either part there is nothing to compare.
-    lamp = Quad((-half, half, height), (2 * half, 0, 0), (0, -2 * half, 0), grey(0, 1.0))
+    # A large emitter close by favours BSDF samples, a small one far away light samples. Half of it is hidden,
+    # so that both parts have variance.
+    emitter = Quad((-half, half, height), (2 * half, 0, 0), (0, -2 * half, 0), grey(0, 1.0))
     screen = Quad((0, -2, 0.9 * height), (4, 0, 0), (0, 4, 0), grey(0, double_sided=True))
     points = np.random.default_rng(3).uniform((-0.1, -0.1, 0), (0.1, 0.1, 0), (256, 3)) * (half, 1, 1)
     where = copies_of(points, copies=1)
     variance = {}
     for name in (power, "light", "bsdf"):
-        scene = quad_scene([lamp, screen])
+        scene = quad_scene([emitter, screen])
         found = traced(scene, where, estimator=name, passes=128, samples=4, stratify=False)
         variance[name] = float((found.standard_error**2).mean())
     assert variance[power] <= 1.1 * min(variance["light"], variance["bsdf"])

@@ -12,31 +12,31 @@ SEEDS = 6
 UP = (0.0, 1.0, 0.0)
 
 
-def lamp_over_floor(double_sided, face_down, **settings):
-    """A lamp of 1 x 1 m one metre above a floor of 2 x 2 m: the floor's texels."""
+def emitter_over_floor(double_sided, face_down, **settings):
+    """An emitter of 1 x 1 m one metre above a floor of 2 x 2 m: the floor's texels."""
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
     edges = ((1, 0, 0), (0, 0, 1)) if face_down else ((0, 0, 1), (1, 0, 0))
-    lamp = builder.quad((-0.5, 1, -0.5), *edges, builder.material(0.5, 10.0, double_sided=double_sided))
-    assert lamp.normal[1] == (-1 if face_down else 1)
+    emitter = builder.quad((-0.5, 1, -0.5), *edges, builder.material(0.5, 10.0, double_sided=double_sided))
+    assert emitter.normal[1] == (-1 if face_down else 1)
     return floor, builder
 
 
-def test_one_sided_lamp_is_dark_behind():
-    floor, builder = lamp_over_floor(False, face_down=False)
+def test_one_sided_emitter_is_dark_behind():
+    floor, builder = emitter_over_floor(False, face_down=False)
     assert (floor.values(builder.bake(sky="0")) == 0).all()
 
 
 @pytest.mark.parametrize(("double_sided", "face_down"), [(False, True), (True, True), (True, False)])
-def test_lamp_shines_from_its_front_and_from_both_if_double_sided(double_sided, face_down):
+def test_emitter_shines_from_its_front_and_from_both_if_double_sided(double_sided, face_down):
     found = []
     for seed in range(SEEDS):
-        floor, builder = lamp_over_floor(double_sided, face_down)
+        floor, builder = emitter_over_floor(double_sided, face_down)
         found.append(floor.values(builder.bake(seed=seed))[..., 0])
     square = [(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)]
     truth = 10.0 * floor.texel_mean(lambda p: polygon_irradiance(square, p, UP))
     assert_unbiased([f.mean(axis=0) for f in found], truth.mean(axis=0), least=0.01)
-    # 64 light rays a texel, each seeing the lamp: stratified noise under 5 %.
+    # 64 light rays a texel, each seeing the emitter: stratified noise under 5 %.
     assert np.abs(np.mean(found, axis=0) / truth - 1).max() < 0.05
 
 
@@ -71,7 +71,7 @@ def test_wall_reflects_what_reaches_it_on_a_side_that_reflects(double_sided, lit
 
 
 def test_double_sided_sheet_in_a_furnace_changes_nothing():
-    """A thin glowing sheet of the walls' own albedo in a furnace: still E = pi L / (1 - rho) everywhere."""
+    """A thin emissive sheet of the walls' own albedo in a furnace: still E = pi L / (1 - rho) everywhere."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)

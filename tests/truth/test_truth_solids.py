@@ -1,4 +1,4 @@
-"""A crate in a slab: whatever materials say of sides, its foot has the light of the open."""
+"""A crate in a slab: texels at its foot are unoccluded, double-sided or not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The integrating sphere: E_indirect = Phi / (4 pi r^2) rho / (1 - rho), wherever the light stands."""
+"""The integrating sphere: E_indirect = Phi / (4 pi r^2) rho / (1 - rho), for any position of the light."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def test_series_scene_is_a_closed_room_whose_faces_and_normals_agree(blobs):
         size = np.linalg.norm(face, axis=1) * np.linalg.norm(shading, axis=1)
         cosine = (face * shading).sum(axis=1) / size
         assert cosine.min() > 0.8, mesh.name
-        # A closed surface's area vectors cancel; the signed volume tells inside from outside.
+        # A closed surface's area vectors cancel; the sign of the volume gives the orientation.
         volume[mesh.name] = (np.cross(corner[:, 0], corner[:, 1]) * corner[:, 2]).sum() / 6
         if mesh.name != "lamp":
             np.testing.assert_allclose(face.sum(axis=0), 0, atol=1e-4)
@@ -96,6 +96,6 @@ def test_rates_of_a_tiny_bake_stand_beside_bare_ones():
     assert found["triangles"] == 32
     assert found["stages"]["final gather"]["rays"] == 4 * found["texels"]
     for kind, loops in found["bare"].items():
-        assert set(loops) == ({"ready"} if kind == "towards lamps" else {"ready", "made"})
+        assert set(loops) == ({"ready"} if kind == "towards emitters" else {"ready", "made"})
         assert min(loops.values()) > 0
     assert {stage["beside"] for stage in found["stages"].values()} <= set(found["bare"])

@@ -119,13 +119,13 @@ def named(name: str) -> bytes:
 
 
 def painted(grey: float) -> bytes:
-    """Return a square with vertex colours, black but for one corner of that grey."""
+    """Return a square with vertex colours, black except for one corner of that grey."""
     colour = np.zeros((4, 3), np.float32)
     colour[2] = grey
     return scene(quad(COLOR_0=colour))
 
 
-def glowing(colour: int) -> bytes:
+def emissive(colour: int) -> bytes:
     """Return a floor whose emissive texture has one grey."""
 
     def add(builder: GltfBuilder) -> None:
@@ -186,7 +186,7 @@ FLIPPED[0] = FLIPPED[0, ::-1]
 ROD, ROD_TRIANGLE = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.019, 0]]), np.int64([[0, 1, 2]])
 WIDE = np.float32([[0, 0, 0], [8, 0, 0], [8, 1, 0], [0, 1, 0]])
 SMALL = np.float32(FLOOR * 0.5 + [0, 0.5, 0])
-LAMP = {**GREY, "emissiveFactor": [1, 1, 1]}
+EMITTER = {**GREY, "emissiveFactor": [1, 1, 1]}
 CEILING = np.float32(FLOOR[::-1] * 0.25 + [0, 2, 0])
 
 CASES: dict[str, Case] = {
@@ -306,7 +306,7 @@ CASES: dict[str, Case] = {
         scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 1.5},)),
         scene(floor(), materials=({**GREY, "alphaMode": "MASK", "alphaCutoff": 0.5},)),
     ),
-    "emissive-black": Case(glowing(0), glowing(1)),
+    "emissive-black": Case(emissive(0), emissive(1)),
     "sun-below": Case(scene(floor(), lights=(sun(UP),)), scene(floor(), lights=(sun(DOWN),))),
     "all-black": Case(
         scene(floor(), lights=(point(1, (0, -2, 0)),)), scene(floor(), lights=(point(1, (0, 2, 0)),))
@@ -316,8 +316,8 @@ CASES: dict[str, Case] = {
     ),
     "light-levels": Case(scene(floor(), lights=(point(1),)), scene(floor())),
     "emitter-unseen": Case(
-        scene(floor(), (CEILING[::-1], QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, LAMP)),
-        scene(floor(), (CEILING, QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, LAMP)),
+        scene(floor(), (CEILING[::-1], QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, EMITTER)),
+        scene(floor(), (CEILING, QUAD_TRIANGLE, {}, {}, 1), materials=(GREY, EMITTER)),
     ),
     "cost": Case(scene(floor()), scene((FLOOR, [[0, 0, 0]]))),
     "file-note": Case(

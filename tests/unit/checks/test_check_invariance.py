@@ -15,14 +15,14 @@ from baker.core.settings import BakeSettings
 
 # A mesh with a bit of everything: two boxes stuck together, one inside out, one with a hole, a flipped
 # face, a face without area, a double, a sliver.
-NEEDLE = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.0004, 0]])
+SLIVER = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.0004, 0]])
 PARTS = [
     (CUBE, CUBE_TRIANGLE),
     (CUBE * 0.5 + np.float32([0.7, 0.3, 0.2]), CUBE_TRIANGLE),
     (CUBE + np.float32([5, 0, 0]), CUBE_TRIANGLE[:, ::-1]),
     (BOX + np.float32([9, 0, 0]), BOX_TRIANGLE[1:]),
     (GRID + np.float32([0, 5, 0]), FLIPPED),
-    (NEEDLE + np.float32([3, 3, 3]), [[0, 1, 2]]),
+    (SLIVER + np.float32([3, 3, 3]), [[0, 1, 2]]),
     (GRID[:3] + np.float32([0, -3, 0]), [[0, 1, 1]]),
     (CUBE[:3] + np.float32([0, 0, 4]), [[0, 1, 2], [2, 0, 1]]),
 ]

@@ -1,4 +1,4 @@
-"""What `check` knows of emissive textures: means over what triangles show, and where on them the light is."""
+"""Emissive textures in `check`: means over the visible part of a texture, and the position of its light."""
 
 from __future__ import annotations
 
@@ -25,10 +25,12 @@ def context(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
     Image.fromarray(image).save(stream, "PNG")
     builder = GltfBuilder()
     texture = builder.image(stream.getvalue())
-    lamp = builder.add("materials", {"emissiveFactor": [1, 1, 0.5], "emissiveTexture": {"index": texture}})
+    emissive = builder.add(
+        "materials", {"emissiveFactor": [1, 1, 0.5], "emissiveTexture": {"index": texture}}
+    )
     grey = builder.add("materials", {})
     for position, normal, triangle, material in (
-        (QUAD, QUAD_NORMAL, QUAD_TRIANGLE, lamp),
+        (QUAD, QUAD_NORMAL, QUAD_TRIANGLE, emissive),
         (QUAD + np.float32([0, 0, 1]), -QUAD_NORMAL, QUAD_TRIANGLE[:, ::-1], grey),
     ):
         made = builder.primitive(

@@ -21,7 +21,7 @@ CEILING = Quad((0, 0, 3), (0, 2, 0), (4, 0, 0))
 
 
 def plain_atlas(scene):
-    """Lightmap uv that nobody reads."""
+    """Lightmap uv that is not used."""
     layouts = []
     for k, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
@@ -119,7 +119,7 @@ def test_a_moved_and_mirrored_object_is_compared_with_itself():
     np.testing.assert_allclose(found.at(sides.b, "position"), expected, atol=1e-6)
 
 
-def test_names_decide_where_nodes_were_numbered_anew():
+def test_names_decide_where_nodes_were_numbered_again():
     scene = quad_scene([FLOOR, CEILING])
     turned = [replace(scene.instances[1], node=0), replace(scene.instances[0], node=1)]
     pairs = pair_objects(scene, replace(scene, instances=tuple(turned)))

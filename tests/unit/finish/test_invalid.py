@@ -40,7 +40,7 @@ def test_no_value_crosses_into_another_chart_and_nan_does_not_survive():
     assert (filled[:, 6:] == 100.0).all()
 
 
-def test_each_side_of_a_buried_strip_keeps_its_own_light():
+def test_each_side_of_a_strip_inside_geometry_keeps_its_own_light():
     chart = np.zeros((20, 21), np.int32)
     valid = np.ones(chart.shape, bool)
     valid[:, 7:14] = False

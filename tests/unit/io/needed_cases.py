@@ -133,7 +133,7 @@ TARGET = FIRST["targets"][0]
 POSITION_VIEW = DOCUMENT["accessors"][FIRST["attributes"]["POSITION"]]["bufferView"]
 SKIN = DOCUMENT["skins"][0]
 
-# Changes after which the file bakes as if nothing were wrong, and says nothing.
+# Changes that affect neither the bake nor its warnings.
 SILENT = {
     "unused mesh is no object": at("meshes.1", 5),
     "unused mesh without primitives": at("meshes.1.primitives", ...),
@@ -190,7 +190,7 @@ SILENT = {
     "number beyond doubles in extras": at("extras", {"far": float("inf")}),
 }
 
-# Changes that are told by a warning of this code, and change nothing of the bake.
+# Changes that give a warning of this code and do not affect the bake.
 WARNED = {
     "missing normal map": (at("images.1", GONE), "missing-texture", "normalTexture"),
     "missing metallic-roughness map": (at("images.2", GONE), "missing-texture", "metallicRoughnessTexture"),

@@ -1,4 +1,4 @@
-"""The order of work: slots, memory, threads, failures, locks; with a bakery that bakes nothing."""
+"""The order of work: slots, memory, threads, failures, locks; with an executor that bakes nothing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from baker.jobs.jobs_file import Job
 from baker.jobs.run import BatchOptions, batch_json, run_batch, write_junit
 
 
-class FakeBakery:
+class FakeExecutor:
     """Ends jobs first in, first out; writes a file instead of a bake."""
 
     def __init__(self, slots, failing=()):
@@ -62,33 +62,33 @@ def states(outcomes):
 
 
 def test_all_in_order_within_slots_and_threads_shared(jobs, tmp_path):
-    bakery = FakeBakery(2)
-    found = run_batch(jobs, bakery, BatchOptions(threads=4), silent)
+    executor = FakeExecutor(2)
+    found = run_batch(jobs, executor, BatchOptions(threads=4), silent)
     assert states(found) == "bbbbbb"
-    assert (bakery.log, bakery.most, bakery.closed) == (list("abcdef"), 2, True)
-    assert bakery.threads == dict.fromkeys("abcdef", 2)
+    assert (executor.log, executor.most, executor.closed) == (list("abcdef"), 2, True)
+    assert executor.threads == dict.fromkeys("abcdef", 2)
     assert [o.job for o in found] == jobs
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == list("abcdef"), "no lock is left"
 
 
 def test_a_job_alone_gets_all_threads_and_its_own_limit_counts(jobs):
-    bakery = FakeBakery(3)
-    run_batch(jobs[:1], bakery, BatchOptions(threads=6), silent)
+    executor = FakeExecutor(3)
+    run_batch(jobs[:1], executor, BatchOptions(threads=6), silent)
     own = [Job(jobs[1].scene, jobs[1].out, BakeSettings(threads=1))]
-    run_batch(own, bakery, BatchOptions(threads=6), silent)
-    assert bakery.threads == {"a": 6, "b": 1}
+    run_batch(own, executor, BatchOptions(threads=6), silent)
+    assert executor.threads == {"a": 6, "b": 1}
 
 
 def test_failures_do_not_stop_the_others(jobs):
-    found = run_batch(jobs, FakeBakery(2, failing="b"), BatchOptions(), silent)
+    found = run_batch(jobs, FakeExecutor(2, failing="b"), BatchOptions(), silent)
     assert states(found) == "bfbbbb"
     assert (found[1].code, found[1].why) == (3, "x: it is broken")
 
 
 def test_fail_fast_starts_nothing_more(jobs, tmp_path):
-    bakery = FakeBakery(2, failing="b")
-    found = run_batch(jobs, bakery, BatchOptions(fail_fast=True), silent)
-    assert bakery.log == list("abc"), "c ran beside b and is finished"
+    executor = FakeExecutor(2, failing="b")
+    found = run_batch(jobs, executor, BatchOptions(fail_fast=True), silent)
+    assert executor.log == list("abc"), "c ran beside b and is finished"
     assert states(found) == "bfbfff"
     assert "not run" in found[3].why
     assert not (tmp_path / "out" / "d").exists()
@@ -97,28 +97,28 @@ def test_fail_fast_starts_nothing_more(jobs, tmp_path):
 def test_memory_is_shared_and_what_never_fits_is_refused(jobs, monkeypatch):
     need = dict(zip("abcdef", (5, 5, 5, 20, 1, 5), strict=True))
     monkeypatch.setattr(memory, "estimate_peak", lambda scene, settings: need[scene.stem])
-    bakery = FakeBakery(3)
-    found = run_batch(jobs, bakery, BatchOptions(memory=10), silent)
+    executor = FakeExecutor(3)
+    found = run_batch(jobs, executor, BatchOptions(memory=10), silent)
     assert states(found) == "bbbfbb"
     assert found[3].code == 4
     assert "20" in found[3].why
     assert "`memory` 10" in found[3].why
-    assert bakery.most == 2
-    assert sorted(bakery.log) == list("abcef")
+    assert executor.most == 2
+    assert sorted(executor.log) == list("abcef")
 
 
 def test_dry_run_touches_nothing(jobs, tmp_path):
-    bakery = FakeBakery(1)
+    executor = FakeExecutor(1)
     before = sorted(tmp_path.rglob("*"))
-    found = run_batch(jobs, bakery, BatchOptions(dry_run=True), silent)
+    found = run_batch(jobs, executor, BatchOptions(dry_run=True), silent)
     assert states(found) == "bbbbbb"
     assert found[0].why == "not baked yet"
-    assert bakery.log == []
+    assert executor.log == []
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_an_output_that_another_run_holds_comes_later(jobs):
-    bakery = FakeBakery(1)
+    executor = FakeExecutor(1)
     lock = OutputLock(jobs[0].out)
     assert lock.acquire()
     waited = []
@@ -128,8 +128,8 @@ def test_an_output_that_another_run_holds_comes_later(jobs):
             waited.append(detail)
             lock.release()
 
-    found = run_batch(jobs[:3], bakery, BatchOptions(), progress)
-    assert bakery.log == list("bca")
+    found = run_batch(jobs[:3], executor, BatchOptions(), progress)
+    assert executor.log == list("bca")
     assert states(found) == "bbb"
     assert waited
 
@@ -137,14 +137,14 @@ def test_an_output_that_another_run_holds_comes_later(jobs):
 def test_scenes_that_cannot_be_read_fail_alone(jobs, tmp_path):
     (tmp_path / "a.glb").write_bytes(b"glTF")
     (tmp_path / "b.glb").unlink()
-    found = run_batch(jobs[:3], FakeBakery(1), BatchOptions(), silent)
+    found = run_batch(jobs[:3], FakeExecutor(1), BatchOptions(), silent)
     assert states(found) == "ffb"
     assert [o.code for o in found] == [3, 3, 0]
     assert "does not exist" in found[1].why
 
 
-def test_cancelling_closes_the_bakery_and_frees_the_locks(jobs, tmp_path):
-    bakery = FakeBakery(2)
+def test_cancelling_closes_the_executor_and_frees_the_locks(jobs, tmp_path):
+    executor = FakeExecutor(2)
     told = []
 
     def progress(stage, fraction, detail=""):
@@ -152,13 +152,13 @@ def test_cancelling_closes_the_bakery_and_frees_the_locks(jobs, tmp_path):
         return len(told) > len(jobs) + 2
 
     with pytest.raises(Cancelled):
-        run_batch(jobs, bakery, BatchOptions(), progress)
-    assert bakery.closed
+        run_batch(jobs, executor, BatchOptions(), progress)
+    assert executor.closed
     assert list(tmp_path.rglob(".*")) == []
 
 
 def test_json_and_junit_say_the_same(jobs, tmp_path):
-    found = run_batch(jobs[:2], FakeBakery(1, failing="b"), BatchOptions(), silent)
+    found = run_batch(jobs[:2], FakeExecutor(1, failing="b"), BatchOptions(), silent)
     rows = batch_json(found, dry_run=False)["jobs"]
     assert [set(row) for row in rows] == [{"scene", "out", "state", "seconds", "why"}] * 2
     assert [row["state"] for row in rows] == ["baked", "failed"]

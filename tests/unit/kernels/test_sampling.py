@@ -143,7 +143,7 @@ def test_a_sample_is_uniform_over_texels(shared):
         # Inside the shared cell.
         numbers = numbers * 8 % 1
     tables = [uniform_table(*numbers[:, s].T, 8) for s in range(len(net))]
-    # Neighbours in the list know nothing of each other.
+    # Neighbours in the list are independent.
     for step in (1, 2, 16):
         for s in (0, 7):
             for a in range(2):

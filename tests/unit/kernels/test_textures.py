@@ -120,7 +120,7 @@ def test_albedo_is_the_mean_over_the_points(painted):
             if k < 2:
                 u, v = transform[k] @ [*(share @ mesh.texcoord[0][source]), 1.0]
                 image_area = abs(np.linalg.det(transform[k][:, :2]))
-                # A quad takes 10.4 x 10.4 texels; one of 16 points stands for a sixteenth of a texel.
+                # A quad takes 10.4 x 10.4 texels; each of 16 points represents a sixteenth of a texel.
                 footprint = np.sqrt(image_area / 10.4**2 / N_POINTS)
                 width = max(levels[k][0].shape[:2])
                 n = int(np.floor(np.log2(max(footprint * width, 1)) + 0.5))

@@ -46,9 +46,9 @@ def check_work(calls):
 
 def test_many_quads_with_many_repeats(calls):
     image = sparks(512, 512)
-    lamp = Material(base_colour=(0, 0, 0, 1), emission=(1, 1, 1), emission_texture=Texture(image))
+    emitter = Material(base_colour=(0, 0, 0, 1), emission=(1, 1, 1), emission_texture=Texture(image))
     place = [(0.4 * (k % 15), 1.5, 0.4 * (k // 15)) for k in range(225)]
-    world = quad_world([Quad(p, (0.15, 0, 0), (0, 0, 0.15), lamp) for p in place])
+    world = quad_world([Quad(p, (0.15, 0, 0), (0, 0, 0.15), emitter) for p in place])
     shading = world.shading._replace(emission_uv=world.shading.emission_uv * np.float32(10))
     calls.clear()
     emitters = build_emitters(world.geometry, shading)

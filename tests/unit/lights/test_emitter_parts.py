@@ -27,7 +27,7 @@ emitted_radiance, emitter_at, emitter_density = compiled(emitted_radiance, emitt
 on_triangle, sample_emitter = compiled(on_triangle, sample_emitter)
 
 
-def glowing(image, emission=(1.0, 1.0, 1.0), **how):
+def emissive(image, emission=(1.0, 1.0, 1.0), **how):
     rgba = np.ones((*image.shape[:2], 4), np.float32)
     rgba[..., :3] = image
     return Material(base_colour=(0, 0, 0, 1), emission=emission, emission_texture=Texture(rgba, **how))
@@ -60,7 +60,7 @@ def plate(material, far=0.0):
 @pytest.mark.parametrize("image", [one_texel(), one_texel(33, 0, 32), blobs()])
 def test_power_is_that_of_the_texture(image, nearest):
     emission = (3.0, 1.0, 0.25)
-    emitters = plate(glowing(image, emission, nearest=nearest)).emitters
+    emitters = plate(emissive(image, emission, nearest=nearest)).emitters
     truth = np.pi * 2.0 * (image.reshape(-1, 3).astype(float).mean(axis=0) * emission).mean()
     assert emitters.power.sum() == pytest.approx(truth, rel=1e-6)
     assert len(emitters.row) < MOST_PARTS
@@ -69,7 +69,7 @@ def test_power_is_that_of_the_texture(image, nearest):
 @pytest.mark.parametrize("far", [0.0, 300.0])
 @pytest.mark.parametrize("image", [one_texel(), blobs()])
 def test_a_hit_finds_the_part_that_is_there(image, far):
-    world = plate(glowing(image), far)
+    world = plate(emissive(image), far)
     emitters = world.emitters
     rng = np.random.default_rng(1)
     seen = 0
@@ -101,32 +101,32 @@ def test_a_hit_finds_the_part_that_is_there(image, far):
 
 
 def test_parts_do_not_overlap_and_leave_out_what_is_black():
-    emitters = plate(glowing(blobs())).emitters
+    emitters = plate(emissive(blobs())).emitters
     whole = emitters.row[:, INSIDE + 2].astype(float) ** 2
     assert whole[emitters.triangle == 0].sum() == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(emitters.row[:, AREA], whole, rtol=1e-5)
-    lit = plate(glowing(one_texel())).emitters.row
+    lit = plate(emissive(one_texel())).emitters.row
     # A bilinear texel reaches over a part of three by three, which is how closely parts follow it.
     assert 4 / 4096 <= lit[:, AREA].sum() / 2 <= 9 / 4096
 
 
 def test_sampled_points_lie_where_their_density_says():
-    world = plate(glowing(blobs()), 300.0)
-    lamps = tile_emitters(world.emitters, np.full((1, 16, 3), [0.5, -1, 0.5], np.float32))
+    world = plate(emissive(blobs()), 300.0)
+    chosen = tile_emitters(world.emitters, np.full((1, 16, 3), [0.5, -1, 0.5], np.float32))
     rng, point, out = np.random.default_rng(0), np.zeros(3, np.float32), np.zeros(4)
     found = np.zeros(3)
-    n, choice = 20000, (lamps.row, lamps.first, lamps.chance, lamps.cumulative)
+    n, choice = 20000, (chosen.row, chosen.first, chosen.chance, chosen.cumulative)
     for u, v in rng.random((n, 2), np.float32):
         m, density, b1, b2 = sample_emitter(*choice, u, v, point)
-        a1, a2 = on_triangle(lamps.row, m, b1, b2)
+        a1, a2 = on_triangle(chosen.row, m, b1, b2)
         # On a part's edge it may be either side.
         if min(b1, b2, 1 - b1 - b2) > 1e-4:
-            assert emitter_at(lamps.node, int(world.emitters.root[lamps.triangle[m]]), a1, a2) == m
-        corner = world.geometry.position[world.geometry.triangle[lamps.triangle[m]]].astype(float)
+            assert emitter_at(chosen.node, int(world.emitters.root[chosen.triangle[m]]), a1, a2) == m
+        corner = world.geometry.position[world.geometry.triangle[chosen.triangle[m]]].astype(float)
         np.testing.assert_allclose(point, corner.T @ [1 - a1 - a2, a1, a2], atol=1e-6)
-        out[:3] = lamps.row[m, RADIANCE : RADIANCE + 3]
-        if lamps.row[m, TEXTURED] > 0:
-            emitted_radiance(world.shading, lamps.triangle[m], a1, a2, out)
+        out[:3] = chosen.row[m, RADIANCE : RADIANCE + 3]
+        if chosen.row[m, TEXTURED] > 0:
+            emitted_radiance(world.shading, chosen.triangle[m], a1, a2, out)
         found += out[:3] / density / n
     truth = 2.0 * blobs().reshape(-1, 3).mean(axis=0)
     np.testing.assert_allclose(found, truth, rtol=0.02)
@@ -135,7 +135,7 @@ def test_sampled_points_lie_where_their_density_says():
 def test_a_palette_texture_costs_nothing():
     """All corners in one colour's cell: one row a triangle, which shines with that colour."""
     image = blobs(8)
-    world = plate(glowing(image))
+    world = plate(emissive(image))
     shading = world.shading._replace(emission_uv=np.full_like(world.shading.emission_uv, 3.5 / 8))
     emitters = build_emitters(world.geometry, shading)
     assert len(emitters.row) == 2
@@ -143,8 +143,8 @@ def test_a_palette_texture_costs_nothing():
     np.testing.assert_allclose(emitters.row[:, RADIANCE : RADIANCE + 3], [image[3, 3]] * 2, rtol=1e-6)
 
 
-def test_a_dim_lamp_is_cut_as_finely_beside_a_bright_one():
-    faint, bright = glowing(one_texel(), (1e-3,) * 3), glowing(blobs(200), (1e6,) * 3)
+def test_a_dim_emitter_is_cut_as_finely_beside_a_bright_one():
+    faint, bright = emissive(one_texel(), (1e-3,) * 3), emissive(blobs(200), (1e6,) * 3)
     emitters = quad_world(
         [Quad((0, 1, 0), (2, 0, 0), (0, 0, 1), faint), Quad((9, 1, 0), (2, 0, 0), (0, 0, 1), bright)]
     ).emitters
@@ -156,7 +156,7 @@ def test_a_dim_lamp_is_cut_as_finely_beside_a_bright_one():
 def test_more_lit_texels_than_parts_keep_their_power():
     """Two hundred repeats of a texture with one lit texel of 64 x 64: parts shine with their means."""
     image = one_texel()
-    world = plate(glowing(image, (8.0,) * 3))
+    world = plate(emissive(image, (8.0,) * 3))
     shading = world.shading._replace(emission_uv=world.shading.emission_uv * np.float32(200))
     emitters = build_emitters(world.geometry, shading, 2000)
     assert len(emitters.row) <= 2002
@@ -165,9 +165,9 @@ def test_more_lit_texels_than_parts_keep_their_power():
     assert emitters.row[:, RADIANCE].max() < 5 * 8 / 4096
 
 
-def test_many_parts_leave_other_lamps_their_clusters():
+def test_many_parts_leave_other_emitters_their_clusters():
     near = [Quad((0.2 * k, 0, 3), (0.1, 0, 0), (0, 0, 0.1), grey(0, 1.0)) for k in range(100)]
-    screen = Quad((0, 1, 0), (2, 0, 0), (0, 0, 1), glowing(np.random.default_rng(0).random((64, 64, 3))))
+    screen = Quad((0, 1, 0), (2, 0, 0), (0, 0, 1), emissive(np.random.default_rng(0).random((64, 64, 3))))
     emitters = quad_world([screen, *near], size=64).emitters
     assert (emitters.triangle < 2).sum() > 1000
     cluster = emitters.row[emitters.triangle >= 2, 16]

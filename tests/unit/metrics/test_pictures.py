@@ -87,7 +87,7 @@ def test_texels_that_stand_out():
     page[0, 70, 80:82] = 40.0
     found = outlier_texels(page, ALL, 2)
     np.testing.assert_array_equal(found, [20 * SIZE + 30, 50 * SIZE + 60])
-    # Two that are wrong side by side excuse each other; beside texels without value nothing is told.
+    # Two wrong neighbours mask each other; beside texels without value nothing is reported.
     hole = ALL[0].copy()
     hole[21, 30] = False
     score = outlier_factor(page[0, ..., 0].astype(np.float64), hole)

@@ -95,7 +95,7 @@ def test_packets_followed_as_one_meet_the_same(under_cards, monkeypatch, distanc
 
 
 def test_a_point_is_the_same_in_any_company(under_cards):
-    """Its numbers are its own, whoever shares its packets; few points are packets of their own."""
+    """The estimate of a point does not depend on its packet; few points are packets of their own."""
     reference, position = under_cards
     together = opened(reference, position, 1.0)
     alone = opened(reference, position[:21], 1.0)

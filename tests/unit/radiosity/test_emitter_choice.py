@@ -14,14 +14,14 @@ from baker.trace.packets import new_packet_buffers
 
 
 def world_of(radiance, wall=True, texels=16):
-    """A floor under two lamps 4 m apart, with a wall between them."""
+    """A floor under two emitters 4 m apart, with a wall between them."""
     builder = SceneBuilder(64)
     grey = builder.material(0.5, double_sided=True)
     floors = [builder.quad((x, 0, 0), (0, 0, 2), (2, 0, 0), grey, (texels, texels)) for x in (0.0, 4.0)]
     if wall:
         builder.quad((3, -1, -9), (0, 0, 20), (0, 20, 0), grey, (4, 4))
-    for x, glow in zip((0.75, 4.75), radiance, strict=True):
-        builder.quad((x, 1.5, 0.75), (0.5, 0, 0), (0, 0, 0.5), builder.material(0.0, glow), (2, 2))
+    for x, emission in zip((0.75, 4.75), radiance, strict=True):
+        builder.quad((x, 1.5, 0.75), (0.5, 0, 0), (0, 0, 0.5), builder.material(0.0, emission), (2, 2))
     return prepared(builder)[0], floors
 
 
@@ -51,7 +51,7 @@ def test_hidden_clusters_are_set_apart_and_the_rest_is_as_if_alone(bright):
         assert choice.seen.chance.sum() == pytest.approx(1.0)
         assert len(choice.seen.chance) == own.sum()
         np.testing.assert_array_equal(choice.found.apart, ~own)
-        # Rays that find a cluster know how often samples do.
+        # Rays that hit a cluster use the density of its samples.
         assert choice.found.chance[own].sum() == pytest.approx(1.0)
         assert choice.found.chance[~own].sum() == pytest.approx(chooser.n_hidden / chooser.n_light)
         assert (choice.found.cumulative == 1.0).all()
@@ -92,7 +92,7 @@ def test_a_tile_over_two_rooms_falls_into_parts():
     assert sum(choice.hidden is not None for choice in made) >= 2
 
 
-def test_one_lamp_of_several_triangles_is_no_choice():
+def test_one_emitter_of_several_triangles_is_no_choice():
     builder = SceneBuilder(32)
     builder.quad((0, 0, 0), (0, 0, 2), (2, 0, 0), builder.material(0.5), (8, 8))
     builder.quad((0.5, 1, 0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 1.0), (4, 4))

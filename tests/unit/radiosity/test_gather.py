@@ -36,7 +36,7 @@ REACH = 0.7
 
 @pytest.fixture(scope="module")
 def room():
-    """A room without a ceiling, a lamp that hangs in it, a two-sided board and a crate."""
+    """A room without a ceiling, an emitter that hangs in it, a two-sided board and a crate."""
     quads = [q for k, q in enumerate(box_quads((0, 0, 0), (2, 1.5, 2), inward=True)) if k != 3]
     quads += [
         Quad((0.5, 1.2, 0.6), (0.6, 0, 0), (0, 0, 0.5), grey(0.1, 4.0)),
@@ -55,7 +55,7 @@ def rays_of(room):
     origin, normal = points_of(room.surface, room.free, np.arange(begin, end))
     exitance = np.random.default_rng(0).random((room.texels.n, 4), np.float32)
     truth = np.zeros((end - begin, N_COLUMNS))
-    lamps = tile_emitters(room.emitters, origin)
+    emitters = tile_emitters(room.emitters, origin)
     corner = room.geometry.uv[room.geometry.triangle]
     entry_at = room.texels.hit_image(np.arange(room.texels.n), -1)
     seeds = np.zeros(32, np.uint32)
@@ -82,7 +82,7 @@ def rays_of(room):
                         direction @ normal[i, k],
                         abs(direction @ room.geometry.face_normal[prim]),
                     )
-                    area = float(emitter_density(lamps.row, lamps.chance, lamps.cumulative, m))
+                    area = float(emitter_density(emitters.row, emitters.chance, emitters.cumulative, m))
                     by_light, by_cosine = n_light * area * t * t / facing, n_samples * cosine / np.pi
                     got = radiance * by_cosine / (by_light + by_cosine)
                 b1, b2 = naive.barycentric(
@@ -98,18 +98,18 @@ def rays_of(room):
             truth[i, INDIRECT : INDIRECT + 3] += indirect * np.pi / n_samples
             batch[k] += (got + indirect).sum() * np.pi / n_samples
         truth[i, SQUARE] = (batch**2).sum()
-    return net, shared, begin, origin, normal, seen_light(room.texels, exitance), lamps, n_light, truth
+    return net, shared, begin, origin, normal, seen_light(room.texels, exitance), emitters, n_light, truth
 
 
 def test_gather_is_the_sum_over_its_rays(room, rays_of):
-    net, shared, begin, origin, normal, exitance, lamps, n_light, truth = rays_of
+    net, shared, begin, origin, normal, exitance, emitters, n_light, truth = rays_of
     ours = np.zeros((len(origin), N_COLUMNS), np.float32)
     gather(
         origin,
         normal,
         room.table,
         exitance,
-        lamps,
+        emitters,
         room.shading,
         new_packet_buffers(room.rays.tracer),
         begin,
@@ -195,15 +195,15 @@ def rectangle_irradiance(point, normal, corners):
     return abs(total) / 2
 
 
-LAMP = (0.3, 0.4, 0.3), (0.5, 0, 0), (0, 0, 0.6)
+EMITTER = (0.3, 0.4, 0.3), (0.5, 0, 0), (0, 0, 0.6)
 
 
 def lit_floor(pieces, n_light, seed=0, n_gather=64):
-    """A floor under a lamp made of `pieces` strips.
+    """A floor under an emitter made of `pieces` strips.
 
     Returns the world, direct and gathered light, the floor's texels and their light in closed form.
     """
-    (x, y, z), (width, *_), long = LAMP
+    (x, y, z), (width, *_), long = EMITTER
     strips = [
         Quad((x + k * width / pieces, y, z), (width / pieces, 0, 0), long, grey(0.0, 5.0))
         for k in range(pieces)
@@ -230,7 +230,7 @@ def lit_floor(pieces, n_light, seed=0, n_gather=64):
 
 
 @pytest.mark.parametrize("n_light", [16, 64])
-def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
+def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
     """Light samples and hemisphere rays together give L x projected solid angle, each alone less."""
     # More triangles than the closed form takes on.
     found = {"whole": [], "complete": [], "part": []}
@@ -248,22 +248,22 @@ def test_both_estimates_of_a_lamp_meet_lamberts_formula(n_light):
         assert np.mean(found[name]) == pytest.approx(1, rel=4e-3)
     assert 0.05 < np.mean(found["part"]) < 0.95
     np.testing.assert_array_equal(direct.weighted[own, 0], direct.weighted[own, 2])
-    # The lamp's back and the lamp itself see none of it.
+    # The emitter's back and the emitter itself see none of it.
     other = world.texels.instance != 0
     assert (direct.complete[other] == 0).all()
-    # The error that is told is that of the estimate, within a factor.
+    # The reported error is that of the estimate, within a factor.
     told = np.sqrt(direct.variance[own].mean())
     assert told > 0
-    # Nothing is in the way: after one shadow ray from each point no other is cast, but for packets of which
-    # few are the floor's.
+    # Nothing is in the way: after one shadow ray from each point no other is cast, except in packets of which
+    # few texels are the floor's.
     shadow = direct.rays - 4 * world.texels.n
     assert 16 * len(own) <= shadow <= (16 if n_light == 16 else 30) * len(own)
 
 
 @pytest.mark.parametrize("n_light", [16, 64])
-def test_a_lamp_with_nothing_in_the_way_shines_by_lamberts_formula(n_light):
+def test_an_unoccluded_emitter_follows_lamberts_formula(n_light):
     world, direct, gathered, own, truth = lit_floor(1, n_light)
-    # The last texel's fifteen neighbours in its packet are the lamp's: too few rays to tell.
+    # The last texel's fifteen neighbours in its packet are the emitter's: too few rays to decide.
     sure = own[direct.analytic[own] != 0]
     assert len(own) - len(sure) <= 1
     np.testing.assert_array_equal(direct.weighted[sure], direct.complete[sure])

@@ -1,4 +1,4 @@
-"""Points inside solids are buried whatever materials say of sides; in rooms and under sheets none is."""
+"""Points in solids are inside geometry, one-sided or double-sided; points in rooms, under sheets are not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def find(world, threads=1):
 
 
 def sunk_crate(double_sided=False, inward=False):
-    """A floor with a crate that stands in it."""
+    """A floor with a crate sunk into it."""
     floor = Quad((0, 0, 0), (0, 0, 4), (4, 0, 0))
     material = grey(double_sided=double_sided)
     crate = box_quads((1.03, -0.51, 1.07), (2.53, 1.0, 2.41), inward=inward, material=material)
@@ -23,15 +23,15 @@ def sunk_crate(double_sided=False, inward=False):
 
 
 @pytest.fixture(scope="module", params=["one-sided", "double-sided", "double-sided and wound inwards"])
-def buried(request):
+def crate(request):
     world = sunk_crate("double" in request.param, "inwards" in request.param)
     runs = [find(world, threads) for threads in (1, 2)]
     assert runs[0][0].tobytes() == runs[1][0].tobytes()
     return world, *runs[0]
 
 
-def test_points_inside_the_crate_are_buried(buried):
-    world, mask, rays = buried
+def test_points_inside_the_crate_are_found(crate):
+    world, mask, rays = crate
     origin, _ = points_of(world.surface, world.free, np.arange(world.texels.n))
     good = (mask[:, None] >> np.arange(16, dtype=np.uint16) & 1).astype(bool)
     on_floor = (world.texels.instance == 0) & ~world.texels.back
@@ -45,8 +45,8 @@ def test_points_inside_the_crate_are_buried(buried):
     assert rays >= world.texels.n * 4
 
 
-def test_half_buried_texels_keep_their_free_half(buried):
-    world, mask, _ = buried
+def test_texels_half_inside_keep_their_valid_half(crate):
+    world, mask, _ = crate
     on_floor = np.flatnonzero((world.texels.instance == 0) & ~world.texels.back)
     part = on_floor[(mask[on_floor] != 0) & (mask[on_floor] != 0xFFFF)]
     assert len(part) > 20

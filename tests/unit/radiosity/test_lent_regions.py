@@ -1,4 +1,4 @@
-"""A buried texel between two regions belongs to the one from which an engine looks it up."""
+"""A texel inside geometry between two regions belongs to the one from which an engine looks it up."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def floor():
 
 
 def lent(floor, left_ends, right_begins):
-    """Bury what lies between two columns; return the regions of the buried texels: 0 left, 1 right."""
+    """Put the columns between two inside geometry; return the regions of their texels: 0 left, 1 right."""
     world, x = floor
     bits = np.uint16(1) << np.arange(N_POINTS, dtype=np.uint16)
     mask = (((x < left_ends) | (x > right_begins)) * bits).sum(axis=1).astype(np.uint16)
@@ -37,12 +37,12 @@ def lent(floor, left_ends, right_begins):
     before = region.copy()
     lend_regions(world.texels, world.surface, region, mask)
     assert (region[mask != 0] == before[mask != 0]).all()
-    buried = [c for c in range(15) if (mask[column == c] == 0).all()]
-    return [set(region[column == c].tolist()) for c in buried]
+    inside = [c for c in range(15) if (mask[column == c] == 0).all()]
+    return [set(region[column == c].tolist()) for c in inside]
 
 
 def test_points_within_a_texel_of_its_centre_decide(floor):
-    # Column 7 alone is buried. Its centre is 0.6 away from one side and 1.2 from the other.
+    # Column 7 alone is inside geometry. Its centre is 0.6 away from one side and 1.2 from the other.
     assert lent(floor, 6.9, 8.7) == [{0}]
     assert lent(floor, 6.3, 8.1) == [{1}]
 

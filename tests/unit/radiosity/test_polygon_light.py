@@ -77,16 +77,16 @@ def test_the_angle_over_its_sine():
     assert angle_over_sine(np.float32(1), np.float32(0)) == pytest.approx(1, rel=1e-6)
 
 
-def test_close_to_a_lamp_s_edge_the_light_is_that_of_a_half_plane():
-    """A hair's breadth from the edge of a lamp at a right angle, half of the hemisphere's light comes."""
-    lamp = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
+def test_close_to_the_edge_of_an_emitter_the_light_is_that_of_a_half_plane():
+    """A hair's breadth from the edge of an emitter at a right angle, half of the hemisphere's light comes."""
+    polygon = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
     for distance in (1e-2, 1e-3, 1e-4, 1e-5):
         origin = np.tile(np.float32([distance, -1e-7, 0.37]), (PACKET_WIDTH, 16, 1))
         normal = np.tile(np.float32([0, 1, 0]), (PACKET_WIDTH, 16, 1))
         square = np.array([(0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0)], float)
         truth = by_angles(square, origin[:1, :1].astype(float), normal[:1, :1])[0, 0]
         assert truth == pytest.approx(np.pi / 2, rel=5 * distance + 2e-4)
-        np.testing.assert_allclose(clear(origin, normal, lamp)[:, 0], truth, rtol=1e-4)
+        np.testing.assert_allclose(clear(origin, normal, polygon)[:, 0], truth, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -127,13 +127,13 @@ def test_only_the_front_shines_unless_both_sides_do():
     assert (shown > 0).all()
     assert not clear(origin, normal, [emitter(up)]).any()
     np.testing.assert_allclose(clear(origin, normal, [emitter(up, two_sided=True)]), shown, rtol=1e-5)
-    # Lamps add up; lanes that are not there stay out of it.
+    # Emitters add up; lanes that are not there stay out of it.
     np.testing.assert_allclose(
         clear(origin, normal, [emitter(down), emitter(down)], 5), 2 * shown[:5], rtol=1e-6
     )
 
 
-def test_a_surface_in_the_lamp_s_plane_is_dark():
+def test_a_surface_in_the_plane_of_an_emitter_is_dark():
     origin, normal = points_below(np.random.default_rng(4), 1.0)
     origin[..., 2] = 1.0
     normal[:] = [0, 0, -1]

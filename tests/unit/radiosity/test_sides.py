@@ -165,7 +165,7 @@ def test_a_corner_of_two_walls_is_found_in_every_texel_that_it_reaches_into(apex
     world = floor_and(*walls)
     sides = cut(world)
     floor = np.flatnonzero((world.texels.instance == 0) & ~world.texels.back)
-    # The floor's texels are squares along x and z around these places, but for those at its border.
+    # The floor's texels are squares along x and z around these points, except those at its border.
     metres = 4.0 / (SIZE // 2 - 1.6)
     whole = floor[np.abs(world.texels.position[floor][:, [0, 2]]).max(axis=1) < 1.8]
     spot = (np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1).reshape(-1, 2) + 0.5) / 40 - 0.5

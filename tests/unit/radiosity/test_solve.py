@@ -22,14 +22,14 @@ from baker.radiosity.solve import (
 )
 
 
-def room(n, seed, openness=0.0):
-    """A reciprocal matrix whose rows sum to 1 - openness; the last patch sees nothing."""
+def room(n, seed, open_sky=0.0):
+    """A reciprocal matrix whose rows sum to 1 - open_sky; the last patch sees nothing."""
     rng = np.random.default_rng(seed)
     area = rng.uniform(0.2, 5, n)
     flux = rng.random((n, n)) ** 3
     flux += flux.T
     np.fill_diagonal(flux, 0)
-    goal = area * (1 - openness)
+    goal = area * (1 - open_sky)
     for _ in range(400):
         scale = np.sqrt(goal / flux.sum(axis=1))
         flux = scale[:, None] * flux * scale
@@ -51,10 +51,10 @@ def dense_solution(dense, source, albedo):
     )
 
 
-@pytest.mark.parametrize("openness", [0.0, 0.3])
+@pytest.mark.parametrize("open_sky", [0.0, 0.3])
 @pytest.mark.parametrize("albedo", [0.0, 0.2, 0.8, 0.95, 0.999, "colours"])
-def test_the_answer_is_that_of_a_dense_solve(albedo, openness):
-    matrix, dense, area, rng = room(50, 1, openness)
+def test_the_answer_is_that_of_a_dense_solve(albedo, open_sky):
+    matrix, dense, area, rng = room(50, 1, open_sky)
     if albedo == "colours":
         value = rng.random((50, 3)) * [1.0, 0.5, 0.05]
         value[:5] = 0
@@ -75,10 +75,12 @@ def coloured(matrix, rng):
     shared = rng.random((n, n, 3))
     shared = (shared + shared.transpose(1, 0, 2)) / 2
     row = np.repeat(np.arange(n), np.diff(matrix.first))
-    tint = np.float32(shared[row, matrix.column])
+    transmittance = np.float32(shared[row, matrix.column])
     dense = np.zeros((3, n, n))
-    dense[:, row, matrix.column] = (matrix.value[:, None] * tint).T
-    return replace(matrix, transmittance=tint, sky_transmittance=np.float32(rng.random((n, 3)))), dense
+    dense[:, row, matrix.column] = (matrix.value[:, None] * transmittance).T
+    return replace(
+        matrix, transmittance=transmittance, sky_transmittance=np.float32(rng.random((n, 3)))
+    ), dense
 
 
 @pytest.mark.parametrize("bounces", [None, 3])

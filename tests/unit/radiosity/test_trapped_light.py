@@ -12,11 +12,11 @@ from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.trapped_light import trapped_light
 
 
-def rooms(*openness, patches=8):
+def rooms(*open_sky, patches=8):
     """Return a matrix of rooms that see nothing of each other; a patch sees each of its own alike."""
-    n = patches * len(openness)
+    n = patches * len(open_sky)
     dense = np.zeros((n, n))
-    for k, share in enumerate(openness):
+    for k, share in enumerate(open_sky):
         own = slice(k * patches, (k + 1) * patches)
         dense[own, own] = (1 - share) / patches
     rows = csr_matrix(dense.astype(np.float32))
@@ -53,10 +53,10 @@ def test_a_small_opening_counts_as_what_it_lets_out():
 
 
 @pytest.mark.parametrize(
-    ("openness", "albedo", "bounces"), [(0.0, 0.97, None), (0.1, 1.0, None), (0.0, 1.0, 5), (1.0, 1.0, None)]
+    ("open_sky", "albedo", "bounces"), [(0.0, 0.97, None), (0.1, 1.0, None), (0.0, 1.0, 5), (1.0, 1.0, None)]
 )
-def test_ordinary_rooms_say_nothing(openness, albedo, bounces):
-    assert told(rooms(openness), albedo, bounces) == []
+def test_ordinary_rooms_say_nothing(open_sky, albedo, bounces):
+    assert told(rooms(open_sky), albedo, bounces) == []
 
 
 def test_a_white_room_beside_a_large_grey_one_is_found():

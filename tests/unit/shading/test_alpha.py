@@ -133,7 +133,7 @@ def test_blend_counts_with_probability_alpha_alone_and_in_layers(alpha):
     ):
         error = np.sqrt(expected * (1 - expected) / n)
         assert (layer == k).mean() == pytest.approx(expected, abs=4 * error)
-    # Neither place nor neighbour tells what a ray does.
+    # The decision of a ray is independent of its position and of its neighbours.
     stopped = (layer == 2).astype(float) - alpha
     limit = 4 / np.sqrt(n)
     for other in (origin[:, 0] - 0.5, origin[:, 1] - 0.5, np.roll(stopped, 1)):

@@ -1,4 +1,4 @@
-"""Kernels where Numba can keep nothing: they are defined and run, and a bake says what that costs."""
+"""Kernels without a writable cache folder: they compile and run, and a bake prints a warning."""
 
 from __future__ import annotations
 

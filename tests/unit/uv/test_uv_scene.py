@@ -144,7 +144,7 @@ def test_split_normals_do_not_cut_charts_but_keep_their_vertices():
         np.testing.assert_array_equal(a.uv[a.triangle], b.uv[b.triangle])
 
 
-def test_degenerate_duplicate_and_needle_triangles_all_get_uv():
+def test_degenerate_duplicate_and_sliver_triangles_all_get_uv():
     box = box_mesh()
     position = np.concatenate([box.position, [[5, 0, 0], [6, 0, 0], [5.5, 1e-6, 0], [8, 0, 0]]])
     bad = [[24, 25, 26], [24, 25, 25], [27, 27, 27], [0, 1, 2], [0, 1, 2], [2, 1, 0]]
@@ -208,7 +208,7 @@ BLACK = (0.0, 0.0, 0.0, 1.0)
         (Material(base_colour=(1.0, 1.0, 1.0, 0.0)), False),
         (Material(emission=(9.0, 9.0, 9.0)), False),
     ],
-    ids=["black lamp", "invisible", "black", "opaque whatever its alpha", "lamp that reflects"],
+    ids=["black emitter", "invisible", "black", "opaque whatever its alpha", "emitter that reflects"],
 )
 def test_what_shows_no_light_leaves_the_page_to_the_rest(material, gives_way):
     # A dome 100 times as wide as the box that it surrounds.
@@ -220,7 +220,7 @@ def test_what_shows_no_light_leaves_the_page_to_the_rest(material, gives_way):
     alone = unwrap(make_scene([box_mesh()], [(0, place())]), resolution=256).layouts[0].texels_per_metre
     if gives_way:
         assert density[0] > 0.9 * alone
-        # Stretch is told by the world's size, and the dome keeps at least a texel a face.
+        # Stretch is measured in world units, and the dome keeps at least a texel a face.
         assert 0.0 < density[1] < 0.01 * density[0]
     else:
         assert density[0] == density[1] < 0.02 * alone

@@ -1,4 +1,4 @@
-"""What the page is handed, and what nobody is."""
+"""The data that the page gets, and requests that are refused."""
 
 from __future__ import annotations
 

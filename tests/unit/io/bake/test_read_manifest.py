@@ -1,4 +1,4 @@
-"""A damaged or hostile manifest is refused by one sentence, whoever reads it."""
+"""Every reader refuses a damaged or hostile manifest with one sentence."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_what_cannot_be_is_refused(out: Path, path: tuple[str | int, ...], value
 
 
 def test_any_value_of_any_other_type_is_refused_or_read(out: Path) -> None:
-    """Replace each value of the manifest in turn: nothing but errors of baker's own comes out."""
+    """Replace one value of the manifest at a time: only errors of baker itself are raised."""
     text = (out / "bake.json").read_text()
     values = [None, -1, 2**70, 1e300, "\x1b[31m", [], {}, [[]], True]
     refused = read = 0

@@ -42,7 +42,7 @@ def scene_of(*matrices: np.ndarray, lights: tuple[PunctualLight, ...] = ()) -> S
         Material("paint", (0.5, 0.25, 1.0, 1.0), TEXTURE, double_sided=True, metallic=0.0),
         Material("lamp", emission=(10.0, 20.0, 5.0)),
     )
-    # Instances stand in another order than their nodes.
+    # Instances are in another order than their nodes.
     count = len(matrices)
     instances = tuple(Instance(count - 1 - k, f"i{k}", 0, m) for k, m in enumerate(matrices))
     return Scene("hand-made", None, (two_material_mesh(),), materials, instances, lights)

@@ -1,4 +1,4 @@
-"""Nodes, instances, lights, scenes and what the importer says about them."""
+"""Nodes, instances, lights, scenes and the importer's warnings and errors."""
 
 from __future__ import annotations
 

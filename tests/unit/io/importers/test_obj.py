@@ -1,4 +1,4 @@
-"""OBJ and MTL: geometry, relative indices, materials, and how defects are told."""
+"""OBJ and MTL: geometry, relative indices, materials, and the errors for defects."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pytest
 from closed_forms import point_irradiance
 from reference_runs import copies_of, traced
 from scenes import SceneBuilder
-from test_truth_tint import COLOUR, HALF, glass, passed
+from test_truth_transmittance import COLOUR, HALF, glass, passed
 from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
@@ -21,17 +21,17 @@ from baker.pathtracer.scene import build_reference
 
 STAINED = Material(base_colour=(*COLOUR.tolist(), HALF), alpha_mode="BLEND", double_sided=True)
 VIEW = Camera("view", 0, (0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 0.5)
-# One for each way that code takes: vertices one by one, paths by chance, aimed at lamps, both, both ends.
+# One for each code path: vertices one by one, paths by chance, aimed at emitters, both, both ends.
 ESTIMATORS = ("uniform", "cosine", "light", "mis", "bdpt")
 
 
 def room():
-    """A closed room with a lamp and a point light above a pane, and a block below it."""
+    """A closed room with an emitter and a point light above a pane, and a block below it."""
     walls = box_quads((0, 0, 0), (2, 2, 2), inward=True, material=grey(0.6))
-    lamp = Quad((0.7, 1.3, 1.8), (0.6, 0, 0), (0, -0.6, 0), grey(0, 5.0))
+    emitter = Quad((0.7, 1.3, 1.8), (0.6, 0, 0), (0, -0.6, 0), grey(0, 5.0))
     block = box_quads((0.3, 0.3, 0.01), (0.8, 0.8, 0.6), inward=False, material=grey(0.4))
     pane = Quad((0, 0, 1.0), (2, 0, 0), (0, 2, 0), STAINED)
-    scene = quad_scene([*walls, lamp, *block, pane])
+    scene = quad_scene([*walls, emitter, *block, pane])
     return replace(scene, lights=(PunctualLight("point", "p", 0, (0.3, 0.3, 0.3), (1.6, 0.4, 1.5)),))
 
 

@@ -14,7 +14,7 @@ from baker.core.scene import Texture
 
 COLOUR = np.array([1.0, 0.5, 0.0])
 HALF = 0.5
-LAMP = (0.0, 2.0, 0.0)
+LIGHT_AT = (0.0, 2.0, 0.0)
 
 
 def glass(builder, colour=COLOUR, alpha=HALF, *, rgba=None):
@@ -40,12 +40,12 @@ def passed(colour, alpha):
 
 
 @pytest.mark.parametrize("panes", [[(COLOUR, 0.5)], [(COLOUR, 0.5), ((0.2, 0.4, 1.0), 0.25)]])
-def test_each_pane_multiplies_the_light_of_a_lamp(panes):
-    builder, floor = floor_under(*[pane(*p) for p in panes], light="point", position=LAMP)
+def test_each_pane_multiplies_the_light_of_a_point(panes):
+    builder, floor = floor_under(*[pane(*p) for p in panes], light="point", position=LIGHT_AT)
     found = floor.values(builder.bake(bounces=0))
-    truth = floor.texel_mean(lambda p: point_irradiance(LAMP, p, (0, 1, 0)))[..., None]
+    truth = floor.texel_mean(lambda p: point_irradiance(LIGHT_AT, p, (0, 1, 0)))[..., None]
     share = np.prod([passed(*p) for p in panes], axis=0)
-    free_builder, free_floor = floor_under(light="point", position=LAMP)
+    free_builder, free_floor = floor_under(light="point", position=LIGHT_AT)
     free = free_floor.values(free_builder.bake(bounces=0))
     # Nothing is left to chance, in any texel and colour.
     np.testing.assert_allclose(found, free * share, rtol=1e-5)
@@ -65,7 +65,7 @@ def test_every_kind_of_light_is_coloured(light):
 
 
 @pytest.mark.parametrize("alpha", [0.6, 0.9])
-def test_a_lamp_behind_a_dense_pane_is_no_noisier_than_without(alpha):
+def test_a_light_behind_a_dense_pane_is_no_noisier_than_without(alpha):
     """Against Lambert's formula; 64 samples of a square in the open scatter by 2 % a texel."""
     square = np.array([(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)])
     builder, floor = floor_under(pane(alpha=alpha), light="", texels=24)
@@ -88,8 +88,8 @@ def test_sky_through_black_glass_all_around_has_no_noise():
     np.testing.assert_allclose(found, np.broadcast_to(truth, found.shape), rtol=1e-4)
 
 
-def test_a_pane_elsewhere_leaves_a_free_lamp_its_closed_form():
-    """No pane is between them: the light has no noise, whatever else is made of glass."""
+def test_a_pane_elsewhere_leaves_an_unoccluded_light_its_closed_form():
+    """No pane is between them: the light has no noise, although other objects are made of glass."""
 
     def baked(*panes):
         builder, floor = floor_under(light="", texels=24)
@@ -108,14 +108,14 @@ def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
     builder.quad((0.013, -0.2, -1.2), (0, 1.6, 0), (0, 0, 2.4), glass(builder, alpha=0.9), (4, 4))
     builder.light("directional", 1.0, direction=(-(0.5**0.5), -(0.5**0.5), 0.0))
     found = floor.values(builder.bake(bounces=0, samples=16)) / 0.5**0.5
-    # Rows run along x; the pane stands in row 12.
+    # Rows run along x; the pane is in row 12.
     np.testing.assert_allclose(found[13:], 1, rtol=1e-5)
     np.testing.assert_allclose(found[:12], np.broadcast_to(passed(COLOUR, 0.9), (12, 24, 3)), rtol=1e-5)
     assert np.ptp(found[12], axis=0).max() < 1e-5
     assert min(abs(found[12, 0] - 1).max(), abs(found[12, 0] - passed(COLOUR, 0.9)).max()) < 1e-5
 
 
-def test_a_lamp_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_a_free_one():
+def test_a_light_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_an_unoccluded_one():
     """Of 256 rays all pass as a rule; each has to be asked for its colour nevertheless."""
     builder, floor = floor_under(pane((1.0, 0.0, 0.0), 1 / 1024), light="")
     builder.quad((-1, 1, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 5.0), (8, 8))
@@ -125,7 +125,7 @@ def test_a_lamp_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_a_free_one():
 
 def test_what_is_not_there_colours_nothing():
     def baked(make):
-        builder, _ = floor_under(make, light="point", position=LAMP)
+        builder, _ = floor_under(make, light="point", position=LIGHT_AT)
         return builder.bake(samples=16, sky=(1.0, 1.0, 1.0)).lightmaps["irradiance"].value.tobytes()
 
     black, white = np.zeros((4, 4, 4)), np.ones((4, 4, 4))
