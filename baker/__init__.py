@@ -1,119 +1,126 @@
 """Baker: radiosity lightmaps and ambient occlusion for game assets.
 
 >>> import baker
->>> result = baker.bake("level.glb", out="out", resolution=1024)  # doctest: +SKIP
+>>> scene = baker.load("level.glb")  # doctest: +SKIP
+>>> result = baker.bake(scene, out="out", resolution=1024)  # doctest: +SKIP
 >>> result.lightmaps["irradiance"].value.shape  # doctest: +SKIP
 (1, 1024, 1024, 3)
+
+docs/API.md describes every function. Names are imported when they are first used.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from baker.core.errors import BakerError, Cancelled, InputError, ResourceError, SettingsError
-from baker.core.progress import Progress, silent
-
 if TYPE_CHECKING:
+    from baker.api.bakes import ao, bake, export, save
+    from baker.api.results import batch, diff, render, verify, view
+    from baker.api.scenes import check, load, repair, unwrap
+    from baker.checks.run import CheckReport
+    from baker.checks.settings import CheckSettings
+    from baker.comparison.compare import DiffReport
+    from baker.comparison.settings import DiffSettings
     from baker.core.atlas import Atlas
-    from baker.core.lightmap import BakeResult
+    from baker.core.errors import BakerError, Cancelled, InputError, ResourceError, SettingsError
+    from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
+    from baker.core.progress import Progress
     from baker.core.scene import Scene
+    from baker.core.settings import BakeSettings
+    from baker.jobs.report import BatchReport
+    from baker.jobs.settings import BatchSettings
+    from baker.rendering.render import Picture
+    from baker.rendering.settings import RenderSettings
+    from baker.repairs.fix_file import FixResult
+    from baker.repairs.settings import RepairSettings
+    from baker.uv.settings import UnwrapSettings
+    from baker.verification.settings import VerifySettings
+    from baker.verification.verify import VerifyReport
+    from baker.viewer.server import ViewServer
+
+__version__ = "0.1.0"
+
+# The module of each name.
+_HOMES = {
+    "api.bakes": ("ao", "bake", "export", "save"),
+    "api.results": ("batch", "diff", "render", "verify", "view"),
+    "api.scenes": ("check", "load", "repair", "unwrap"),
+    "checks.run": ("CheckReport",),
+    "checks.settings": ("CheckSettings",),
+    "comparison.compare": ("DiffReport",),
+    "comparison.settings": ("DiffSettings",),
+    "core.atlas": ("Atlas",),
+    "core.errors": ("BakerError", "Cancelled", "InputError", "ResourceError", "SettingsError"),
+    "core.lightmap": ("BakeResult", "Lightmap", "TexelStatus"),
+    "core.progress": ("Progress",),
+    "core.scene": ("Scene",),
+    "core.settings": ("BakeSettings",),
+    "jobs.report": ("BatchReport",),
+    "jobs.settings": ("BatchSettings",),
+    "rendering.render": ("Picture",),
+    "rendering.settings": ("RenderSettings",),
+    "repairs.fix_file": ("FixResult",),
+    "repairs.settings": ("RepairSettings",),
+    "uv.settings": ("UnwrapSettings",),
+    "verification.settings": ("VerifySettings",),
+    "verification.verify": ("VerifyReport",),
+    "viewer.server": ("ViewServer",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Atlas",
+    "BakeResult",
+    "BakeSettings",
     "BakerError",
+    "BatchReport",
+    "BatchSettings",
     "Cancelled",
+    "CheckReport",
+    "CheckSettings",
+    "DiffReport",
+    "DiffSettings",
+    "FixResult",
     "InputError",
+    "Lightmap",
+    "Picture",
+    "Progress",
+    "RenderSettings",
+    "RepairSettings",
     "ResourceError",
     "Scene",
     "SettingsError",
+    "TexelStatus",
+    "UnwrapSettings",
+    "VerifyReport",
+    "VerifySettings",
+    "ViewServer",
+    "ao",
     "bake",
+    "batch",
+    "check",
+    "diff",
+    "export",
     "load",
+    "render",
+    "repair",
+    "save",
     "unwrap",
+    "verify",
+    "view",
 ]
-__version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    """Import `baker.Scene` when it is first asked for: NumPy takes a moment."""
-    if name == "Scene":
-        from baker.core.scene import Scene
-
-        return Scene
-    raise AttributeError(f"module 'baker' has no attribute '{name}'")
-
-
-def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
-    """Read a scene file.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file of a format in `baker.io.importers`; `baker bake --help` lists the suffixes.
-    up, scale : str, float
-        Up axis and metres per unit of formats other than glTF.
-
-    Raises
-    ------
-    InputError
-        If the file is unreadable, malformed, or holds nothing to bake.
-    """
-    from baker.io.load import load_scene
-
-    return load_scene(path, up=up, scale=scale)
+    """Import a name of the API when it is first used (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'baker' has no attribute '{name}'")
+    value = getattr(import_module(f"baker.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
 
 
-def unwrap(scene: Scene, *, progress: Progress = silent, **settings: Any) -> Atlas:
-    """Give every instance of a scene its place in the lightmap pages.
-
-    Parameters
-    ----------
-    scene : Scene
-    progress : Progress
-    settings
-        Any of `baker.core.settings.BakeSettings`: resolution, density, padding, uv ...
-
-    Raises
-    ------
-    SettingsError, InputError, Cancelled
-    """
-    from baker.core.settings import make_settings
-    from baker.uv.unwrap import unwrap_scene
-
-    return unwrap_scene(scene, make_settings(settings), progress)
-
-
-def bake(
-    scene: Scene | str | Path,
-    *,
-    out: str | Path | None = None,
-    progress: Progress = silent,
-    force: bool = False,
-    **settings: Any,
-) -> BakeResult:
-    """Bake a scene.
-
-    Parameters
-    ----------
-    scene : Scene, str or Path
-    out : str or Path, optional
-        Folder to write; None keeps everything in memory.
-    progress : Progress
-        Is told stage and fraction; a truthy answer cancels.
-    force : bool
-        Replace an `out` that baker did not write.
-    settings
-        Any of `baker.core.settings.BakeSettings`: channels, resolution, samples ...
-
-    Returns
-    -------
-    BakeResult
-        `result.lightmaps["irradiance"].value` is (pages, H, W, 3) float32, lx.
-
-    Raises
-    ------
-    SettingsError, InputError, ResourceError, Cancelled
-    """
-    from baker.core.settings import make_settings
-    from baker.pipeline.bake import bake as run
-
-    return run(scene, settings=make_settings(settings), out=out, progress=progress, force=force)
+def __dir__() -> list[str]:
+    """Return the names of the API."""
+    return [*__all__, "__version__"]

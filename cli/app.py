@@ -1,7 +1,7 @@
 """The `baker` command: finds the subcommand, runs it, turns failures into exit codes.
 
-Nothing heavy is imported here: `baker --help` has to answer at once, so a subcommand's module (and with it
-the settings) is imported only when it is the one that was asked for.
+No heavy module is imported here, so that `baker --help` is quick: the module of a subcommand, and with it the
+settings, is imported only for that subcommand.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from baker.cli.supervise import INTERRUPTED, supervise
 def main() -> None:
     """Run the command line of this process; never returns."""
     argv = sys.argv[1:]
-    # Imports make many objects and no cycles: searching for some takes 5 % of the start.
+    # Imports create many objects and no cycles: collecting them takes 5 % of the start.
     gc.set_threshold(100_000, 20, 100)
     for stream in (sys.stdout, sys.stderr):
-        # A name that the terminal's encoding cannot show is no reason to fail.
+        # Escape characters that the terminal's encoding lacks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     stop, notes = supervise(argv)
@@ -43,7 +43,7 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
     out : TextIO or None
         Standard output.
     stop : StopFlag or None
-        Set by a signal; None for a run that nobody stops.
+        Set by a signal; None for a run without signals.
     notes : int or None
         See `supervise`.
     """
@@ -58,7 +58,7 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         out.flush()
         return code
     except (SystemExit, BrokenPipeError):
-        # The reader (`| head`) has seen enough; typer makes an exit of the broken pipe.
+        # The reader (`| head`) closed the pipe; typer turns that into an exit.
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -72,7 +72,7 @@ def _dispatch(argv: list[str], session: Any) -> int:
 
     code = make_app().main(args=argv, prog_name="baker", standalone_mode=False, obj=session)
     if code == INTERRUPTED:
-        # typer made an exit code of it; the message and the JSON are still to be written.
+        # typer turned the interrupt into an exit code; the message and the JSON are still to be written.
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
 
@@ -82,13 +82,13 @@ def _asks_json(argv: list[str]) -> bool:
 
 
 def _verbosity(argv: list[str]) -> int:
-    # Read before parsing: a usage error must honour it too.
+    # Read before parsing, since it applies to usage errors, too.
     count = argv.count("--verbose")
     return count + sum(len(word) - 1 for word in argv if word[:1] == "-" and set(word[1:]) == {"v"})
 
 
 def _reserve_stdout() -> TextIO:
-    # Native libraries print to descriptor 1 as they please; with --json it may carry one object only.
+    # Native libraries may print to descriptor 1; with --json it carries one object only.
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return out
@@ -102,8 +102,8 @@ def _silence(stream: TextIO) -> None:
 
 
 def _leave(code: int) -> None:
-    # Not sys.exit: it takes half a second to free compiled code and arrays one by one, and after an
-    # interruption it would wait for kernels that still run in worker threads.
+    # Not sys.exit: freeing compiled code and arrays one by one takes half a second, and after an interruption
+    # it would wait for kernels that still run in worker threads.
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -3,70 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
 from baker.cli.command import Cluster, Run, command
-from baker.core.settings_model import RunSettings
+from baker.jobs.settings import BatchSettings
 
 if TYPE_CHECKING:
     from baker.jobs.executor import Bakery
     from baker.jobs.run import Outcome
 
 
-@command("batch", RunSettings)
+@command("batch", BatchSettings)
 def batch(
     ctx: typer.Context,
     jobs_file: Annotated[Path, typer.Argument(metavar="JOBS.toml", help="List of scenes and settings.")],
-    jobs: Annotated[int, typer.Option("--jobs", metavar="N", min=1, max=1024, help="Bakes at a time.")] = 1,
-    memory: Annotated[
-        str | None,
-        typer.Option(
-            "--memory", metavar="SIZE", help="Memory of all bakes together, like 8G; jobs wait for it."
-        ),
-    ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only report what would be baked, and why.")
-    ] = False,
-    fail_fast: Annotated[
-        bool, typer.Option("--fail-fast", help="Start nothing more after a failure.")
-    ] = False,
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Bake all, and replace outputs even if baker did not write them."),
-    ] = False,
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
     cluster: Cluster = None,
 ) -> None:
     """Bake what changed, show one progress for all, and report."""
-    from baker.jobs.executor import LocalBakery
-    from baker.jobs.jobs_file import read_jobs
-    from baker.jobs.memory import parse_size
-    from baker.jobs.run import BatchOptions, batch_json, run_batch, write_junit
+    from baker.jobs.report import run_jobs_file
+    from baker.jobs.run import write_junit
 
     run: Run = ctx.obj
-    overrides = dict(run.given)
-    options = BatchOptions(
-        threads=run.of(RunSettings).threads,
-        memory=None if memory is None else parse_size(memory),
-        force=force,
-        fail_fast=fail_fast,
-        dry_run=dry_run,
-    )
-    overrides.pop("threads", None)
-    todo = read_jobs(jobs_file, overrides)
+    settings = run.of(BatchSettings)
     with run.session.reporter(quiet=run.quiet) as progress:
-        bakery = LocalBakery(jobs) if cluster is None or dry_run else _on_cluster(cluster, options.threads)
-        outcomes = run_batch(todo, bakery, options, progress, lambda out: run.session.will_write(str(out)))
+        report = run_jobs_file(
+            jobs_file,
+            settings,
+            progress,
+            executor=None if cluster is None else partial(_on_cluster, cluster, settings.threads),
+            starting=lambda out: run.session.will_write(str(out)),
+        )
     if junit is not None:
-        write_junit(junit, outcomes)
+        write_junit(junit, report.outcomes)
     if not run.quiet:
-        write_table(outcomes, run.text, dry_run=dry_run)
+        write_table(report.outcomes, run.text, dry_run=settings.dry_run)
     if run.as_json:
-        run.session.write_json(batch_json(outcomes, dry_run=dry_run))
-    code = max((outcome.code for outcome in outcomes), default=0)
+        run.session.write_json(report.to_dict())
+    code = max((outcome.code for outcome in report.outcomes), default=0)
     if code:
         raise typer.Exit(code)
 

@@ -13,7 +13,7 @@ from baker.cli.outcome import report_outcome, write_failed, write_worst
 from baker.comparison.settings import DiffSettings
 
 if TYPE_CHECKING:
-    from baker.comparison.compare import Difference
+    from baker.comparison.compare import DiffReport
 
 _SHOWN = 3
 
@@ -28,13 +28,12 @@ def diff(
     run: Run = ctx.obj
     with run.progress() as progress:
         from baker.comparison.compare import compare
-        from baker.comparison.summary import difference_json
 
         found = compare(a, b, run.of(DiffSettings), progress)
-    report_outcome(found, run, write_text, difference_json)
+    report_outcome(found, run, write_text)
 
 
-def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:
+def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
     """Write what differs, a table of figures, the objects and places furthest apart, and what failed."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
@@ -60,7 +59,7 @@ def write_text(found: Difference, stream: TextIO, *, verbose: int) -> None:
     stream.write(f"{verdict_text} ({found.seconds:.0f} s)\n")
 
 
-def _furthest(found: Difference) -> list[tuple[float, str, dict[str, Any]]]:
+def _furthest(found: DiffReport) -> list[tuple[float, str, dict[str, Any]]]:
     """Return (p95, channel, object) of objects that differ, the furthest first."""
     apart = [
         (float(figures["p95"]), name, entry)

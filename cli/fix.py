@@ -81,7 +81,7 @@ def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> 
 
 def fixed_json(result: FixResult, request: FixRequest) -> dict[str, Any]:
     """Return the keys that a fix adds to `--json`."""
-    return {**result.json(), "out": str(request.out)}
+    return {**result.to_dict(), "out": str(request.out)}
 
 
 def _more(change: Change) -> str:

@@ -13,8 +13,7 @@ from typing import Any, TextIO
 _NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
 # Arguments of commands that are no settings.
 _ARGUMENTS = frozenset({
-    "cluster", "config", "fail_fast", "fix", "force", "jobs", "junit", "memory", "out", "port", "report",
-    "sarif", "three",
+    "cluster", "config", "fix", "force", "junit", "out", "port", "report", "sarif", "three",
 })  # fmt: skip
 # Arguments whose flag is another word.
 _SHORT = {"out": "-o"}
@@ -34,11 +33,14 @@ def flag_names() -> frozenset[str]:
     from baker.checks.settings import CheckSettings
     from baker.comparison.settings import DiffSettings
     from baker.core.settings import BakeSettings
+    from baker.core.settings_model import Settings
+    from baker.jobs.settings import BatchSettings
     from baker.rendering.settings import RenderSettings
     from baker.repairs.settings import RepairSettings
     from baker.verification.settings import VerifySettings
 
-    models = (BakeSettings, CheckSettings, DiffSettings, RenderSettings, RepairSettings, VerifySettings)
+    models: list[type[Settings]] = [BakeSettings, BatchSettings, CheckSettings, DiffSettings]
+    models += [RenderSettings, RepairSettings, VerifySettings]
     return _ARGUMENTS.union(*(model.model_fields for model in models))
 
 

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 class LazyGroup(TyperGroup):
-    """Knows every subcommand's name and summary, and imports only the one that runs."""
+    """Lists every subcommand with its summary, and imports only the one that runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names in the order of the table."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the subcommand; while help is made, a stand-in with its summary."""
+        """Return the subcommand; while help is made, a placeholder with its summary."""
         if cmd_name not in COMMANDS:
             return None
         if self._listing:

@@ -12,35 +12,35 @@ from baker.cli.failures import FAILED_CHECK
 
 if TYPE_CHECKING:
     from baker.cli.command import Run
+    from baker.comparison.compare import DiffReport
     from baker.metrics.limits import Verdict
+    from baker.verification.verify import VerifyReport
 
 
-def report_outcome(
-    found: Any, run: Run, as_text: Callable[..., None], as_data: Callable[[Any], dict[str, Any]]
-) -> None:
+def report_outcome(found: VerifyReport | DiffReport, run: Run, as_text: Callable[..., None]) -> None:
     """Write an outcome as text and, if wanted, as JSON; end the program as failed if it did not pass.
 
-    as_text : called with the outcome, a stream and `verbose`; as_data : makes what `--json` writes
+    as_text : called with the outcome, a stream and `verbose`
     """
     if not run.quiet:
         as_text(found, run.text, verbose=run.verbose)
     if run.as_json:
-        run.session.write_json(as_data(found))
+        run.session.write_json(found.to_dict())
     if not found.passed:
         raise typer.Exit(FAILED_CHECK)
 
 
 def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
-    """Write one line for each of the worst places."""
+    """Write one line for each of the worst texels."""
     for entry in worst:
-        place = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
+        texel = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
         stream.write(
-            f"worst: {entry['channel']} of '{entry['object']}' at {place}: {entry['error']:.1%} off\n"
+            f"worst: {entry['channel']} of '{entry['object']}' at {texel}: {entry['error']:.1%} off\n"
         )
 
 
 def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
-    """Write the limits that were applied, and beside each the figure that was held against it."""
+    """Write the limits that were applied, and with each the figure that was compared with it."""
     by_channel: dict[str, list[str]] = {}
     for verdict in verdicts:
         limit = verdict.limit
@@ -53,7 +53,7 @@ def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
 
 
 def write_failed(verdicts: Iterable[Verdict], stream: TextIO) -> None:
-    """Write the limits that were passed."""
+    """Write the limits that were exceeded."""
     for verdict in verdicts:
         if verdict.failed:
             value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"

@@ -64,7 +64,7 @@ class Reporter:
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> bool:
         """Show that `fraction` of `stage` is done; return whether to stop."""
         if not self._quiet:
-            # Tiles may report from several threads.
+            # Tiles report from several threads.
             with self._lock:
                 self._show(stage, min(max(fraction, 0.0), 1.0), detail)
         return self._stopped()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
@@ -61,24 +60,11 @@ def picture_json(picture: Picture, out: Path, settings: RenderSettings) -> dict[
     from baker.rendering.write import exr_layers, tone_of
 
     tone = tone_of(out, picture)
-    eye = picture.camera
     return {
         "out": str(out),
-        "width": settings.width,
-        "height": settings.height,
-        "spp": picture.spp,
-        "seconds": picture.seconds,
-        "rays": picture.rays,
-        "unit": picture.unit,
+        **picture.to_dict(),
         "tone": tone,
         "layers": list(exr_layers(picture)) if tone is None else [],
         "estimator": None if settings.ao or settings.lightmap else settings.estimator,
         "denoised": settings.denoise,
-        "mean": [float(v) for v in picture.colour.mean(axis=(0, 1), dtype=float)],
-        "camera": {
-            "position": list(eye.position),
-            "target": [p + f for p, f in zip(eye.position, eye.forward, strict=True)],
-            "fov": math.degrees(eye.fov),
-        },
-        "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in picture.warnings],
     }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 if TYPE_CHECKING:
     from baker.core.lightmap import BakeResult
 
-# The promised keys of `bake --json`, taken from the manifest as they are.
+# Keys of the manifest that `bake --json` prints.
 KEYS = ("pages", "statistics", "timings", "rays", "warnings")
 
 

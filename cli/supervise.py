@@ -1,10 +1,10 @@
 """Runs the work in a child process, so that stopping never waits for a library.
 
-Some C++ libraries keep Python's lock for as long as they work (xatlas does, for minutes on a large
-mesh): a signal handler or a thread written in Python cannot run meanwhile. The parent process here
-does nothing but wait, so it always hears Ctrl-C. It passes the signal on, gives the child a moment to
-stop by itself, then ends it and every process it started, and removes what was half written.
-The same parent turns a crash of native code or a kill for want of memory into one sentence.
+Some C++ libraries hold Python's global lock while they work (xatlas does so for minutes on a large mesh): no
+signal handler or thread written in Python can run during that time. The parent process only waits, so it
+always receives Ctrl-C. It forwards the signal, gives the child `GRACE` seconds to stop, then kills it and
+every process that it started, and removes unfinished output. The parent also reports a crash of native code,
+or a kill for lack of memory, in one sentence.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import sys
 import tempfile
 from types import FrameType
 
-# Seconds that the child gets to stop by itself. The promise is one second for everything.
+# Seconds for the child to stop by itself; everything together takes at most one second.
 GRACE = 0.6
 INTERRUPTED = 130
 RESOURCE = 4
@@ -25,19 +25,19 @@ _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class StopFlag:
-    """Remembers that a signal asked the work to stop.
+    """Records that a signal asked the work to stop.
 
     Attributes
     ----------
     requested : bool
-        What a progress callback answers.
+        The return value of a progress callback.
     """
 
     def __init__(self) -> None:
         self.requested = False
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Set the flag; the first signal also interrupts Python code where it stands."""
+        """Set the flag; the first signal also interrupts running Python code."""
         if not self.requested:
             self.requested = True
             raise KeyboardInterrupt
@@ -57,15 +57,15 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     Parameters
     ----------
     argv : list of str
-        The command line, to know whether a failure must be reported as JSON.
+        The command line; with `--json`, a failure is reported as JSON.
 
     Returns
     -------
     stop : StopFlag
         Set by a stopping signal in the working process.
     notes : int or None
-        File for `note_output`, shared with the parent; None where there is no `fork` and this process does
-        the work.
+        Descriptor for `note_output`, shared with the parent; None without `fork`, where this process does the
+        work.
     """
     stop = StopFlag()
     if not hasattr(os, "fork"):
@@ -73,11 +73,11 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
         return stop, None
     sys.stdout.flush()
     sys.stderr.flush()
-    # Not a pipe: a batch notes more folders than one holds, and the parent reads at the end only.
+    # Not a pipe: the parent reads at the end only, and a batch may note more folders than a pipe holds.
     with tempfile.TemporaryFile() as file:
         notes = os.dup(file.fileno())
     blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
-    # No signal may fall between the fork and the handlers.
+    # Block signals until the handlers are installed.
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     parent = os.getpid()
     child = os.fork()
@@ -101,8 +101,8 @@ def note_output(notes: int | None, out: str) -> None:
 
 
 def _settle_child(parent: int) -> None:
-    # A group of its own: the terminal's Ctrl-C reaches the parent only, which passes it on once,
-    # and the parent can end helpers that the child started.
+    # Its own process group: the terminal's Ctrl-C reaches the parent only, which forwards it once, and the
+    # parent can kill processes that the child started.
     os.setpgid(0, 0)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     if sys.platform == "linux":
@@ -115,7 +115,7 @@ def _settle_child(parent: int) -> None:
 
 
 class _Watch:
-    """Is the parent's side: passes signals on, waits, and tidies up after a hard end."""
+    """The parent's side: forwards signals, waits, and cleans up after a kill."""
 
     def __init__(self, child: int, notes: int, as_json: bool) -> None:
         self.child = child
@@ -124,7 +124,7 @@ class _Watch:
         self.stopping = False
 
     def install(self) -> None:
-        with contextlib.suppress(OSError):  # the child was quicker, or is gone
+        with contextlib.suppress(OSError):  # the child has done it already, or has ended
             os.setpgid(self.child, self.child)
         for name in _STOPPING:
             number = getattr(signal, name)
@@ -142,7 +142,7 @@ class _Watch:
         if self.stopping:
             return
         self.stopping = True
-        # Only the child itself is asked: helpers of it would answer with messages of their own.
+        # Signal the child only: its own child processes would print further messages.
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.child, signal.SIGINT)
         signal.setitimer(signal.ITIMER_REAL, GRACE)
@@ -162,7 +162,7 @@ class _Watch:
         _, status = os.waitpid(self.child, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
         if self.stopping or not os.WIFEXITED(status):
-            self._send(signal.SIGKILL)  # helpers that outlived it
+            self._send(signal.SIGKILL)  # child processes that outlived it
             self._tidy()
         if os.WIFEXITED(status):
             return os.WEXITSTATUS(status)

@@ -12,7 +12,7 @@ from baker.cli.outcome import report_outcome, write_failed, write_limits, write_
 from baker.verification.settings import VerifySettings
 
 if TYPE_CHECKING:
-    from baker.verification.verify import Verification
+    from baker.verification.verify import VerifyReport
 
 
 @command("verify", VerifySettings)
@@ -27,7 +27,6 @@ def verify(
     """Verify the bake and report the figures."""
     run: Run = ctx.obj
     with run.progress() as progress:
-        from baker.verification.summary import verification_json
         from baker.verification.verify import verify
 
         found = verify(out, run.of(VerifySettings), progress)
@@ -39,10 +38,10 @@ def verify(
             from baker.verification.junit import write_junit
 
             write_junit(junit, found)
-    report_outcome(found, run, write_text, verification_json)
+    report_outcome(found, run, write_text)
 
 
-def write_text(found: Verification, stream: TextIO, *, verbose: int) -> None:
+def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
     """Write a table of figures, what failed, and the worst texels."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")

@@ -14,6 +14,7 @@ from baker.cli.fields import default_of, flag_of, is_switch, metavar_of, range_o
 from baker.comparison.settings import DiffSettings
 from baker.core.settings import BakeSettings
 from baker.core.settings_model import Settings
+from baker.jobs.settings import BatchSettings
 from baker.rendering.settings import RenderSettings
 from baker.repairs.settings import RepairSettings
 from baker.verification.settings import VerifySettings
@@ -37,6 +38,7 @@ SECTIONS: list[tuple[type[Settings], str, str]] = [
     ),
     (VerifySettings, "verify", "Of `baker verify`; of `baker.verify`."),
     (DiffSettings, "diff", "Of `baker diff`; of `baker.diff`."),
+    (BatchSettings, "batch", "Of `baker batch`; of `baker.batch`. These have no keys in a file."),
     (RenderSettings, "render", "Of `baker render`; of `baker.render`."),
 ]
 

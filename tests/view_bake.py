@@ -59,7 +59,7 @@ def make_bake(folder: Path, *, half: bool = True, name: str = "probe") -> Path:
         lightmaps=_maps(half),
         status=_status(layouts),
         texel_count=np.array([576, 256, 16]),
-        solve={"energy": {}},
+        solve={"energy": {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}},
     )
     write_bake(result, out)
     return out

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from baker.checks.bake_rates import rates_beside, rates_of
 from baker.checks.context import CheckContext
-from baker.checks.finding import SEVERITIES, Finding, Location, RawFinding
+from baker.checks.finding import SEVERITIES, Finding, Location, RawFinding, finding_json
 from baker.checks.ignore import Ignore, parse_ignore
 from baker.checks.rule import CHECKS, all_checks, run_check
 from baker.checks.settings import CheckSettings, with_extras
 from baker.core.errors import IndexRangeError
 from baker.core.progress import Progress, silent
 from baker.core.progress import report as report_progress
+from baker.core.result import Result
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.io.load import load_for_bake
 
 
-@dataclass(frozen=True)
-class CheckReport:
+@dataclass(frozen=True, repr=False)
+class CheckReport(Result):
     """The findings about one scene.
 
     Attributes
@@ -53,19 +56,39 @@ class CheckReport:
         limit = SEVERITIES.index(self.fail_on)
         return all(finding.rank < limit for finding in self.findings)
 
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        counts = Counter(finding.severity for finding in self.findings)
+        return {
+            "scene": self.path.name,
+            "passed": self.passed,
+            **{f"{severity}s": counts[severity] for severity in reversed(SEVERITIES)},
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain values."""
+        return {
+            "scene": str(self.path),
+            "passed": self.passed,
+            "fail_on": self.fail_on,
+            "findings": [finding_json(finding) for finding in self.findings],
+            "ignored": len(self.ignored),
+            "seconds": self.seconds,
+        }
+
 
 def check_scene(
-    path: Path | str,
+    scene: Scene | Path | str,
     settings: CheckSettings,
     bake_settings: BakeSettings,
     progress: Progress = silent,
 ) -> CheckReport:
-    """Read a scene leniently and run every rule on it.
+    """Run every rule on a scene; a file is read leniently.
 
     Parameters
     ----------
-    path : Path or str
-        The scene file.
+    scene : Scene, Path or str
+        A Scene is checked as it is.
     settings : CheckSettings
         The scene's own extras are added to them.
     bake_settings : BakeSettings
@@ -86,11 +109,12 @@ def check_scene(
         For an unknown code among `ignore`, `rates` without a bake, or wrong values in the scene's extras.
     """
     start = time.perf_counter()
-    path = Path(path)
+    path = (scene.path or Path("scene")) if isinstance(scene, Scene) else Path(scene)
     parse_ignore(settings.ignore)
     timings: dict[str, float] = {}
     try:
-        scene = load_for_bake(path, bake_settings, lenient=True)
+        if not isinstance(scene, Scene):
+            scene = load_for_bake(path, bake_settings, lenient=True)
     except IndexRangeError as error:
         found = [_index_range(error)]
     else:

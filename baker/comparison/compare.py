@@ -23,6 +23,7 @@ from baker.core.errors import InputError
 from baker.core.geometry import world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
+from baker.core.result import Metrics, Result
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
@@ -37,7 +38,7 @@ LIMITED = (*(name for name in METRICS if not name.startswith(("noise", "z_", "en
 
 
 @dataclass(frozen=True)
-class ChannelDifference:
+class ChannelDifference(Metrics):
     """A channel at the points of both bakes.
 
     Attributes
@@ -53,9 +54,9 @@ class ChannelDifference:
     metrics: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Difference:
-    """What `compare` found.
+@dataclass(frozen=True, repr=False)
+class DiffReport(Result):
+    """The differences of two bakes.
 
     Attributes
     ----------
@@ -85,13 +86,36 @@ class Difference:
 
     @property
     def passed(self) -> bool:
-        """Tell whether no limit was passed."""
+        """Return whether no limit was exceeded."""
         return not any(verdict.failed for verdict in self.verdicts)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        rows: dict[str, Any] = {"passed": self.passed}
+        for name, channel in self.channels.items():
+            rows[f"{name} bias"], rows[f"{name} p95"] = channel.metrics["bias"], channel.metrics["p95"]
+        return rows | {"settings that differ": len(self.differences)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the comparison as plain values, the object of `baker diff` as JSON."""
+        return {
+            "passed": self.passed,
+            "channels": {name: check.metrics for name, check in self.channels.items()},
+            "objects": self.objects,
+            "worst": self.worst,
+            "differences": self.differences,
+            "only_in_a": self.only_in_a,
+            "only_in_b": self.only_in_b,
+            "unmatched": self.unmatched,
+            "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in self.verdicts],
+            "seconds": self.seconds,
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }
 
 
 def compare(
     a: Path | str, b: Path | str, settings: DiffSettings | None = None, progress: Progress = silent
-) -> Difference:
+) -> DiffReport:
     """Compare the bake in folder a with that in folder b.
 
     Parameters
@@ -105,7 +129,7 @@ def compare(
 
     Returns
     -------
-    Difference
+    DiffReport
         Figures of each channel that both bakes have, and the points furthest apart.
 
     Raises
@@ -152,8 +176,8 @@ def compare(
     where = points.at(sides.a, "position") + origin
     worst = worst_texels(first.scene.instances, size, pixel, owner, where, channels)
     worst = [entry for entry in worst if entry["error"] > 0]
-    _add_places(worst, first, second, sides, pixel, other)
-    return Difference(
+    _add_texels_of_b(worst, first, second, sides, pixel, other)
+    return DiffReport(
         a=first,
         b=second,
         channels=channels,
@@ -228,7 +252,7 @@ def _objects(
     return found
 
 
-def _add_places(
+def _add_texels_of_b(
     worst: list[dict[str, Any]],
     a: StoredBake,
     b: StoredBake,
@@ -236,7 +260,7 @@ def _add_places(
     pixel: NDArray[np.int64],
     other: SurfacePoints,
 ) -> None:
-    """Say where in b's maps the worst places are."""
+    """Add to each of the worst texels the texel of b at the same point of the surface."""
     size_a, size_b = a.atlas.resolution, b.atlas.resolution
     uv = other.at(sides.b, "uv")
     for entry in worst:
@@ -245,8 +269,8 @@ def _add_places(
         column, row = np.clip(np.floor(uv[i] * size_b), 0, size_b - 1).astype(int).tolist()
         triangle = other.triangle[i]
         instance = b.scene.instances[int(sides.b.instance[triangle])]
-        place = {"page": int(sides.b.page[triangle]), "row": row, "column": column}
-        entry["in_b"] = {"object": instance.name, "node": instance.node, **place}
+        texel = {"page": int(sides.b.page[triangle]), "row": row, "column": column}
+        entry["in_b"] = {"object": instance.name, "node": instance.node, **texel}
 
 
 def _named(bake: StoredBake, which: NDArray[np.bool_]) -> list[dict[str, Any]]:

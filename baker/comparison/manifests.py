@@ -1,4 +1,4 @@
-"""What two bakes say differently about how they were made."""
+"""Differences between the manifests of two bakes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.io.bake.read_bake import StoredBake
 
 
 def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> list[dict[str, Any]]:
-    """Return [{what, a, b}]: settings, input, versions, lights, pages, channels and places of objects.
+    """Return [{what, a, b}]: settings, input, versions, lights, pages, channels and matrices of objects.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def _facts(bake: StoredBake) -> Iterator[tuple[str, Any]]:
     for section in ("input", "settings", "versions"):
         entries = manifest.get(section)
         for key, value in entries.items() if isinstance(entries, dict) else ():
-            # The path is told from the output folder, so it differs with that, too.
+            # The path is relative to the output folder and differs with it.
             if (section, key) != ("input", "path"):
                 yield f"{section}.{key}", value
     yield "pages.count", bake.atlas.n_pages

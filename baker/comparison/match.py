@@ -1,8 +1,8 @@
 """Finds points of one bake's surface on another's.
 
-Where a pair of objects has the same mesh, a point has the same triangle and the same weights in both, so that
-a bake differs from itself by nothing at all, and an object that was moved is still compared with itself.
-Otherwise a point is looked for near its place in the world, on a face that looks the same way.
+If a pair of objects has the same mesh, a point has the same triangle and the same weights in both: a bake
+differs from itself by exactly 0, and an object that was moved is compared with itself. Otherwise the nearest
+point is searched along the normal, within a small distance in the world, on a face with a similar normal.
 """
 
 from __future__ import annotations
@@ -19,13 +19,17 @@ from baker.kernels.cast import first_hits
 from baker.trace.embree import RayScene
 from baker.trace.packets import new_packet_buffers
 
-# How far off a surface may be, as a share of the diagonal of the box around the object.
-_REACH = 1.0e-3
-# Triangles are lifted by this share of that, so that of two faces back to back the one in front is met.
+# Largest distance of the matched surface, as a share of the diagonal of the object's bounding box.
+_MAX_DISTANCE = 1.0e-3
+# Triangles are moved along their normal by this share of the largest distance: of two faces back to back, a
+# ray meets the one that faces it first.
 _LIFT = 0.01
+# Least cosine between the normals of matched faces.
 _ALIKE = 0.5
+# Hits that are tested along one ray.
 _LAYERS = 4
-# An object without a partner is there, too, if so much of its area lies on other surfaces without one.
+# An object without a partner counts as present if this share of its area lies on the other side's objects
+# without a partner.
 _PRESENT = 0.5
 
 
@@ -63,7 +67,7 @@ class Sides:
         Instances whose triangles' corners are in the reverse order of the mesh's.
     pairs : ObjectPairs
     missing_a, missing_b : (I,) bool
-        Objects that are nowhere on the other side.
+        Objects without a counterpart on the other side.
     """
 
     a: Geometry
@@ -76,7 +80,7 @@ class Sides:
 
 
 def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: ObjectPairs) -> Sides:
-    """Find the objects that are on one side only."""
+    """Return both surfaces, with the objects that exist on one side only."""
     return Sides(
         a,
         b,
@@ -89,7 +93,10 @@ def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: 
 
 
 def match(sides: Sides, points: SurfacePoints) -> SurfacePoints:
-    """Return where points of a lie on b; triangle -1 where that surface is not there."""
+    """Return the points of b that match points of a; triangle -1 where b has no such surface.
+
+    sides : both surfaces; points : on a
+    """
     a, pairs = sides.a, sides.pairs
     triangle, weight = np.full(len(points.triangle), -1, np.int64), np.zeros((len(points.triangle), 3))
     owner = a.instance[points.triangle]
@@ -104,13 +111,13 @@ def match(sides: Sides, points: SurfacePoints) -> SurfacePoints:
     for number in np.unique(owner[~equal & (partner >= 0)]):
         some = owner == number
         wanted = np.flatnonzero(sides.b.instance == pairs.partner[number])
-        found = _near(sides.b, wanted, *_places(a, points[some]), _reach(a, a.instance == number))
+        found = _near(sides.b, wanted, *_ray_starts(a, points[some]), _max_distance(a, a.instance == number))
         triangle[some], weight[some] = found.triangle, found.weight
     some = (partner < 0) & ~sides.missing_a[owner]
     if some.any():
         wanted = np.flatnonzero(np.isin(sides.b.instance, pairs.rest_b))
-        reach = _reach(a, np.isin(a.instance, pairs.rest_a))
-        found = _near(sides.b, wanted, *_places(a, points[some]), reach)
+        max_distance = _max_distance(a, np.isin(a.instance, pairs.rest_a))
+        found = _near(sides.b, wanted, *_ray_starts(a, points[some]), max_distance)
         triangle[some], weight[some] = found.triangle, found.weight
     return SurfacePoints(triangle, weight)
 
@@ -124,14 +131,14 @@ def _first(geometry: Geometry) -> NDArray[np.int64]:
     return np.searchsorted(geometry.instance, np.arange(count)).astype(np.int64)
 
 
-def _places(geometry: Geometry, points: SurfacePoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ray_starts(geometry: Geometry, points: SurfacePoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     normal = geometry.face_normal[points.triangle].astype(np.float64)
     return points.at(geometry, "position"), normal
 
 
-def _reach(geometry: Geometry, chosen: NDArray[np.bool_]) -> float:
+def _max_distance(geometry: Geometry, chosen: NDArray[np.bool_]) -> float:
     corner = geometry.position[geometry.triangle[chosen]].reshape(-1, 3).astype(np.float64)
-    return _REACH * float(np.linalg.norm(corner.max(axis=0) - corner.min(axis=0)))
+    return _MAX_DISTANCE * float(np.linalg.norm(corner.max(axis=0) - corner.min(axis=0)))
 
 
 def _missing(
@@ -141,16 +148,19 @@ def _missing(
     other: Geometry,
     other_rest: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Return (I,): instances of `rest` whose triangles' middles lie on none of the other side's rest."""
+    """Return (I,): instances of `rest` most of whose triangle centroids match nothing of `other_rest`."""
     missing = np.zeros(n_instances, bool)
     missing[rest] = True
     mine = np.flatnonzero(np.isin(geometry.instance, rest))
     wanted = np.flatnonzero(np.isin(other.instance, other_rest))
     if not len(mine) or not len(wanted):
         return missing
-    middle = SurfacePoints(mine, np.full((len(mine), 3), 1 / 3))
+    centroid = SurfacePoints(mine, np.full((len(mine), 3), 1 / 3))
     found = _near(
-        other, wanted, *_places(geometry, middle), _reach(geometry, np.isin(geometry.instance, rest))
+        other,
+        wanted,
+        *_ray_starts(geometry, centroid),
+        _max_distance(geometry, np.isin(geometry.instance, rest)),
     )
     area = geometry.area[mine].astype(np.float64)
     whole = np.bincount(geometry.instance[mine], area, n_instances)
@@ -163,41 +173,41 @@ def _near(
     wanted: NDArray[np.int64],
     position: NDArray[np.float64],
     normal: NDArray[np.float64],
-    reach: float,
+    max_distance: float,
 ) -> SurfacePoints:
-    """Return the nearest points on wanted triangles along the normals (n, 3) that face the same way."""
+    """Return the nearest points of wanted triangles along normals (n, 3), on faces with a similar normal."""
     n = len(position)
     triangle, offset = np.full(n, -1, np.int64), np.full(n, np.inf)
-    if not len(wanted) or reach <= 0:
+    if not len(wanted) or max_distance <= 0:
         return SurfacePoints(triangle, np.zeros((n, 3)))
     face = geometry.face_normal[wanted].astype(np.float64)
     corner = geometry.position[geometry.triangle[wanted]].astype(np.float64)
-    # Single precision is finest around 0.
+    # Relative to the centre: single precision is finest around 0.
     centre = corner.reshape(-1, 3).mean(axis=0)
-    lifted = corner - centre + _LIFT * reach * face[:, None]
+    lifted = corner - centre + _LIFT * max_distance * face[:, None]
     index = np.arange(3 * len(wanted), dtype=np.int32).reshape(-1, 3)
     rays = RayScene(lifted.reshape(-1, 3).astype(np.float32), index, threads=1)
-    origin = (position - centre + reach * normal).astype(np.float32)
-    way, far = (-normal).astype(np.float32), np.full(n, 2 * reach, np.float32)
+    origin = (position - centre + max_distance * normal).astype(np.float32)
+    direction, far = (-normal).astype(np.float32), np.full(n, 2 * max_distance, np.float32)
     near = np.zeros(n, np.float32)
-    going = np.arange(n)
+    active = np.arange(n)
     try:
         for _ in range(_LAYERS):
-            hit, distance = np.full(len(going), -1, np.int32), np.zeros(len(going), np.float32)
+            hit, distance = np.full(len(active), -1, np.int32), np.zeros(len(active), np.float32)
             first_hits(
                 new_packet_buffers(rays.tracer),
-                origin[going],
-                way[going],
-                near[going],
-                far[going],
+                origin[active],
+                direction[active],
+                near[active],
+                far[active],
                 hit,
                 distance,
             )
-            going, hit, distance = going[hit >= 0], hit[hit >= 0], distance[hit >= 0]
-            off = np.abs(distance.astype(np.float64) - reach)
-            better = ((face[hit] * normal[going]).sum(axis=1) > _ALIKE) & (off < offset[going])
-            triangle[going[better]], offset[going[better]] = hit[better], off[better]
-            near[going] = distance + np.float32(1e-3 * reach)
+            active, hit, distance = active[hit >= 0], hit[hit >= 0], distance[hit >= 0]
+            off = np.abs(distance.astype(np.float64) - max_distance)
+            better = ((face[hit] * normal[active]).sum(axis=1) > _ALIKE) & (off < offset[active])
+            triangle[active[better]], offset[active[better]] = hit[better], off[better]
+            near[active] = distance + np.float32(1e-3 * max_distance)
     finally:
         rays.close()
     met = triangle >= 0
@@ -207,7 +217,7 @@ def _near(
 
 
 def _weights(corner: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights (n, 3) of corners (n, 3, 3) at positions (n, 3), put on the triangle."""
+    """Return barycentric weights (n, 3) of positions (n, 3) in triangles (n, 3, 3), clamped to them."""
     u, v, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], position - corner[:, 0]
     uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
     pu, pv = (p * u).sum(axis=1), (p * v).sum(axis=1)

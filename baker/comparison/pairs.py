@@ -1,8 +1,8 @@
-"""Which object of one bake is which of another.
+"""Pairs the objects of two bakes.
 
-Objects with the same node and name are a pair; then those whose name occurs once among what is left on both
-sides; then those with the same node and the very same mesh (renamed ones). What is still left on both sides
-may have been joined or split: such surfaces are looked for in each other, whatever their objects.
+Objects with the same node and name are a pair; then those whose name occurs once among the remaining ones
+of both sides; then those with the same node and an equal mesh (renamed ones). The objects that remain may
+have been joined or split: points of one side are matched with all of the other side.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Mesh, Scene
 
-# Corners that lie nearer to each other, as a share of the mesh's largest coordinate, are the same.
+# Corners at a smaller distance, relative to the mesh's largest coordinate, are equal.
 _NEAR = 1.0e-6
 
 
@@ -41,7 +41,7 @@ class ObjectPairs:
 
 
 def pair_objects(a: Scene, b: Scene) -> ObjectPairs:
-    """Pair the instances of two scenes; see this file's head."""
+    """Pair the instances of two scenes by the rules at the top of this file."""
     partner = np.full(len(a.instances), -1, np.int64)
     known: dict[tuple[int, int], bool] = {}
 
@@ -71,14 +71,14 @@ def _pair(
     left = {i: key(instance) for i, instance in enumerate(a.instances) if partner[i] < 0}
     right = {j: key(instance) for j, instance in enumerate(b.instances) if j not in taken}
     count_a, count_b = Counter(left.values()), Counter(right.values())
-    place = {value: j for j, value in right.items()}
+    right_of = {value: j for j, value in right.items()}
     for i, value in left.items():
-        if count_a[value] == count_b[value] == 1 and accept(i, place[value]):
-            partner[i] = place[value]
+        if count_a[value] == count_b[value] == 1 and accept(i, right_of[value]):
+            partner[i] = right_of[value]
 
 
 def _same_mesh(a: Mesh, b: Mesh) -> bool:
-    """Tell whether the triangles of two meshes have the same corners, in the same order."""
+    """Return whether the triangles of two meshes have the same corners, in the same order."""
     if a.triangle.shape != b.triangle.shape:
         return False
     if not len(a.triangle):

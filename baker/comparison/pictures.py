@@ -1,4 +1,4 @@
-"""FLIP between two bakes: the pages of one, beside the same texels filled from the other's maps."""
+"""FLIP between two bakes: pages of a against the same texels with values from the maps of b."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import look_up_uv, one_surface_point
 
-# Of larger pages every second, third ... row and column is taken: FLIP takes two seconds for this many.
+# Larger pages are subsampled to at most this many rows and columns: FLIP takes two seconds for 512 x 512.
 _LARGEST = 512
 
 
@@ -42,23 +42,23 @@ def page_flip(
     a: StoredBake,
     b: StoredBake,
     sides: Sides,
-    judged: NDArray[np.bool_],
+    compared: NDArray[np.bool_],
     names: list[str],
     seed: int,
     progress: Progress,
 ) -> FlipMeans:
-    """Compare pages as pictures, means being over texels with surface that both bakes have.
+    """Compare pages as pictures; means are over texels whose surface both bakes have.
 
     Parameters
     ----------
-    judged : (P, H, W) bool
-        Texels of a on whose surface the bakes are compared.
+    compared : (P, H, W) bool
+        Texels of a at which the bakes are compared.
     """
     size, pages = a.atlas.resolution, a.atlas.n_pages
     step = -(-size // _LARGEST)
     total = {name: np.zeros((2, len(a.scene.instances))) for name in names}
     for number in range(pages):
-        row, column = np.nonzero(judged[number, ::step, ::step])
+        row, column = np.nonzero(compared[number, ::step, ::step])
         if not len(row):
             continue
         pixel = (number * size + row * step) * size + column * step

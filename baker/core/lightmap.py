@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
+from baker.core.result import Result
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 
@@ -44,8 +45,8 @@ class Lightmap:
     value: NDArray[np.float32]
 
 
-@dataclass(frozen=True)
-class BakeResult:
+@dataclass(frozen=True, repr=False)
+class BakeResult(Result):
     """All that a bake made.
 
     Attributes
@@ -79,3 +80,33 @@ class BakeResult:
     warnings: tuple[SceneWarning, ...] = ()
     out: Path | None = None
     manifest: dict[str, Any] = field(default_factory=dict)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        pages, height, width = self.status.shape
+        rows: dict[str, Any] = {
+            "pages": f"{pages} of {width} x {height}",
+            "texels": int(self.texel_count.sum()),
+        }
+        for name, lightmap in self.lightmaps.items():
+            mean = self.statistics.get(name, {}).get("mean")
+            rows[name] = lightmap.unit if mean is None else f"mean {mean:.4g} {lightmap.unit}"
+        rows["warnings"] = len(self.warnings)
+        return rows if self.out is None else {**rows, "out": str(self.out)}
+
+    def picture(self) -> NDArray[np.float32] | None:
+        """Return the first page of the first channel."""
+        return next((lightmap.value[0] for lightmap in self.lightmaps.values()), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return statistics, times and warnings as plain values, with the manifest of a written bake."""
+        found = {
+            "out": None if self.out is None else str(self.out),
+            "statistics": self.statistics,
+            "timings": self.timings,
+            "rays": self.rays,
+            "solve": self.solve,
+            "denoise": self.denoise,
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }
+        return {**found, **self.manifest}

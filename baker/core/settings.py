@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
-from baker.core.settings_model import Names, Settings, Text, seed_setting, setting, threads_setting
+from baker.core.settings_model import Names, Numbers, Settings, Text, seed_setting, setting, threads_setting
 
 # Hemisphere rays per texel of each preset. Light samples per texel are as many.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
@@ -41,7 +41,7 @@ class CommonSettings(Settings):
     ao_distance: Text = setting(
         "10%", "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
     )
-    sky: Text | None = setting(None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2")
+    sky: Numbers | None = setting(None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2")
     sky_strength: float = setting(1.0, "Factor on the sky.", ge=0, allow_inf_nan=False)
     bounces: int | None = setting(None, "Reflections of light; default: until converged.", ge=0, le=1000)
     denoise: bool = setting(True, "Denoise with Open Image Denoise.")

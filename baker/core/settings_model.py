@@ -8,6 +8,7 @@ makes flags of them, and `docs/make_keywords.py` makes the keywords of the Pytho
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
@@ -51,6 +52,24 @@ def setting(
     return Field(default, description=description, json_schema_extra=extra, **bounds)
 
 
+def same_setting(model: type[Settings], name: str) -> Any:
+    """Return a field of another model, for a model that has the same setting.
+
+    Parameters
+    ----------
+    model : type of Settings
+        The model that declares the setting.
+    name : str
+        Of the setting.
+
+    Returns
+    -------
+    FieldInfo
+        Typed as Any, as that of `setting`.
+    """
+    return copy(model.model_fields[name])
+
+
 def _split(value: Any) -> Any:
     """Return the names in a text with commas, or in a list of such texts; other values as they are."""
     if isinstance(value, list | tuple) and all(isinstance(part, str) for part in value):
@@ -63,10 +82,13 @@ def _one_name(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-def _as_text(value: Any) -> Any:
+def _as_list_text(value: Any) -> Any:
     """Return numbers, and lists of them with commas, as text; other values as they are."""
-    if isinstance(value, list | tuple):
-        return ",".join(map(str, value))
+    return ",".join(map(str, value)) if isinstance(value, list | tuple) else _as_text(value)
+
+
+def _as_text(value: Any) -> Any:
+    """Return a number as text; other values as they are."""
     return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
@@ -74,8 +96,10 @@ def _as_text(value: Any) -> Any:
 Names = Annotated[tuple[str, ...], BeforeValidator(_split)]
 # A list of texts that may hold commas.
 Texts = Annotated[tuple[str, ...], BeforeValidator(_one_name)]
-# A text that may be given as a number or a list of numbers.
+# A text that may be given as a number.
 Text = Annotated[str, BeforeValidator(_as_text)]
+# A text of numbers with commas, which may be given as a number or a list of numbers.
+Numbers = Annotated[str, BeforeValidator(_as_list_text)]
 
 
 class Settings(BaseModel):

@@ -31,6 +31,7 @@ from baker.pipeline.pages import TracedTexels, finish_pages
 from baker.pipeline.prepare import prepare_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import trace_transport
+from baker.uv.settings import settings_of_atlas
 from baker.uv.unwrap import unwrap_scene
 
 
@@ -42,6 +43,7 @@ def bake(
     progress: Progress = silent,
     force: bool = False,
     executor: TileExecutor | None = None,
+    atlas: Atlas | None = None,
 ) -> BakeResult:
     """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
 
@@ -59,6 +61,8 @@ def bake(
         Replace an `out` that baker did not write.
     executor : TileExecutor, optional
         Runs the tiles of the ray stages; None is this process.
+    atlas : Atlas, optional
+        Lightmap uv of the scene; its resolution and padding replace those of `settings`.
 
     Returns
     -------
@@ -89,10 +93,12 @@ def bake(
                 check_brightness(scene)
             else:
                 scene = load_for_bake(scene, settings)
+        if atlas is not None:
+            settings = settings_of_atlas(scene, atlas, settings)
         compiling = precompile.restart_for_materials(compiling, scene)
         record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
         with record.stage(Stage.UNWRAP):
-            atlas = unwrap_scene(scene, settings, progress)
+            atlas = atlas or unwrap_scene(scene, settings, progress)
         record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
         traced = _trace(scene, atlas, settings, channels, record, executor or LocalTileExecutor(), compiling)
         precompile.finish(compiling, progress)

@@ -28,7 +28,7 @@ _new_value, _new_rgba = scratch((3,), np.float64), scratch((4,), np.float64)
 
 @dataclass(frozen=True)
 class BakedLight:
-    """A finished bake, ready to light a picture.
+    """A finished bake as the light of a picture.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class BakedLight:
         Raises
         ------
         InputError
-            If it holds no bake, or one without irradiance.
+            If the folder holds no bake, or one without irradiance.
         """
         bake = read_bake(folder)
         if "irradiance" not in bake.maps:
@@ -55,7 +55,7 @@ class BakedLight:
         return cls(bake, world_geometry(bake.scene, bake.atlas))
 
     def radiance(self, reference: Reference, hits: FirstHits) -> NDArray[np.float64]:
-        """Return the radiance (n, 3), cd/m2, that leaves hits; 0 where nothing was met or a back is black."""
+        """Return the radiance (n, 3), cd/m2, that leaves hits; 0 for misses and one-sided backs."""
         light = np.zeros((len(hits.triangle), 3))
         lit = np.flatnonzero(hits.lit)
         triangle, bary = hits.triangle[lit], hits.bary[lit]

@@ -1,4 +1,4 @@
-"""Picks one of a file's own cameras."""
+"""Selects one of the cameras of a scene file."""
 
 from __future__ import annotations
 
@@ -7,19 +7,24 @@ from collections.abc import Sequence
 from baker.core.errors import SettingsError
 from baker.core.scene import Camera
 
-# Cameras told in an error before the rest is only counted.
-_TOLD = 12
+# Cameras listed in an error before the rest is only counted.
+_LISTED = 12
 
 
 def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
-    """Return the camera of a name, or of a place in the file's order, from 0.
+    """Return the camera of a name, or of an index in the order of the file, from 0.
 
     Parameters
     ----------
     cameras : sequence of Camera
         As `baker inspect` lists them.
     text : str
-        A name counts before a number.
+        A name or an index; a camera whose name is the text wins.
+
+    Returns
+    -------
+    Camera
+        One of `cameras`.
 
     Raises
     ------
@@ -34,11 +39,11 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     if not cameras:
         message = "the file has no camera of its own; give seven numbers, PX,PY,PZ,TX,TY,TZ,FOV"
         raise SettingsError(message, object="camera")
-    told = ", ".join(f"{number} '{camera.name}'" for number, camera in enumerate(cameras[:_TOLD]))
-    more = f" and {len(cameras) - _TOLD} more (see baker inspect)" if len(cameras) > _TOLD else ""
+    listed = ", ".join(f"{number} '{camera.name}'" for number, camera in enumerate(cameras[:_LISTED]))
+    more = f" and {len(cameras) - _LISTED} more (see baker inspect)" if len(cameras) > _LISTED else ""
     what = (
         f"{len(found)} cameras are named '{text}'; say which by its number"
         if found
         else f"no camera '{text}'"
     )
-    raise SettingsError(f"{what}; the file has {told}{more}", object="camera")
+    raise SettingsError(f"{what}; the file has {listed}{more}", object="camera")

@@ -1,6 +1,6 @@
-"""The passes that a picture is the mean of, and what first hits alone tell.
+"""The passes whose mean is a picture, and the layers that need first hits only.
 
-Pixels are worked on in blocks, so that memory beyond the picture itself does not grow with it.
+Pixels are computed in blocks, so that temporary memory does not grow with the picture.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from baker.rendering.settings import RenderSettings
 
 # Samples of a pixel in one pass.
 _PASS, _OPENNESS_PASS = 4, 16
-# Samples that a slow machine makes in a second: passes are small where time is short.
+# Samples per second of a slow machine, for the size of passes under a time limit.
 _RATE, _OPENNESS_RATE = 2.0e4, 2.0e5
 _BLOCK = 1 << 14
 _AOV_SAMPLES = 4
@@ -72,11 +72,11 @@ class Run:
         return max(most, 1)
 
     def enough(self, estimate: PointEstimate) -> bool:
-        """Tell if rendering may end: all samples are made, or another pass would take too long."""
+        """Return whether rendering may end: all samples are made, or another pass would take too long."""
         now = time.monotonic()
         last, self.passed = now - self.passed, now
-        self.tell(estimate, 0.0)
-        # Two passes at least: there is no variance of one.
+        self.show(estimate, 0.0)
+        # At least two passes: the variance needs two.
         if estimate.rounds < 2:
             return False
         goal, limit = self.settings.goal, self.settings.time_limit
@@ -84,8 +84,8 @@ class Run:
             return True
         return limit is not None and now - self.start + last > limit
 
-    def tell(self, estimate: PointEstimate, part: float) -> None:
-        """Report how far the picture is, `part` of the next pass being done."""
+    def show(self, estimate: PointEstimate, part: float) -> None:
+        """Report the progress of the picture; `part` of the next pass is done."""
         goal, limit = self.settings.goal, self.settings.time_limit
         done = estimate.rounds * estimate.samples
         by_samples = 0.0 if goal is None else (done + part * estimate.samples) / goal
@@ -93,19 +93,19 @@ class Run:
         report(self.progress, Stage.RENDERING, min(max(by_samples, by_time), 1.0), f"{done} samples a pixel")
 
     def within(self, estimate: PointEstimate) -> Progress:
-        """Return what a pass may report to: its share counts as a share of the picture."""
+        """Return a progress callback for one pass: its fraction is scaled to that of the picture."""
 
-        def told(_: str, fraction: float, __: str = "", /) -> None:
-            self.tell(estimate, fraction)
+        def scaled(_: str, fraction: float, __: str = "", /) -> None:
+            self.show(estimate, fraction)
 
-        return told
+        return scaled
 
     def hits(self, begin: int, end: int, number: int) -> FirstHits:
-        """Return what one ray through each pixel from `begin` to `end` meets in pass `number`."""
+        """Return the first hits of one ray through each pixel from `begin` to `end` in pass `number`."""
         settings, camera = self.settings, self.camera
         pixel = np.arange(begin, end)
-        way = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
-        return first_hits(self.reference, self.reference.local(camera.position), way.reshape(-1, 3))
+        direction = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
+        return first_hits(self.reference, self.reference.local(camera.position), direction.reshape(-1, 3))
 
     def blocks(self, work: Callable[[int, int], None], progress: Progress) -> None:
         """Call `work(begin, end)` for all pixels, on all threads."""
@@ -133,13 +133,13 @@ def traced(run: Run) -> PointEstimate:
     return estimate
 
 
-def openness(run: Run, distance: float) -> PointEstimate:
-    """Return ambient occlusion (H * W, 1), 1 being open; where nothing is met it is open."""
+def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
+    """Return ambient occlusion (H * W, 1), 0 to 1; 1 where a camera ray hits nothing."""
     estimate = new_estimate(run.pixels, 1, run.samples(_OPENNESS_PASS, _OPENNESS_RATE))
     while not run.enough(estimate):
         cast = run.pixels
         for begin in range(0, run.pixels, _BLOCK):
-            run.tell(estimate, begin / run.pixels)
+            run.show(estimate, begin / run.pixels)
             end = min(begin + _BLOCK, run.pixels)
             hits = run.hits(begin, end, estimate.rounds)
             met = np.flatnonzero(hits.triangle >= 0)
@@ -159,7 +159,7 @@ def openness(run: Run, distance: float) -> PointEstimate:
 
 
 def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
-    """Return what an engine shows (H * W, 3), cd/m2: albedo x map / pi + emission, black backs, the sky."""
+    """Return the radiance an engine shows (H * W, 3), cd/m2: albedo x map / pi + emission, or the sky."""
     estimate = new_estimate(run.pixels, 3, 1)
 
     def work(begin: int, end: int) -> None:

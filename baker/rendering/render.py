@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.progress import Progress, report, silent
+from baker.core.result import Result
 from baker.core.scene import Camera, Scene, SceneWarning
 from baker.core.stage import Stage
 from baker.io.load import load_scene
@@ -19,21 +22,24 @@ from baker.pathtracer.camera import parse_camera
 from baker.pathtracer.scene import Reference, build_reference
 from baker.rendering.baked import BakedLight, other_scene
 from baker.rendering.cameras import named_camera
-from baker.rendering.passes import Run, first_layers, lit_by, openness, traced
+from baker.rendering.passes import Run, ambient_occlusion, first_layers, lit_by, traced
 from baker.rendering.settings import RenderSettings
 
 
-@dataclass(frozen=True)
-class Picture:
+@dataclass(frozen=True, repr=False)
+class Picture(Result):
     """A rendered picture.
 
     Attributes
     ----------
-    colour : (H, W, 3) float32, cd/m2, or the open share three times
-    variance : (H, W, 3) float32, of `colour` before any denoising
+    colour : (H, W, 3) float32
+        Radiance, cd/m2; or ambient occlusion, three equal components.
+    variance : (H, W, 3) float32
+        Of `colour`, before denoising.
     layers : dict of name to (H, W, C) float32
     unit : str
-    spp, rays : int; seconds : float
+    spp, rays : int
+    seconds : float
     camera : Camera
     warnings : list of SceneWarning
     """
@@ -48,6 +54,41 @@ class Picture:
     camera: Camera
     warnings: list[SceneWarning] = field(default_factory=list)
 
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        height, width = self.colour.shape[:2]
+        return {
+            "size": f"{width} x {height}",
+            "unit": self.unit,
+            "samples a pixel": self.spp,
+            "mean": float(self.colour.mean()),
+            "seconds": self.seconds,
+        }
+
+    def picture(self) -> NDArray[np.float32]:
+        """Return the colours; ambient occlusion as one component."""
+        return self.colour if self.unit != "1" else self.colour[..., :1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return size, camera, rays and warnings as plain values; no pixels."""
+        height, width = self.colour.shape[:2]
+        eye = self.camera
+        return {
+            "width": width,
+            "height": height,
+            "spp": self.spp,
+            "seconds": self.seconds,
+            "rays": self.rays,
+            "unit": self.unit,
+            "mean": [float(v) for v in self.colour.mean(axis=(0, 1), dtype=float)],
+            "camera": {
+                "position": list(eye.position),
+                "target": [p + f for p, f in zip(eye.position, eye.forward, strict=True)],
+                "fov": math.degrees(eye.fov),
+            },
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }
+
 
 def render(
     scene: Scene | Path | str, settings: RenderSettings | None = None, progress: Progress = silent
@@ -57,23 +98,39 @@ def render(
     Parameters
     ----------
     scene : Scene, Path or str
-        Of a path, textures of metallic and roughness are read, too. With `settings.lightmap` the bake's own
-        scene is shown; a path that is not what was baked is warned about.
+        Of a path, textures of metallic and roughness are read, too. With `settings.lightmap` the scene of the
+        bake is shown; a path to another scene is a warning.
+    settings : RenderSettings, optional
+        Camera, size, samples, and which quantity is rendered.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+
+    Returns
+    -------
+    Picture
+        Pixels, layers, camera, warnings.
 
     Raises
     ------
-    InputError, SettingsError, ResourceError, Cancelled
+    InputError
+        If the scene or the bake cannot be read, or there is no camera.
+    SettingsError
+        If there is no camera of that name.
+    ResourceError
+        If memory or the denoiser is missing.
+    Cancelled
+        If `progress` answers so.
     """
     settings = settings or RenderSettings()
     start = time.monotonic()
     report(progress, Stage.LOAD, 0.0)
-    # Seven numbers are judged before anything is loaded; a name needs the file.
+    # Parse seven numbers before anything is loaded; a name needs the file.
     text = settings.camera
     camera = parse_camera(text) if text is not None and ("," in text or not text) else None
     if settings.denoise:
         from baker.finish.oidn import denoiser_name
 
-        # Here, so that nobody waits for a picture that cannot be denoised.
+        # Fails here, before any work, if the picture cannot be denoised.
         denoiser_name()
     warnings: list[SceneWarning] = []
     baked, sky = None, settings.sky_radiance
@@ -91,7 +148,7 @@ def render(
     with build_reference(scene, sky=sky, threads=settings.threads) as reference:
         run = Run(reference, camera or _own_camera(scene, reference), settings, start, progress)
         if settings.ao:
-            estimate = openness(run, settings.ao_reach(reference.geometry.diagonal))
+            estimate = ambient_occlusion(run, settings.ao_reach(reference.geometry.diagonal))
         elif baked is not None:
             estimate = lit_by(run, baked, sky)
         else:
@@ -138,7 +195,7 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
         max(float(np.linalg.norm(high - low)), 1e-6),
     )
     eye = middle + size * np.array([0.35, 0.3, 1.15])
-    # Enough digits to see the difference of eye and target.
+    # Enough digits to tell eye and target apart far from 0.
     digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
     numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(

@@ -8,7 +8,7 @@ from typing import ClassVar
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings import BakeSettings, ao_metres
-from baker.core.settings_model import Names, Settings, Text, seed_setting, setting, threads_setting
+from baker.core.settings_model import Names, Numbers, Settings, Text, same_setting, setting
 
 AOVS = ("albedo", "normal", "depth")
 DEFAULT_SPP = 64
@@ -51,12 +51,12 @@ class RenderSettings(Settings):
     aov: Names = setting((), "Further layers: albedo, normal, depth.")
     denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
     lightmap: Path | None = setting(None, "Light the scene by this bake instead.", metavar="OUT")
-    sky: Text | None = setting(
+    sky: Numbers | None = setting(
         None, "Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.", unit="cd/m2"
     )
-    sky_strength: float = setting(1.0, "Factor on the sky.", ge=0, allow_inf_nan=False)
-    seed: int = seed_setting()
-    threads: int | None = threads_setting()
+    sky_strength: float = same_setting(BakeSettings, "sky_strength")
+    seed: int = same_setting(BakeSettings, "seed")
+    threads: int | None = same_setting(BakeSettings, "threads")
 
     def check(self) -> None:
         """Raise `SettingsError` for values that do not go together."""

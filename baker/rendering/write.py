@@ -1,7 +1,7 @@
-"""Writes a rendered picture: EXR with its layers, or PNG for people.
+"""Writes a rendered picture: EXR with its layers, or PNG.
 
-PNG: x = L / (L + m) for each colour, m being the median luminance of what is not black, then the sRGB curve;
-an ambient occlusion picture is stored as it is, without any curve. The file says which in a text chunk.
+PNG: x = L / (L + m) for each colour, m being the median luminance of pixels that are not black, then the sRGB
+curve. Ambient occlusion is stored linearly, 0 to 1 as 0 to 255. A text chunk of the file names the mapping.
 """
 
 from __future__ import annotations
@@ -27,7 +27,14 @@ PLAIN = "none, 0 to 1 is 0 to 255"
 
 
 def check_image(path: Path, aov: Collection[str] = ()) -> None:
-    """Make sure, before the long work, that a picture with layers `aov` may be written to `path`.
+    """Check, before the long work, that a picture with layers `aov` can be written to `path`.
+
+    Parameters
+    ----------
+    path : Path
+        An EXR or PNG file, which need not exist.
+    aov : collection of str
+        Names of layers; only an EXR holds them.
 
     Raises
     ------
@@ -50,7 +57,14 @@ def check_image(path: Path, aov: Collection[str] = ()) -> None:
 
 
 def write_picture(path: Path, picture: Picture) -> None:
-    """Write a picture so that it is either whole or not there.
+    """Write a picture in one step: the file is complete, or as it was.
+
+    Parameters
+    ----------
+    path : Path
+        An EXR or PNG file.
+    picture : Picture
+        As `render` returns it.
 
     Raises
     ------
@@ -66,14 +80,27 @@ def write_picture(path: Path, picture: Picture) -> None:
 
 
 def tone_of(path: Path, picture: Picture) -> str | None:
-    """Return how `path` holds light as levels; None for an EXR, which holds it as it is."""
+    """Return the tone mapping of a file.
+
+    Parameters
+    ----------
+    path : Path
+        An EXR or PNG file.
+    picture : Picture
+        The picture in it.
+
+    Returns
+    -------
+    str or None
+        In words; None for an EXR, which stores radiance.
+    """
     if path.suffix.lower() != ".png":
         return None
     return PLAIN if picture.unit == "1" else TONE
 
 
 def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
-    """Return (H, W, 3) uint8; see the head of this file."""
+    """Return (H, W, 3) uint8 by the mapping at the top of this file."""
     colour = picture.colour
     if picture.unit == "1":
         return grey_levels(colour)
@@ -84,7 +111,18 @@ def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
 
 
 def exr_layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
-    """Return all planes (H, W) by the names of their EXR channels."""
+    """Return the channels of an EXR.
+
+    Parameters
+    ----------
+    picture : Picture
+        Colours, variance and layers.
+
+    Returns
+    -------
+    dict of str to (H, W) float32
+        By the names of the channels: R, variance.R, albedo.R, normal.X, depth.Z ...
+    """
     named = {"": picture.colour, "variance.": picture.variance}
     named.update({f"{name}.": layer for name, layer in picture.layers.items()})
     letters = {"normal.": "XYZ", "depth.": "Z"}

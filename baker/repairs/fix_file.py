@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report, silent
+from baker.core.result import Result
 from baker.core.scene import Scene, SourceDocument
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 from baker.core.stage import Stage
@@ -55,8 +56,8 @@ class LeftAlone:
     reason: str
 
 
-@dataclass(frozen=True)
-class FixResult:
+@dataclass(frozen=True, repr=False)
+class FixResult(Result):
     """A fixed scene.
 
     Attributes
@@ -71,8 +72,12 @@ class FixResult:
     fixed: tuple[Fix, ...]
     left_alone: tuple[LeftAlone, ...]
 
-    def json(self) -> dict[str, Any]:
-        """Return the keys `fixed` and `left_alone` of `--json`."""
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        return {"fixed": len(self.fixed), "left alone": len(self.left_alone)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the keys `fixed` and `left_alone` of the object of `baker check` as JSON."""
         return {
             "fixed": [
                 {"object": fix.object, "node": fix.node, **_change_json(fix.change)} for fix in self.fixed

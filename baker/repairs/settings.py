@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from baker.core.settings_model import Settings, setting, threads_setting
+from baker.core.settings import BakeSettings
+from baker.core.settings_model import Settings, same_setting, setting
 
 
 class RepairSettings(Settings):
@@ -21,6 +22,6 @@ class RepairSettings(Settings):
     resolution: int = setting(
         1024, "Page width for which lightmap uv are tested and made.", unit="texels", ge=16, le=16384
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")
-    scale: float = setting(1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0)
-    threads: int | None = threads_setting()
+    up: Literal["y", "z"] = same_setting(BakeSettings, "up")
+    scale: float = same_setting(BakeSettings, "scale")
+    threads: int | None = same_setting(BakeSettings, "threads")

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from baker.io.junit import Case, junit_text, write_text
-from baker.verification.verify import Verification
+from baker.verification.verify import VerifyReport
 
 
-def write_junit(path: Path, found: Verification) -> None:
+def write_junit(path: Path, found: VerifyReport) -> None:
     """Write the JUnit file.
 
     Parameters
     ----------
     path : Path
         File to write.
-    found : Verification
+    found : VerifyReport
         Result of `verify`.
 
     Raises

@@ -17,8 +17,7 @@ from baker.io.junit import write_text
 from baker.io.png import encode_png, srgb_levels
 from baker.metrics.error_metrics import dark_floor, relative_error
 from baker.verification.criteria.registry import METRIC_NAMES
-from baker.verification.summary import mean_flip, verification_json
-from baker.verification.verify import ChannelCheck, Verification
+from baker.verification.verify import ChannelCheck, VerifyReport
 
 # Largest side of the image of a page, texels, and largest number of regions listed.
 _SHOWN, _REGIONS = 512, 40
@@ -33,14 +32,14 @@ figure{display:inline-block;margin:.5rem 1rem .5rem 0}figcaption{font-size:13px;
 .bad{color:#b00020;font-weight:600}.good{color:#187a2f;font-weight:600}"""
 
 
-def write_report(path: Path, found: Verification) -> None:
+def write_report(path: Path, found: VerifyReport) -> None:
     """Write the page.
 
     Parameters
     ----------
     path : Path
         File to write.
-    found : Verification
+    found : VerifyReport
         Result of `verify`.
 
     Raises
@@ -51,9 +50,9 @@ def write_report(path: Path, found: Verification) -> None:
     write_text(path, report_html(found))
 
 
-def report_html(found: Verification) -> str:
+def report_html(found: VerifyReport) -> str:
     """Return the page as text."""
-    summary = verification_json(found)
+    summary = found.to_dict()
     verdict = '<span class="good">passed</span>' if found.passed else '<span class="bad">failed</span>'
     scene = html.escape(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
     parts = [
@@ -78,7 +77,7 @@ def report_html(found: Verification) -> str:
     )
 
 
-def _failures(found: Verification) -> str:
+def _failures(found: VerifyReport) -> str:
     lines = [
         f"{verdict.limit}: it is {'missing' if verdict.value is None else f'{verdict.value:.4g}'}"
         for verdict in found.verdicts
@@ -89,7 +88,7 @@ def _failures(found: Verification) -> str:
     return f"<ul>{items}</ul>" if lines else ""
 
 
-def _limits_table(found: Verification) -> str:
+def _limits_table(found: VerifyReport) -> str:
     rows = ""
     for verdict in found.verdicts:
         words = '<td class="bad">failed</td>' if verdict.failed else '<td class="good">holds</td>'
@@ -99,7 +98,7 @@ def _limits_table(found: Verification) -> str:
     return f"<h2>Limits</h2>{note}<table>{head}{rows}</table>"
 
 
-def _regions_table(found: Verification) -> str:
+def _regions_table(found: VerifyReport) -> str:
     rows = ""
     for row in found.regions[:_REGIONS]:
         colour = " ".join(f"{shift:+.1%}" for shift in row["colour"])
@@ -122,14 +121,14 @@ def _regions_table(found: Verification) -> str:
     return f"<h2>Regions</h2>{note}<div class=wide><table><tr>{head}</tr>{rows}</table></div>"
 
 
-def _metrics_table(found: Verification) -> str:
+def _metrics_table(found: VerifyReport) -> str:
     # One row for each metric: columns would be wider than a page.
     head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
     rows = ""
     for key in METRIC_NAMES:
         cells = "".join(f"<td>{_number(check.metrics[key])}</td>" for check in found.channels.values())
         rows += f"<tr><td>{key}</td>{cells}</tr>"
-    cells = "".join(f"<td>{_number(mean_flip(found, name))}</td>" for name in found.channels)
+    cells = "".join(f"<td>{_number(found.flip(name))}</td>" for name in found.channels)
     rows += f"<tr><td>flip</td>{cells}</tr>"
     note = (
         "<p>bias, median, p95, p99, max and noise_floor are relative; noise_floor is what the reference's "
@@ -146,7 +145,7 @@ def _number(value: Any) -> str:
     return str(value) if isinstance(value, int) else f"{value:.4g}"
 
 
-def _pages(found: Verification, name: str, check: ChannelCheck) -> str:
+def _pages(found: VerifyReport, name: str, check: ChannelCheck) -> str:
     """Return an image of each page, and a map of the errors of the compared texels."""
     size = found.bake.atlas.resolution
     step = max(size // _SHOWN, 1)
@@ -212,7 +211,7 @@ def _histogram(histogram: dict[str, list[float]]) -> str:
     )
 
 
-def _crops(found: Verification) -> str:
+def _crops(found: VerifyReport) -> str:
     if not found.crops:
         return ""
     text = "<h2>Around the worst texels</h2>"
@@ -226,7 +225,7 @@ def _crops(found: Verification) -> str:
     return text
 
 
-def _worst_table(found: Verification) -> str:
+def _worst_table(found: VerifyReport) -> str:
     rows = ""
     for entry in found.worst:
         position = ", ".join(f"{x:.3f}" for x in entry["position"])
@@ -241,7 +240,7 @@ def _worst_table(found: Verification) -> str:
     return f"<h2>Worst texels</h2><div class=wide><table>{head}{rows}</table></div>"
 
 
-def _objects_table(found: Verification) -> str:
+def _objects_table(found: VerifyReport) -> str:
     shown = ("texels", "bias", "median", "p95", "noise_floor")
     rows = ""
     for entry in found.objects:

@@ -19,10 +19,12 @@ from baker.core.errors import InputError
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
+from baker.core.result import Metrics, Result
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
 from baker.kernels.not_kept import cache_warnings
+from baker.metrics.error_metrics import z_scores
 from baker.metrics.groups import ComparedPoints
 from baker.metrics.limits import Verdict, evaluate_limits, parse_limits
 from baker.metrics.texel_area import look_up
@@ -52,7 +54,7 @@ _CROP_TIME = 0.1
 
 
 @dataclass(frozen=True)
-class ChannelCheck:
+class ChannelCheck(Metrics):
     """Stored and path-traced values of a channel's n texels, with metrics.
 
     Attributes
@@ -89,8 +91,8 @@ class ChannelCheck:
         return power
 
 
-@dataclass(frozen=True)
-class Verification:
+@dataclass(frozen=True, repr=False)
+class VerifyReport(Result):
     """The result of `verify`.
 
     Attributes
@@ -145,6 +147,56 @@ class Verification:
         """Return whether no limit failed."""
         return not any(verdict.failed for verdict in self.verdicts)
 
+    def flip(self, channel: str) -> float | None:
+        """Return the mean FLIP of a channel's crops, None without any."""
+        values = [crop.flip for crop in self.crops if crop.channel == channel]
+        return float(np.mean(values)) if values else None
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        rows: dict[str, Any] = {"passed": self.passed}
+        for name, channel in self.channels.items():
+            for figure in ("bias", "median", "p95"):
+                rows[f"{name} {figure}"] = channel.metrics[figure]
+        return rows | {"texels": len(self.pixel), "failed": ", ".join(self.problems) or "nothing"}
+
+    def picture(self) -> NDArray[np.float32] | None:
+        """Return the first page of the bake."""
+        return next((pages[0] for pages in self.bake.maps.values()), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the verification as plain values, the object of `baker verify` as JSON."""
+        return {
+            "passed": self.passed,
+            "channels": {
+                name: {
+                    **check.metrics,
+                    "unresolved": check.unresolved,
+                    "flip": self.flip(name),
+                    "z_histogram": _histogram(check),
+                }
+                for name, check in self.channels.items()
+            },
+            "objects": self.objects,
+            "levels": self.levels,
+            "regions": self.regions,
+            "worst": self.worst,
+            "limits": [{"limit": str(v.limit), "value": v.value, "failed": v.failed} for v in self.verdicts],
+            "problems": self.problems,
+            "invalid": self.invalid,
+            "rays": self.rays,
+            "seconds": self.seconds,
+            "compile_seconds": self.compile_seconds,
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }
+
+
+def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
+    """Return counts of z-scores between -6 and 6; values beyond are in the outer bins."""
+    z = np.clip(z_scores(check.value, check.reference, check.standard_error), -5.99, 5.99)
+    count, edge = np.histogram(z, bins=24, range=(-6.0, 6.0))
+    return {"edges": edge.tolist(), "counts": count.tolist()}
+
 
 @dataclass(frozen=True)
 class _Traced:
@@ -158,7 +210,7 @@ class _Traced:
 
 def verify(
     out: Path | str, settings: VerifySettings | None = None, progress: Progress = silent
-) -> Verification:
+) -> VerifyReport:
     """Compare the bake in a folder with path-traced values.
 
     Parameters
@@ -172,7 +224,7 @@ def verify(
 
     Returns
     -------
-    Verification
+    VerifyReport
         Metrics of all channels, and whether the limits hold.
 
     Raises
@@ -197,7 +249,7 @@ def verify(
     found = _compare(bake, names, settings, progress)
     metrics = {name: check.metrics for name, check in found.channels.items()}
     verdicts = evaluate_limits(limits, metrics, missing_fails=settings.fail_if is not None)
-    return Verification(
+    return VerifyReport(
         bake=bake,
         pixel=found.pixel,
         owner=found.owner,

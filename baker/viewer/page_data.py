@@ -1,6 +1,6 @@
 """Lightmap pages as numbers that a browser uploads unchanged.
 
-Halves stay halves, so that what the page shows of a texel is what the EXR holds, bit by bit.
+Half floats stay half floats, so that the values in the page are those of the EXR, bit by bit.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 
 def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
-    """Return a page as one or four numbers a texel, as halves if that loses nothing.
+    """Return a page with one or four components per texel, as half floats if they are exact.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
     Returns
     -------
     (H, W, 1) or (H, W, 4) float16 or float32
-        Channels that `page` lacks are 1 (graphics hardware has no three-number textures that all draw).
+        Added components are 1: not all graphics hardware can draw from three-component float textures.
     """
     height, width, channels = page.shape
     wide = page

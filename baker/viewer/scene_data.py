@@ -1,6 +1,6 @@
-"""A bake as the page wants it: one JSON object that describes, and flat arrays that are only copied.
+"""The data of the viewer page: one JSON object, and flat arrays that the browser uploads as they are.
 
-World-space triangles are sorted by page and material, so that the page draws one range for each pair.
+World-space triangles are sorted by page and material, so that the page makes one draw call for each pair.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _TYPES = {"float32": "float", "uint32": "uint"}
 
 @dataclass(frozen=True)
 class SceneData:
-    """What the page reads before it draws.
+    """The header, geometry and textures of a bake.
 
     Attributes
     ----------
@@ -45,15 +45,17 @@ class SceneData:
 
 
 def scene_data(bake: StoredBake) -> SceneData:
-    """Describe a bake for the page.
+    """Return the data that the page shows.
 
     Parameters
     ----------
     bake : StoredBake
+        The bake.
 
     Returns
     -------
     SceneData
+        Header, geometry and textures.
     """
     geometry = world_geometry(bake.scene, bake.atlas)
     images: list[NDArray[Any]] = []
@@ -62,7 +64,7 @@ def scene_data(bake: StoredBake) -> SceneData:
     position = geometry.position[np.unique(geometry.triangle)] if len(order) else np.zeros((1, 3), np.float32)
     source = str(bake.manifest.get("input", {}).get("path") or "")
     header = {
-        # `scene.glb` is called the same in every bake: the input's name tells more.
+        # The name of the input: `scene.glb` has the same name in every bake.
         "name": PurePath(source).stem or bake.folder.resolve().name,
         "folder": str(bake.folder.resolve()),
         "input": source,
@@ -72,7 +74,7 @@ def scene_data(bake: StoredBake) -> SceneData:
         "pages": bake.atlas.n_pages,
         "triangles": len(geometry.triangle),
         "box": {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()},
-        # What positions, the box and the camera are relative to: the world's 0 may be far away.
+        # Positions, the box and the camera are relative to this point of the world.
         "origin": geometry.origin.tolist(),
         "camera": _camera(bake),
         "channels": [_channel(bake, name) for name in bake.maps],
@@ -100,7 +102,7 @@ def _arrays(bake: StoredBake, geometry: Geometry, order: NDArray[Any]) -> dict[s
         "colour": vertex_colour(bake.scene, geometry),
     }
     n_vertices = len(geometry.position)
-    wide = {  # one row stands for all vertices where nothing has such a thing
+    wide = {  # an attribute that no mesh has is one row for all vertices
         name: np.broadcast_to(array, (n_vertices, array.shape[1])) if len(array) == 1 else array
         for name, array in arrays.items()
     }
@@ -181,9 +183,9 @@ def _channel(bake: StoredBake, name: str) -> dict[str, Any]:
     pages = [page for page in bake.manifest["pages"] if page["channel"] == name]
     value = bake.maps[name]
     covered = (bake.status != TexelStatus.EMPTY) & (bake.status != TexelStatus.DILATED)
-    grey = value[covered] @ LUMINANCE if value.shape[3] == 3 else value[covered][:, 0]
-    grey = grey[np.isfinite(grey)]
-    low, median, high = np.percentile(grey, (1, 50, 99)) if len(grey) else (0.0, 0.0, 0.0)
+    level = value[covered] @ LUMINANCE if value.shape[3] == 3 else value[covered][:, 0]
+    level = level[np.isfinite(level)]
+    low, median, high = np.percentile(level, (1, 50, 99)) if len(level) else (0.0, 0.0, 0.0)
     return {
         "name": name,
         "unit": pages[0].get("unit", ""),

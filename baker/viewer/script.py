@@ -1,7 +1,7 @@
-"""Finds three.js on this machine: the page must work without a network.
+"""Finds three.js on this machine: the page works without a network.
 
-The package `jupyter-threejs-sage` carries the library as one file, so pip brings it along. A copy that npm
-installed works as well; both kinds of file are known, a script that sets `THREE` and an ES module.
+The package `jupyter-threejs-sage`, a dependency, contains the library as one file. A copy installed by npm
+works as well. The file is a script that sets `THREE` or an ES module.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from pathlib import Path
 
 from baker.core.errors import InputError, ResourceError
 
-# Where a folder may hold the library, the best first: npm's package, a folder with node_modules, bare files.
-_PLACES = (
+# Paths of the library in a folder, in the order of preference: npm's package, node_modules, single files.
+_PATHS = (
     "build/three.module.min.js",
     "build/three.module.js",
     "node_modules/three/build/three.module.min.js",
@@ -49,12 +49,12 @@ class ThreeScript:
         return {path.name: path for path in sorted(self.path.parent.glob("*.js"))}
 
 
-def find_three(place: Path | None) -> ThreeScript:
-    """Return the copy of three.js in `place`, or the installed one.
+def find_three(location: Path | None) -> ThreeScript:
+    """Return the copy of three.js in `location`, or the installed one.
 
     Parameters
     ----------
-    place : Path or None
+    location : Path or None
         A file, or a folder with npm's package in it; None for the installed package.
 
     Returns
@@ -65,15 +65,15 @@ def find_three(place: Path | None) -> ThreeScript:
     Raises
     ------
     InputError
-        If there is no three.js in `place`.
+        If there is no three.js in `location`.
     ResourceError
         If none is installed.
     """
-    if place is not None:
-        return _named(place)
+    if location is not None:
+        return _named(location)
     package = find_spec("jupyter_threejs_sage")
     for folder in (package.submodule_search_locations or ()) if package is not None else ():
-        # One folder a release of the library, r122, r130 ...: the newest of them.
+        # There is a folder for each release, r122, r130 ...; take the newest.
         found = sorted(
             Path(folder).glob("static/r*/three.min.js"), key=lambda path: int(path.parent.name[1:])
         )
@@ -82,15 +82,10 @@ def find_three(place: Path | None) -> ThreeScript:
     raise ResourceError(f"three.js is not installed, which the page is drawn with; {_HELP}")
 
 
-def _named(place: Path) -> ThreeScript:
-    tried = [place] if place.is_file() else [place / name for name in _PLACES]
+def _named(location: Path) -> ThreeScript:
+    tried = [location] if location.is_file() else [location / name for name in _PATHS]
     for path in tried:
         if path.is_file() and path.suffix in (".js", ".mjs"):
             return ThreeScript(path.resolve(), module=path.suffix == ".mjs" or ".module." in path.name)
     message = "there is no three.js here; name its file (three.module.min.js) or the folder where npm put it"
-    raise InputError(message, file=str(place))
-
-
-def _release(path: Path) -> int:
-    number = path.parent.name.removeprefix("r")
-    return int(number) if number.isdecimal() else 0
+    raise InputError(message, file=str(location))

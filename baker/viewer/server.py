@@ -1,8 +1,8 @@
-"""Hands the page and the bake to a browser on this machine.
+"""Serves the page and the bake to a browser on this machine.
 
-Every address is made before the first request and looked up in a table, so nothing else of the disk can be
-reached, whatever a request spells. Only requests that name this machine are answered: a foreign site cannot
-read the bake through a name of its own that points here.
+Every address is a key of a table that is complete before the first request, so no other file can be read.
+Requests whose Host header names another machine are refused, so that a foreign site cannot read the bake
+through a host name that resolves to 127.0.0.1 (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ _MIME = {
     ".glb": "model/gltf-binary",
 }
 _BYTES = "application/octet-stream"
-# The page is all its own: no script, style or request from elsewhere.
+# No script, style or request from another origin.
 _POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'"
 
-# What an address answers: the type of its content, and the bytes, made when they are asked for.
+# The answer of an address: media type, and a function that returns the bytes.
 Answer = tuple[str, Callable[[], bytes]]
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Answers from a table of addresses."""
+    """An HTTP server that answers from a table of addresses."""
 
     daemon_threads = True
 
@@ -64,15 +64,15 @@ class ViewServer(ThreadingHTTPServer):
 
     @property
     def names(self) -> set[str]:
-        """Return what a request may call this machine."""
+        """Return the host names that a request may use."""
         return {f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"}
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Keep quiet about browsers that went away."""
+        """Ignore connections that the browser closed."""
 
 
 def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewServer:
-    """Return a server for a bake, bound to its port and not yet answering.
+    """Return a server for a bake, bound to its port; `serve_forever` makes it answer.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
                 answers[f"/page/{name}/{page}"] = (_BYTES, partial(_page_bytes, value[page]))
     folder = bake.folder.resolve()
     for name in own_files(folder) or ():
-        # A manifest is only text: a file that it names may lie anywhere.
+        # A manifest may name files outside of the folder: leave them out.
         path = (folder / name).resolve()
         if path.is_relative_to(folder) and path.is_file():
             answers[f"/out/{name}"] = _file(path)
@@ -183,4 +183,4 @@ class _Handler(BaseHTTPRequestHandler):
                 self.wfile.write(content)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: the terminal shows the address and stays as it is."""
+        """Log nothing."""

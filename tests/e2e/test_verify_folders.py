@@ -15,7 +15,6 @@ from baker.cli.app import run
 from baker.core.settings import make_settings
 from baker.pipeline.bake import bake
 from baker.verification.settings import VerifySettings
-from baker.verification.summary import verification_json
 from baker.verification.verify import verify
 
 QUICK = VerifySettings(texels=120, spp=128, time_limit=None)
@@ -70,7 +69,7 @@ def test_nothing_is_lit(tmp_path):
     figures = found.channels["irradiance"].metrics
     assert figures["bias"] == figures["median"] == figures["max"] == 0
     # Numbers only: what JSON cannot say is not in it.
-    json.dumps(verification_json(found), allow_nan=False)
+    json.dumps(found.to_dict(), allow_nan=False)
 
 
 def test_sky_alone(tmp_path):

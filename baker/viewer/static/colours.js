@@ -8,7 +8,7 @@ export const STATUS = [
   { name: "empty", colour: "#20262f", says: "no surface" },
   { name: "covered", colour: "#3f8fcb", says: "baked" },
   { name: "dilated", colour: "#4f5d70", says: "grown into the gap between charts" },
-  { name: "invalid", colour: "#ff4d6d", says: "buried in something; filled from its neighbours" },
+  { name: "invalid", colour: "#ff4d6d", says: "inside geometry; filled from its neighbours" },
   { name: "not converged", colour: "#ffb454", says: "still noisy" },
 ];
 

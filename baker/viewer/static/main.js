@@ -219,7 +219,7 @@ function exposureOf(scene) {
 }
 
 function brightnessOf(state) {
-  // Openness is a share already; what other channels hold is brightened as the user likes.
+  // Ambient occlusion is between 0 and 1 already; other channels are scaled by the exposure.
   return state.mode.id === "ao" ? 1 : 2 ** state.exposure;
 }
 

@@ -113,8 +113,8 @@ vec3 checker() {
   // The average over a pixel, so that far squares turn grey and do not flicker.
   vec2 wave = clamp((abs(fract(square * 0.5 + 0.25) - 0.5) - 0.25) * 2.0 / wide, -0.5, 0.5);
   float light = 0.5 + 2.0 * wave.x * wave.y * step(max(wide.x, wide.y), 1.0);
-  vec3 tint = mix(vec3(0.75), hue(vOwner), 0.62);
-  return encode(tint * mix(0.18, 0.85, light) * headlight());
+  vec3 colour = mix(vec3(0.75), hue(vOwner), 0.62);
+  return encode(colour * mix(0.18, 0.85, light) * headlight());
 }
 
 void main() {
@@ -124,11 +124,11 @@ void main() {
   float alpha = alphaCutoff >= 0.0 ? 1.0 : colour.a;
   vec3 seen;
   if (mode == ${MODES.lit}) {
-    vec3 glow = emission;
-    if (hasEmissionMap) glow *= texture(emissionMap, vEmissionUv).rgb;
+    vec3 emitted = emission;
+    if (hasEmissionMap) emitted *= texture(emissionMap, vEmissionUv).rgb;
     // exposure holds the 1 / pi of a diffuse surface: emission is radiance already.
     vec3 light = lookUp(vPageUv);
-    seen = any(isnan(light)) ? vec3(1.0, 0.0, 1.0) : encode(colour.rgb * light * exposure + glow * brightness);
+    seen = any(isnan(light)) ? vec3(1.0, 0.0, 1.0) : encode(colour.rgb * light * exposure + emitted * brightness);
   } else if (mode == ${MODES.checker}) {
     seen = checker();
   } else if (mode == ${MODES.status}) {

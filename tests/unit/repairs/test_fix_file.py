@@ -313,7 +313,7 @@ def test_a_file_is_written_whole_and_nothing_else(tmp_path):
 
 def test_json_is_plain(tmp_path):
     _, _, fixed = fix_builder(random_builder(3), tmp_path)
-    told = json.loads(json.dumps(fixed.json()))
+    told = json.loads(json.dumps(fixed.to_dict()))
     assert all(
         set(fix) == {"object", "node", "change", "counted", "before", "after"} for fix in told["fixed"]
     )

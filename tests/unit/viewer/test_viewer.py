@@ -30,9 +30,13 @@ def server(out):
     # A file of the user's own beside the bake, and one that only the manifest believes to be there.
     (out / "notes.txt").write_text("private")
     (out.parent / "secret.txt").write_text("private")
-    manifest = json.loads((out / "bake.json").read_text("utf-8"))
+    sound = (out / "bake.json").read_text("utf-8")
+    manifest = json.loads(sound)
     manifest["files"].append({"file": "../secret.txt", "sha256": "0" * 64})
     (out / "bake.json").write_text(json.dumps(manifest), "utf-8")
+    with pytest.raises(InputError, match=r"no readable bake\.json"):
+        read_bake(out)
+    (out / "bake.json").write_text(sound, "utf-8")
     server = make_server(read_bake(out), find_three(None))
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()

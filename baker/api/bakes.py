@@ -1,0 +1,296 @@
+"""Bakes: make them, write them, export them to engines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+from baker.core.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from baker.api.keywords import AoKeywords, BakeKeywords
+    from baker.core.atlas import Atlas
+    from baker.core.lightmap import BakeResult
+    from baker.core.scene import Scene
+    from baker.core.settings import BakeSettings
+
+
+def bake(
+    scene: Scene | str | Path,
+    settings: BakeSettings | None = None,
+    *,
+    out: str | Path | None = None,
+    atlas: Atlas | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+    **keywords: Unpack[BakeKeywords],
+) -> BakeResult:
+    """Bake a scene.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene file, or what `load` returns.
+    settings : BakeSettings, optional
+        What is baked, and how.
+    out : str or Path, optional
+        Folder to write; None keeps everything in memory.
+    atlas : Atlas, optional
+        Lightmap uv of the scene, as `unwrap` returns it; its resolution and padding count. A Scene is needed.
+    force : bool
+        Replace an `out` that baker did not write.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[BakeKeywords]
+        Settings by name, in place of those in `settings`:
+
+        channels : str | Sequence[str], default ('irradiance', 'ao')
+            What to bake.
+        resolution : int, texels, 16 to 16384, default 1024
+            Page width and height, exact.
+        density : float | None, texels/m, above 0, default None
+            Texels per metre; pages overflow into more.
+        max_pages : int, 1 to 256, default 16
+            Most pages that `density` may fill.
+        padding : int, texels, 0 to 64, default 4
+            Empty texels between charts.
+        uv : Literal["auto", "keep", "unwrap"], default 'auto'
+            Keep a valid TEXCOORD_1, or unwrap.
+        unwrapper : Literal["xatlas"], default 'xatlas'
+            Library that cuts and packs charts.
+        quality : Literal["preview", "medium", "high", "ultra"], default 'medium'
+            Preset of samples: preview 16, medium 64, high 256, ultra 1024.
+        samples : int | None, 1 to 65536, default None
+            Hemisphere rays per texel; default by quality.
+        light_samples : int | None, 1 to 65536, default None
+            Shadow rays per texel; default: samples.
+        ao_samples : int | None, 1 to 65536, default None
+            AO rays per texel; default: samples.
+        ao_distance : str | float, m, default '10%'
+            Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+        sky : str | float | Sequence[float] | None, cd/m2, default None
+            Sky radiance R,G,B in cd/m2.
+        sky_strength : float, from 0, default 1.0
+            Factor on the sky.
+        bounces : int | None, 0 to 1000, default None
+            Reflections of light; default: until converged.
+        denoise : bool, default True
+            Denoise with Open Image Denoise.
+        encode : str | Sequence[str], default ()
+            Further files of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+        export : str | Sequence[str], default ()
+            Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+        include : str | Sequence[str], default ()
+            Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
+        exclude : str | Sequence[str], default ()
+            Leave out objects and lights with these names or paths of nodes, and what is below.
+        up : Literal["y", "z"], default 'y'
+            Up axis of files whose format defines none.
+        scale : float, m, above 0, default 1.0
+            Metres per unit of files whose format defines none.
+        seed : int, 0 to 2147483647, default 0
+            Seed of all random numbers.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+        dtype : Literal["half", "float"], default 'half'
+            Number format of the EXR files.
+        exr_compression : Literal["zip", "piz"], default 'zip'
+            Compression of the EXR files.
+        rgbm_range : str | float, lx, default 'auto'
+            Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.
+
+    Returns
+    -------
+    BakeResult
+        `result.lightmaps["irradiance"].value` is (pages, H, W, 3) float32, lx.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be read or holds nothing to bake.
+    SettingsError
+        For an unknown setting, a value out of range, or an atlas of another scene.
+    ResourceError
+        If memory, disk or a library is missing.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> result = baker.bake("cornell.glb", out="out", resolution=64, quality="preview", denoise=False)
+    >>> result.lightmaps["irradiance"].value.shape
+    (1, 64, 64, 3)
+    >>> (result.status == baker.TexelStatus.COVERED).any()
+    np.True_
+
+    Stages can be called one by one, and settings be kept in an object:
+
+    >>> scene = baker.load("cornell.glb")
+    >>> atlas = baker.unwrap(scene, baker.UnwrapSettings(resolution=64))
+    >>> settings = baker.BakeSettings(quality="preview", denoise=False)
+    >>> result = baker.bake(scene, settings, atlas=atlas, samples=4)
+    >>> result.settings.resolution
+    64
+    """
+    from baker.api.settings_of import settings_of
+    from baker.core.settings import BakeSettings
+    from baker.pipeline.bake import bake as run
+
+    wanted = settings_of(BakeSettings, settings, keywords)
+    return run(scene, settings=wanted, out=out, progress=progress, force=force, atlas=atlas)
+
+
+def ao(
+    scene: Scene | str | Path,
+    settings: BakeSettings | None = None,
+    *,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+    **keywords: Unpack[AoKeywords],
+) -> BakeResult:
+    """Bake ambient occlusion only.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene file, or what `load` returns.
+    settings : BakeSettings, optional
+        How it is baked; its channels do not count.
+    out : str or Path, optional
+        Folder to write; None keeps everything in memory.
+    force : bool
+        Replace an `out` that baker did not write.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[AoKeywords]
+        Settings by name, in place of those in `settings`; as of `bake`, without `channels`.
+
+    Returns
+    -------
+    BakeResult
+        `result.lightmaps["ao"].value` is (pages, H, W, 1) float32; 1 is open, 0 is closed.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be read or holds nothing to bake.
+    SettingsError
+        For an unknown setting or a value out of range.
+    ResourceError
+        If memory, disk or a library is missing.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> result = baker.ao("cornell.glb", resolution=64, samples=4, ao_distance=0.5, denoise=False)
+    >>> list(result.lightmaps)
+    ['ao']
+    """
+    from baker.api.settings_of import settings_of
+    from baker.core.settings import BakeSettings
+    from baker.pipeline.bake import bake as run
+
+    wanted = settings_of(BakeSettings, settings, {**keywords, "channels": "ao"})
+    return run(scene, settings=wanted, out=out, progress=progress, force=force)
+
+
+def save(
+    bake: BakeResult,
+    out: str | Path,
+    *,
+    export: str | Sequence[str] = (),
+    force: bool = False,
+    progress: Progress = silent,
+) -> BakeResult:
+    """Write a bake that is in memory to an output folder.
+
+    Parameters
+    ----------
+    bake : BakeResult
+        As `bake` returns it.
+    out : str or Path
+        Folder to write, as a whole or not at all.
+    export : str or sequence of str
+        Engines for which a folder is added: "godot", "unity", "three" ...
+    force : bool
+        Replace an `out` that baker did not write.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+
+    Returns
+    -------
+    BakeResult
+        The same, with `out` and `manifest`.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown export, or an `out` that must not be replaced.
+    ResourceError
+        If it cannot be written.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> saved = baker.save(result, "ao_only", export=["gltf"])
+    >>> sorted(path.name for path in saved.out.iterdir())
+    ['ao_0.exr', 'bake.json', 'gltf', 'scene.glb', 'status_0.png']
+    """
+    from baker.core.export import check_exports
+    from baker.io.bake.write_bake import check_out, write_bake
+
+    folder = Path(out)
+    settings = bake.settings.changed(export=export) if export else bake.settings
+    check_exports(settings.export, settings.channels)
+    check_out(folder, force=force, scene_path=bake.scene.path)
+    manifest = write_bake(replace(bake, settings=settings), folder, force=force, progress=progress)
+    return replace(bake, settings=settings, out=folder, manifest=manifest)
+
+
+def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
+    """Make a folder for one engine from a finished output folder.
+
+    Parameters
+    ----------
+    bake : str, Path or BakeResult
+        An output folder, or a bake that was written to one.
+    engine : str
+        Name of an export, such as "godot", "unity" or "three"; see ENGINES.md.
+    out : str or Path
+        Folder to make; it must not exist or be empty.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no bake.
+    SettingsError
+        For an unknown engine, a channel that is not baked, or an `out` that is not empty.
+
+    Examples
+    --------
+    >>> baker.export("out", "three", "for_three").name
+    'for_three'
+    """
+    from baker.api.folders import folder_of
+    from baker.core.errors import SettingsError
+    from baker.core.export import EXPORTS, check_exports
+    from baker.io.bake.read_bake import read_bake
+
+    stored = read_bake(folder_of(bake))
+    check_exports((engine,), tuple(stored.maps))
+    target = Path(out)
+    if target.exists() and (not target.is_dir() or any(target.iterdir())):
+        raise SettingsError("there are files here already; name another folder", file=str(target))
+    target.mkdir(parents=True, exist_ok=True)
+    EXPORTS.require(engine, "export").write(stored.folder, target)
+    return target

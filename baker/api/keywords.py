@@ -1,0 +1,312 @@
+"""Settings as keywords of the functions of the Python API, for editors and type checkers.
+
+Made by `docs/make_keywords.py` from the models of settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, TypedDict
+
+
+class BakeKeywords(TypedDict, total=False):
+    """Keywords of `BakeSettings`."""
+
+    # What to bake.
+    channels: str | Sequence[str]
+
+    # Page width and height, exact.
+    resolution: int
+
+    # Texels per metre; pages overflow into more.
+    density: float | None
+
+    # Most pages that `density` may fill.
+    max_pages: int
+
+    # Empty texels between charts.
+    padding: int
+
+    # Keep a valid TEXCOORD_1, or unwrap.
+    uv: Literal["auto", "keep", "unwrap"]
+
+    # Library that cuts and packs charts.
+    unwrapper: Literal["xatlas"]
+
+    # Preset of samples: preview 16, medium 64, high 256, ultra 1024.
+    quality: Literal["preview", "medium", "high", "ultra"]
+
+    # Hemisphere rays per texel; default by quality.
+    samples: int | None
+
+    # Shadow rays per texel; default: samples.
+    light_samples: int | None
+
+    # AO rays per texel; default: samples.
+    ao_samples: int | None
+
+    # Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+    ao_distance: str | float
+
+    # Sky radiance R,G,B in cd/m2.
+    sky: str | float | Sequence[float] | None
+
+    # Factor on the sky.
+    sky_strength: float
+
+    # Reflections of light; default: until converged.
+    bounces: int | None
+
+    # Denoise with Open Image Denoise.
+    denoise: bool
+
+    # Further files of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+    encode: str | Sequence[str]
+
+    # Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+    export: str | Sequence[str]
+
+    # Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
+    include: str | Sequence[str]
+
+    # Leave out objects and lights with these names or paths of nodes, and what is below.
+    exclude: str | Sequence[str]
+
+    # Up axis of files whose format defines none.
+    up: Literal["y", "z"]
+
+    # Metres per unit of files whose format defines none.
+    scale: float
+
+    # Seed of all random numbers.
+    seed: int
+
+    # Threads; default: all cores.
+    threads: int | None
+
+    # Number format of the EXR files.
+    dtype: Literal["half", "float"]
+
+    # Compression of the EXR files.
+    exr_compression: Literal["zip", "piz"]
+
+    # Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.
+    rgbm_range: str | float
+
+
+class AoKeywords(TypedDict, total=False):
+    """Keywords of `BakeSettings`, `channels` aside."""
+
+    resolution: int
+    density: float | None
+    max_pages: int
+    padding: int
+    uv: Literal["auto", "keep", "unwrap"]
+    unwrapper: Literal["xatlas"]
+    quality: Literal["preview", "medium", "high", "ultra"]
+    samples: int | None
+    light_samples: int | None
+    ao_samples: int | None
+    ao_distance: str | float
+    sky: str | float | Sequence[float] | None
+    sky_strength: float
+    bounces: int | None
+    denoise: bool
+    encode: str | Sequence[str]
+    export: str | Sequence[str]
+    include: str | Sequence[str]
+    exclude: str | Sequence[str]
+    up: Literal["y", "z"]
+    scale: float
+    seed: int
+    threads: int | None
+    dtype: Literal["half", "float"]
+    exr_compression: Literal["zip", "piz"]
+    rgbm_range: str | float
+
+
+class BatchKeywords(TypedDict, total=False):
+    """Keywords of `BatchSettings`."""
+
+    # Bakes at a time, each in a process of its own.
+    jobs: int
+
+    # Memory of all bakes together, like 8G; jobs wait for it.
+    memory: str | float | None
+
+    # Only report what would be baked, and why.
+    dry_run: bool
+
+    # Start nothing more after a failure.
+    fail_fast: bool
+
+    # Bake all, and replace outputs even if baker did not write them.
+    force: bool
+
+    # Seed of all bakes; default: that of each job.
+    seed: int | None
+
+    # Threads; default: all cores.
+    threads: int | None
+
+
+class CheckKeywords(TypedDict, total=False):
+    """Keywords of `CheckSettings`."""
+
+    # Least severity that fails the check; default: the scene's extras, else error.
+    fail_on: Literal["warning", "error"] | None
+
+    # Findings that do not count, with `*` for any letters; repeatable.
+    ignore: str | Sequence[str]
+
+    # Mip level at which charts must not mix.
+    mip: int
+
+    # Estimate time with the speed of this earlier bake (else of one beside the scene).
+    rates: str | Path | None
+
+    # Report what a bake will take; measures a second's worth of rays.
+    cost: bool
+
+
+class DiffKeywords(TypedDict, total=False):
+    """Keywords of `DiffSettings`."""
+
+    # Texels of A to compare.
+    texels: int
+
+    # Compare pages as pictures, too, with the measure FLIP.
+    flip: bool
+
+    # Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
+    fail_if: str | None
+
+    # Seed of all random numbers.
+    seed: int
+
+    # Threads; default: all cores.
+    threads: int | None
+
+
+class RenderKeywords(TypedDict, total=False):
+    """Keywords of `RenderSettings`."""
+
+    # Position, target, vertical field of view in degrees; or one of the file's own; default: its
+    # first.
+    camera: str | None
+
+    # Width of the picture.
+    width: int
+
+    # Height of the picture.
+    height: int
+
+    # Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.
+    spp: int | None
+
+    # Stop after this time, loading included; two passes are always made.
+    time_limit: float | None
+
+    # One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.
+    estimator: str
+
+    # Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.
+    max_depth: int | None
+
+    # Render ambient occlusion.
+    ao: bool
+
+    # Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+    ao_distance: str | float | None
+
+    # Further layers: albedo, normal, depth.
+    aov: str | Sequence[str]
+
+    # Run Open Image Denoise over the picture.
+    denoise: bool
+
+    # Light the scene by this bake instead.
+    lightmap: str | Path | None
+
+    # Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
+    sky: str | float | Sequence[float] | None
+
+    # Factor on the sky.
+    sky_strength: float
+
+    # Seed of all random numbers.
+    seed: int
+
+    # Threads; default: all cores.
+    threads: int | None
+
+
+class RepairKeywords(TypedDict, total=False):
+    """Keywords of `RepairSettings`."""
+
+    # Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers
+    # (needs pip install pymeshlab).
+    repair: bool
+
+    # Page width for which lightmap uv are tested and made.
+    resolution: int
+
+    # Up axis of files whose format defines none.
+    up: Literal["y", "z"]
+
+    # Metres per unit of files whose format defines none.
+    scale: float
+
+    # Threads; default: all cores.
+    threads: int | None
+
+
+class UnwrapKeywords(TypedDict, total=False):
+    """Keywords of `UnwrapSettings`."""
+
+    # Page width and height, exact.
+    resolution: int
+
+    # Texels per metre; pages overflow into more.
+    density: float | None
+
+    # Most pages that `density` may fill.
+    max_pages: int
+
+    # Empty texels between charts.
+    padding: int
+
+    # Keep a valid TEXCOORD_1, or unwrap.
+    uv: Literal["auto", "keep", "unwrap"]
+
+    # Library that cuts and packs charts.
+    unwrapper: Literal["xatlas"]
+
+    # Threads; default: all cores.
+    threads: int | None
+
+
+class VerifyKeywords(TypedDict, total=False):
+    """Keywords of `VerifySettings`."""
+
+    # Texels compared at their centres; points at edges and outliers are added.
+    texels: int
+
+    # Paths for each texel, whatever its error.
+    spp: int | None
+
+    # Relative standard error at which a texel is good enough.
+    target_se: float
+
+    # Time for path tracing; default: 40 without `spp`, else none. `inf` is none.
+    time_limit: float | None
+
+    # Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+    fail_if: str | None
+
+    # Seed of all random numbers.
+    seed: int
+
+    # Threads; default: all cores.
+    threads: int | None

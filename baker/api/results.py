@@ -1,0 +1,358 @@
+"""Finished bakes: verify, compare, render and view them; batches of bakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+from baker.core.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from baker.api.keywords import BatchKeywords, DiffKeywords, RenderKeywords, VerifyKeywords
+    from baker.comparison.compare import DiffReport
+    from baker.comparison.settings import DiffSettings
+    from baker.core.lightmap import BakeResult
+    from baker.core.scene import Scene
+    from baker.jobs.report import BatchReport
+    from baker.jobs.settings import BatchSettings
+    from baker.rendering.render import Picture
+    from baker.rendering.settings import RenderSettings
+    from baker.verification.settings import VerifySettings
+    from baker.verification.verify import VerifyReport
+    from baker.viewer.server import ViewServer
+
+
+def verify(
+    bake: str | Path | BakeResult,
+    settings: VerifySettings | None = None,
+    *,
+    progress: Progress = silent,
+    **keywords: Unpack[VerifyKeywords],
+) -> VerifyReport:
+    """Measure the error of a finished bake against path tracing.
+
+    Parameters
+    ----------
+    bake : str, Path or BakeResult
+        An output folder, or a bake that was written to one.
+    settings : VerifySettings, optional
+        How much is path-traced, and limits.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[VerifyKeywords]
+        Settings by name, in place of those in `settings`:
+
+        texels : int, from 1, default 2000
+            Texels compared at their centres; points at edges and outliers are added.
+        spp : int | None, from 1, default None
+            Paths for each texel, whatever its error.
+        target_se : float, above 0, default 0.005
+            Relative standard error at which a texel is good enough.
+        time_limit : float | None, s, above 0, default None
+            Time for path tracing; default: 40 without `spp`, else none. `inf` is none.
+        fail_if : str | None, default None
+            Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+        seed : int, 0 to 2147483647, default 0
+            Seed of all random numbers.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    VerifyReport
+        Figures of each channel, tables by object, worst texels, and whether all limits hold.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no bake.
+    SettingsError
+        For an unknown setting, a value out of range, or a limit that cannot be read.
+    ResourceError
+        If memory or a library is missing.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> report = baker.verify("out", texels=50, spp=8)
+    >>> 0 <= report.channels["irradiance"].figures["median"] < 1
+    True
+    >>> report.channels["ao"].bias == report.channels["ao"].figures["bias"]
+    True
+    """
+    from baker.api.folders import folder_of
+    from baker.api.settings_of import settings_of
+    from baker.verification.settings import VerifySettings
+    from baker.verification.verify import verify as run
+
+    return run(folder_of(bake), settings_of(VerifySettings, settings, keywords), progress)
+
+
+def diff(
+    a: str | Path | BakeResult,
+    b: str | Path | BakeResult,
+    settings: DiffSettings | None = None,
+    *,
+    progress: Progress = silent,
+    **keywords: Unpack[DiffKeywords],
+) -> DiffReport:
+    """Compare two finished bakes at the same points of the surface, whatever their lightmap uv.
+
+    Parameters
+    ----------
+    a, b : str, Path or BakeResult
+        Output folders, or bakes that were written to one; b is the reference.
+    settings : DiffSettings, optional
+        How much is compared, and limits.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[DiffKeywords]
+        Settings by name, in place of those in `settings`:
+
+        texels : int, from 1, default 20000
+            Texels of A to compare.
+        flip : bool, default True
+            Compare pages as pictures, too, with the measure FLIP.
+        fail_if : str | None, default None
+            Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
+        seed : int, 0 to 2147483647, default 0
+            Seed of all random numbers.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    DiffReport
+        Figures of each channel that both have, and the points furthest apart.
+
+    Raises
+    ------
+    InputError
+        If one is no bake, or they have nothing in common.
+    SettingsError
+        For an unknown setting, a value out of range, or a limit that cannot be read.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> report = baker.diff("out", "ao_only", texels=100)
+    >>> list(report.channels), report.passed
+    (['ao'], True)
+    """
+    from baker.api.folders import folder_of
+    from baker.api.settings_of import settings_of
+    from baker.comparison.compare import compare
+    from baker.comparison.settings import DiffSettings
+
+    return compare(folder_of(a), folder_of(b), settings_of(DiffSettings, settings, keywords), progress)
+
+
+def render(
+    scene: Scene | str | Path,
+    settings: RenderSettings | None = None,
+    *,
+    out: str | Path | None = None,
+    progress: Progress = silent,
+    **keywords: Unpack[RenderKeywords],
+) -> Picture:
+    """Render a scene through a pinhole camera: path-traced, its ambient occlusion, or lit by a bake.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene file, or what `load` returns.
+    settings : RenderSettings, optional
+        Camera, size, samples ...
+    out : str or Path, optional
+        An EXR or PNG file to write, too.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[RenderKeywords]
+        Settings by name, in place of those in `settings`:
+
+        camera : str | None, default None
+            Position, target, vertical field of view in degrees; or one of the file's own; default: its
+            first.
+        width : int, pixels, 1 to 16384, default 640
+            Width of the picture.
+        height : int, pixels, 1 to 16384, default 480
+            Height of the picture.
+        spp : int | None, from 1, default None
+            Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.
+        time_limit : float | None, s, above 0, default None
+            Stop after this time, loading included; two passes are always made.
+        estimator : str, default 'mis'
+            One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.
+        max_depth : int | None, from 1, default None
+            Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.
+        ao : bool, default False
+            Render ambient occlusion.
+        ao_distance : str | float | None, m, default None
+            Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+        aov : str | Sequence[str], default ()
+            Further layers: albedo, normal, depth.
+        denoise : bool, default False
+            Run Open Image Denoise over the picture.
+        lightmap : str | Path | None, default None
+            Light the scene by this bake instead.
+        sky : str | float | Sequence[float] | None, cd/m2, default None
+            Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
+        sky_strength : float, from 0, default 1.0
+            Factor on the sky.
+        seed : int, 0 to 2147483647, default 0
+            Seed of all random numbers.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    Picture
+        `colour` is (H, W, 3) float32, cd/m2.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be read, or has no camera and none is set.
+    SettingsError
+        For an unknown setting, a value out of range, or an `out` that is no picture.
+    ResourceError
+        If memory, disk or a library is missing.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> picture = baker.render("cornell.glb", out="view.png", width=32, height=24, spp=4)
+    >>> picture.colour.shape
+    (24, 32, 3)
+    """
+    from baker.api.settings_of import settings_of
+    from baker.rendering.render import render as run
+    from baker.rendering.settings import RenderSettings
+    from baker.rendering.write import check_image, write_picture
+
+    wanted = settings_of(RenderSettings, settings, keywords)
+    if out is not None:
+        check_image(Path(out), wanted.aov)
+    picture = run(scene, wanted, progress)
+    if out is not None:
+        write_picture(Path(out), picture)
+    return picture
+
+
+def view(
+    bake: str | Path | BakeResult, *, port: int = 0, three: str | Path | None = None, browser: bool = True
+) -> ViewServer:
+    """Serve a local web page that shows a finished bake, in a thread of this process.
+
+    Parameters
+    ----------
+    bake : str, Path or BakeResult
+        An output folder, or a bake that was written to one.
+    port : int
+        Port on 127.0.0.1; 0 is a free one.
+    three : str or Path, optional
+        Your own three.js: its file, or npm's folder.
+    browser : bool
+        Open the page.
+
+    Returns
+    -------
+    ViewServer
+        Its address is `url`; `shutdown()` and `server_close()` end it.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no bake, or `three` is no three.js.
+    ResourceError
+        If the port is taken, or three.js is not installed.
+
+    Examples
+    --------
+    >>> server = baker.view("out", browser=False)
+    >>> server.url.startswith("http://127.0.0.1:")
+    True
+    >>> server.shutdown(), server.server_close()
+    (None, None)
+    """
+    import threading
+    import webbrowser
+
+    from baker.api.folders import folder_of
+    from baker.io.bake.read_bake import read_bake
+    from baker.viewer.script import find_three
+    from baker.viewer.server import make_server
+
+    script = find_three(None if three is None else Path(three))
+    server = make_server(read_bake(folder_of(bake)), script, port=port)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    if browser:
+        threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+    return server
+
+
+def batch(
+    jobs_file: str | Path,
+    settings: BatchSettings | None = None,
+    *,
+    progress: Progress = silent,
+    **keywords: Unpack[BatchKeywords],
+) -> BatchReport:
+    r"""Bake many scenes, and only what changed.
+
+    Parameters
+    ----------
+    jobs_file : str or Path
+        TOML file of scenes and settings, see BATCH.md.
+    settings : BatchSettings, optional
+        Processes, memory, and what is baked.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[BatchKeywords]
+        Settings by name, in place of those in `settings`:
+
+        jobs : int, 1 to 1024, default 1
+            Bakes at a time, each in a process of its own.
+        memory : str | float | None, bytes, default None
+            Memory of all bakes together, like 8G; jobs wait for it.
+        dry_run : bool, default False
+            Only report what would be baked, and why.
+        fail_fast : bool, default False
+            Start nothing more after a failure.
+        force : bool, default False
+            Bake all, and replace outputs even if baker did not write them.
+        seed : int | None, 0 to 2147483647, default None
+            Seed of all bakes; default: that of each job.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    BatchReport
+        The outcome of each job.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    SettingsError
+        For an unknown setting or a value out of range.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("jobs.toml").write_text('[[job]]\nscene = "cornell.glb"\nout = "batch_out"\n')
+    >>> report = baker.batch("jobs.toml", dry_run=True)
+    >>> [outcome.state for outcome in report.outcomes]
+    ['baked']
+    """
+    from baker.api.settings_of import settings_of
+    from baker.jobs.report import run_jobs_file
+    from baker.jobs.settings import BatchSettings
+
+    return run_jobs_file(Path(jobs_file), settings_of(BatchSettings, settings, keywords), progress)

@@ -1,0 +1,255 @@
+"""Scenes and their lightmap uv: load, check, repair, unwrap."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+from baker.core.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from baker.api.keywords import CheckKeywords, RepairKeywords, UnwrapKeywords
+    from baker.checks.run import CheckReport
+    from baker.checks.settings import CheckSettings
+    from baker.core.atlas import Atlas
+    from baker.core.scene import Scene
+    from baker.core.settings import BakeSettings
+    from baker.repairs.fix_file import FixResult
+    from baker.repairs.settings import RepairSettings
+    from baker.uv.settings import UnwrapSettings
+
+
+def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of a format that `baker.io.importers` has, such as .glb or .obj.
+    up : str
+        Up axis of formats other than glTF: "y" or "z".
+    scale : float
+        Metres per unit of formats other than glTF.
+
+    Returns
+    -------
+    Scene
+        In metres, +Y up, linear Rec.709.
+
+    Raises
+    ------
+    InputError
+        If the file is unreadable, malformed, or holds nothing to bake.
+
+    Examples
+    --------
+    >>> import baker
+    >>> scene = baker.load("cornell.glb")
+    >>> len(scene.instances), scene.n_triangles
+    (8, 32)
+    """
+    from baker.io.load import load_scene
+
+    return load_scene(path, up=up, scale=scale)
+
+
+def check(
+    scene: Scene | str | Path,
+    settings: CheckSettings | None = None,
+    *,
+    bake: BakeSettings | None = None,
+    progress: Progress = silent,
+    **keywords: Unpack[CheckKeywords],
+) -> CheckReport:
+    """Find what would spoil a bake, before any ray is cast.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A file is read leniently: what would stop a bake becomes a finding. A Scene has passed the importer.
+    settings : CheckSettings, optional
+        How findings are counted.
+    bake : BakeSettings, optional
+        Settings of the bake that the scene is for: resolution, padding, uv, sky ...
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[CheckKeywords]
+        Settings by name, in place of those in `settings`:
+
+        fail_on : Literal["warning", "error"] | None, default None
+            Least severity that fails the check; default: the scene's extras, else error.
+        ignore : str | Sequence[str], default ()
+            Findings that do not count, with `*` for any letters; repeatable.
+        mip : int, 0 to 14, default 2
+            Mip level at which charts must not mix.
+        rates : str | Path | None, default None
+            Estimate time with the speed of this earlier bake (else of one beside the scene).
+        cost : bool, default False
+            Report what a bake will take; measures a second's worth of rays.
+
+    Returns
+    -------
+    CheckReport
+        Findings, worst first, and whether the scene passed.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    SettingsError
+        For an unknown setting or a value out of range.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> report = baker.check("cornell.glb", fail_on="warning")
+    >>> report.passed
+    True
+    >>> sorted({finding.severity for finding in report.findings})
+    ['info']
+    """
+    from baker.api.settings_of import settings_of
+    from baker.checks.run import check_scene
+    from baker.checks.settings import CheckSettings
+    from baker.core.settings import BakeSettings
+
+    return check_scene(
+        scene, settings_of(CheckSettings, settings, keywords), bake or BakeSettings(), progress
+    )
+
+
+def repair(
+    scene: str | Path,
+    out: str | Path | None = None,
+    settings: RepairSettings | None = None,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+    **keywords: Unpack[RepairKeywords],
+) -> FixResult:
+    """Fix the meshes of a scene file where that keeps their look; with `repair=True` also their shape.
+
+    Parameters
+    ----------
+    scene : str or Path
+        A file of any format that can be read. It is not changed.
+    out : str or Path, optional
+        The .glb file to write; None keeps the result in memory.
+    settings : RepairSettings, optional
+        Lightmap resolution, units, and whether shapes are repaired.
+    force : bool
+        Replace an `out` that exists.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[RepairKeywords]
+        Settings by name, in place of those in `settings`:
+
+        repair : bool, default False
+            Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers
+            (needs pip install pymeshlab).
+        resolution : int, texels, 16 to 16384, default 1024
+            Page width for which lightmap uv are tested and made.
+        up : Literal["y", "z"], default 'y'
+            Up axis of files whose format defines none.
+        scale : float, m, above 0, default 1.0
+            Metres per unit of files whose format defines none.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    FixResult
+        The GLB in `data`, what was fixed, and what was left alone.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    SettingsError
+        For an unknown setting, a value out of range, or an `out` that cannot be written.
+    ResourceError
+        If `repair` is set and pymeshlab is not installed.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> result = baker.repair("cornell.glb", "fixed.glb", resolution=64)
+    >>> [fix.change.change for fix in result.fixed]
+    []
+    """
+    from baker.api.settings_of import settings_of
+    from baker.repairs.fix_file import fix_file
+    from baker.repairs.settings import RepairSettings
+    from baker.repairs.write import check_fixed, write_fixed
+
+    wanted = settings_of(RepairSettings, settings, keywords)
+    if out is not None:
+        check_fixed(Path(out), Path(scene), force=force)
+    result = fix_file(Path(scene), wanted, progress)
+    if out is not None:
+        write_fixed(Path(out), result.data)
+    return result
+
+
+def unwrap(
+    scene: Scene,
+    settings: UnwrapSettings | None = None,
+    *,
+    progress: Progress = silent,
+    **keywords: Unpack[UnwrapKeywords],
+) -> Atlas:
+    """Lay out every instance of a scene in lightmap pages.
+
+    Parameters
+    ----------
+    scene : Scene
+        As `load` returns it.
+    settings : UnwrapSettings, optional
+        Size of the pages, and how charts are cut and packed.
+    progress : Progress
+        Called with stage and fraction; a truthy answer cancels.
+    **keywords : Unpack[UnwrapKeywords]
+        Settings by name, in place of those in `settings`:
+
+        resolution : int, texels, 16 to 16384, default 1024
+            Page width and height, exact.
+        density : float | None, texels/m, above 0, default None
+            Texels per metre; pages overflow into more.
+        max_pages : int, 1 to 256, default 16
+            Most pages that `density` may fill.
+        padding : int, texels, 0 to 64, default 4
+            Empty texels between charts.
+        uv : Literal["auto", "keep", "unwrap"], default 'auto'
+            Keep a valid TEXCOORD_1, or unwrap.
+        unwrapper : Literal["xatlas"], default 'xatlas'
+            Library that cuts and packs charts.
+        threads : int | None, 1 to 1024, default None
+            Threads; default: all cores.
+
+    Returns
+    -------
+    Atlas
+        Page and lightmap uv of each instance; an argument of `bake`.
+
+    Raises
+    ------
+    InputError
+        If the scene has no triangles, or its uv cannot be kept although `uv` is "keep".
+    SettingsError
+        For an unknown setting or a value out of range.
+    Cancelled
+        If `progress` answers so.
+
+    Examples
+    --------
+    >>> atlas = baker.unwrap(scene, resolution=64)
+    >>> atlas.resolution, atlas.n_pages, len(atlas.layouts)
+    (64, 1, 8)
+    """
+    from baker.api.settings_of import settings_of
+    from baker.uv.settings import UnwrapSettings
+    from baker.uv.unwrap import unwrap_scene
+
+    return unwrap_scene(scene, settings_of(UnwrapSettings, settings, keywords).for_bake(), progress)

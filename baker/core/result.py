@@ -1,0 +1,118 @@
+"""The base of results: a short text for consoles, a table with a small picture for notebooks."""
+
+from __future__ import annotations
+
+import base64
+import struct
+import zlib
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Longest side of a picture in a notebook, pixels.
+THUMBNAIL = 256
+
+
+class Result:
+    """Base of what the functions of the Python API return.
+
+    A subclass gives its rows in `summary` and, where there is one, its picture in `picture`. `repr` is one
+    line; a notebook shows a table, and the picture scaled down.
+    """
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text: names and values, the most important first."""
+        return {}
+
+    def picture(self) -> NDArray[np.float32] | None:
+        """Return a picture (H, W), (H, W, 1) or (H, W, 3) to show, linear; None without one."""
+        return None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain values: numbers, texts, lists, dicts."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        rows = ", ".join(f"{name} {_words(value)}" for name, value in self.summary().items())
+        return f"<{type(self).__name__}: {rows}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{escape(str(name))}</th><td>{escape(_words(value))}</td></tr>"
+            for name, value in self.summary().items()
+        )
+        picture = self.picture()
+        shown = "" if picture is None or not picture.size else f"<img alt='' src='{picture_uri(picture)}'>"
+        return f"<b>{escape(type(self).__name__)}</b><table>{rows}</table>{shown}"
+
+
+class Metrics:
+    """Mixin for a dataclass with a dict `metrics`: each metric is an attribute, too."""
+
+    metrics: dict[str, Any]
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Return `metrics`: the figures that limits name."""
+        return self.metrics
+
+    def __getattr__(self, name: str) -> Any:
+        metrics = self.__dict__.get("metrics", {})
+        if name in metrics:
+            return metrics[name]
+        raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.metrics})
+
+
+def picture_uri(linear: NDArray[np.float32]) -> str:
+    """Return a small PNG of a picture as a data URI.
+
+    Parameters
+    ----------
+    linear : (H, W), (H, W, 1) or (H, W, 3) float32
+        One component between 0 and 1 is stored as it is. Colours x become x / (x + m), m being the median
+        of the luminance above 0, then the sRGB curve.
+
+    Returns
+    -------
+    str
+        "data:image/png;base64,..."; at most `THUMBNAIL` pixels a side.
+    """
+    value = np.asarray(linear, np.float32)
+    value = value[..., None] if value.ndim == 2 else value
+    step = max(1, -(-max(value.shape[:2]) // THUMBNAIL))
+    value = np.nan_to_num(value[::step, ::step], posinf=0.0, neginf=0.0)
+    if value.shape[2] == 1:
+        level = np.repeat(value, 3, axis=2)
+    else:
+        luminance = value.mean(axis=2)
+        lit = luminance[luminance > 0]
+        middle = float(np.median(lit)) if lit.size else 1.0
+        tone = np.maximum(value, 0) / (np.maximum(value, 0) + middle)
+        level = np.where(tone <= 0.0031308, 12.92 * tone, 1.055 * tone ** (1 / 2.4) - 0.055)
+    pixels = np.rint(np.clip(level, 0, 1) * 255).astype(np.uint8)
+    return "data:image/png;base64," + base64.b64encode(_png(pixels)).decode("ascii")
+
+
+def _png(pixels: NDArray[np.uint8]) -> bytes:
+    """Return (H, W, 3) uint8 as a PNG; `core` imports no other package, `io.png` neither."""
+    height, width = pixels.shape[:2]
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)
+    rows[:, 1:] = pixels.reshape(height, -1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    body = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows.tobytes())) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,96 @@
+"""A batch as one call, and its report."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from baker.core.progress import Progress, silent
+from baker.core.result import Result
+from baker.jobs.executor import Bakery, LocalBakery
+from baker.jobs.jobs_file import read_jobs
+from baker.jobs.memory import parse_size
+from baker.jobs.run import BatchOptions, Outcome, batch_json, run_batch
+from baker.jobs.settings import BatchSettings
+
+
+@dataclass(frozen=True, repr=False)
+class BatchReport(Result):
+    """The outcomes of all jobs of a batch.
+
+    Attributes
+    ----------
+    outcomes : list of Outcome
+        One for each job, in their order.
+    dry_run : bool
+        Whether nothing was baked, and the states are those that a batch would give.
+    """
+
+    outcomes: list[Outcome]
+    dry_run: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Return whether no job failed."""
+        return not any(outcome.code for outcome in self.outcomes)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the number of jobs in each state."""
+        counts = Counter(outcome.state for outcome in self.outcomes)
+        return {state: counts[state] for state in ("baked", "unchanged", "failed")}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as plain values, the object of `baker batch` as JSON."""
+        return batch_json(self.outcomes, dry_run=self.dry_run)
+
+
+def run_jobs_file(
+    jobs_file: Path,
+    settings: BatchSettings,
+    progress: Progress = silent,
+    *,
+    executor: Callable[[], Bakery] | None = None,
+    starting: Callable[[Path], None] = lambda out: None,
+) -> BatchReport:
+    """Bake the jobs of a file that need it.
+
+    Parameters
+    ----------
+    jobs_file : Path
+        TOML file of scenes and settings.
+    settings : BatchSettings
+        Processes, memory, seed, and what is baked.
+    progress : Progress
+        Called with all jobs as one stage; a truthy answer stops them all.
+    executor : callable, optional
+        Makes what runs the jobs; default: processes on this machine.
+    starting : callable
+        Called with each output folder before anything is done there.
+
+    Returns
+    -------
+    BatchReport
+        The outcome of each job.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    SettingsError
+        If it is not TOML, or a setting in it is wrong.
+    Cancelled
+        If `progress` answers so.
+    """
+    options = BatchOptions(
+        threads=settings.threads,
+        memory=None if settings.memory is None else parse_size(settings.memory),
+        force=settings.force,
+        fail_fast=settings.fail_fast,
+        dry_run=settings.dry_run,
+    )
+    todo = read_jobs(jobs_file, {} if settings.seed is None else {"seed": settings.seed})
+    workers = LocalBakery(settings.jobs) if executor is None or settings.dry_run else executor()
+    return BatchReport(run_batch(todo, workers, options, progress, starting), settings.dry_run)
