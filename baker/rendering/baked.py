@@ -64,8 +64,8 @@ class BakedLight:
         irradiance = bilinear(self.bake.maps["irradiance"], self.geometry.page[triangle], uv)
         light[lit] = hits.albedo[lit] * irradiance / math.pi
         surface = reference.surfaces.row
-        glowing = np.flatnonzero(hits.lit & (surface[hits.triangle, SHINES] > 0))
-        add_emission(glowing, surface, hits.triangle, hits.bary, reference.shading, light)
+        emitting = np.flatnonzero(hits.lit & (surface[hits.triangle, SHINES] > 0))
+        add_emission(emitting, surface, hits.triangle, hits.bary, reference.shading, light)
         return light
 
 
