@@ -8,6 +8,7 @@ raises. A kernel names in its docstring each argument that its body indexes.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -47,14 +48,16 @@ def files():
     return sorted([*(ROOT / "baker").rglob("*.py"), *(ROOT / "cli").rglob("*.py")])
 
 
+@functools.cache
 def trees():
     return {path: ast.parse(path.read_text("utf-8")) for path in files()}
 
 
-def public_names(trees):
+@functools.cache
+def public_names():
     """Return {(module, name)} of everything that another package imports by name."""
     names = set()
-    for path, tree in trees.items():
+    for path, tree in trees().items():
         for node in ast.walk(tree):
             if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("baker."):
                 continue
@@ -116,9 +119,9 @@ def faults_of_function(path, node, ancestry):
 
 def faults(package):
     """Return one line for each fault of a package's docstrings."""
-    lines, parsed = [], trees()
-    public = public_names(parsed)
-    for path, tree in parsed.items():
+    lines = []
+    public = public_names()
+    for path, tree in trees().items():
         if package_of(path) != package:
             continue
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
