@@ -33,7 +33,6 @@ from baker.pathtracer.bidirectional_lights import (
 from baker.pathtracer.bidirectional_weights import (
     BACK,
     CHAIN,
-    EYE,
     MAX_LIGHT_VERTICES,
     N_ROWS_BOTH,
     OPEN,
@@ -46,6 +45,7 @@ from baker.pathtracer.bidirectional_weights import (
     towards_light,
 )
 from baker.pathtracer.bsdf import N_PARAMETERS, bsdf_sample
+from baker.pathtracer.camera import EYE
 from baker.pathtracer.emitters import EMITTER_TEXTURED
 from baker.pathtracer.light_table import SHORT, on_whole_triangle
 from baker.pathtracer.rng import draw, path_state, stratum
@@ -61,6 +61,9 @@ from baker.pathtracer.vertex import (
     MOST,
     NORMAL,
     POSITION,
+    RAY_B1,
+    RAY_B2,
+    RAY_LENGTH,
     SHADED,
     SURE,
     TO,
@@ -184,7 +187,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
     for c in range(3):
         value[c] *= path[BETA + c, lane] * kept[BETA + c, k] * spare[c] * scale
         total += value[c]
-    ray[0], ray[1], ray[2], ray[3] = dx, dy, dz, length * SHORT
+    ray[0], ray[1], ray[2], ray[RAY_LENGTH] = dx, dy, dz, length * SHORT
     return total > 0.0
 
 
@@ -211,7 +214,7 @@ def show(path, row, lane, camera, n_subpaths, value, ray):
     if pixel < 0 or cosine <= 0.0:
         return -1
     density = pixel_density(camera, ray) * cosine / square
-    ray[0], ray[1], ray[2], ray[3] = -ray[0], -ray[1], -ray[2], length * SHORT
+    ray[0], ray[1], ray[2], ray[RAY_LENGTH] = -ray[0], -ray[1], -ray[2], length * SHORT
     reverse, _ = meet(
         path, row, lane, ray[0], ray[1], ray[2], path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane],
         value,
@@ -233,7 +236,7 @@ def trace_both_ways(
 
     where, toward, normal, begin, surfaces, lights, shading, sobol_points, settings, out : see `trace_paths`
     buffers : `PacketBuffers`
-    camera : (15,) float64, see `bidirectional_weights`
+    camera : (15,) float64, see `camera`
     n_subpaths : float, light subpaths that one pixel can see for each of its own samples: the number of
         pixels; 0 if paths start at surfaces
     sphere : (4,) float64, `Reference.sphere`
@@ -401,7 +404,7 @@ def trace_both_ways(
                             )
                         light = aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray)
                         if 0 <= light < len(emitter) and (alpha or emitter[light, EMITTER_TEXTURED] > 0.0):
-                            u, v = on_whole_triangle(emitter, light, ray[4], ray[5])
+                            u, v = on_whole_triangle(emitter, light, ray[RAY_B1], ray[RAY_B2])
                             multiply_emission_texture(shading, triangle[light], u, v, value, rgba, True)
                         found = light >= 0
                 elif step < count[lane]:
@@ -413,7 +416,7 @@ def trace_both_ways(
                     set_ray(
                         floats, words, width, lane,
                         path[POSITION, lane], path[POSITION + 1, lane], path[POSITION + 2, lane],
-                        ray[0], ray[1], ray[2], np.float32(ray[3]),
+                        ray[0], ray[1], ray[2], np.float32(ray[RAY_LENGTH]),
                     )  # fmt: skip
                     valid[lane] = -1
                     any_shadow = True

@@ -52,11 +52,23 @@ from baker.pathtracer.light_table import (
     aim_at_emitter,
     falloff,
     pick_light,
+    point_on_emitter,
     range_window,
 )
 from baker.pathtracer.scene import EMISSION, FACE
 from baker.pathtracer.scene import TWO_SIDED as SURFACE_TWO_SIDED
-from baker.pathtracer.vertex import BETA, DENSITY, GO, NORMAL, POSITION, offset_origin, size_of
+from baker.pathtracer.vertex import (
+    BETA,
+    DENSITY,
+    GO,
+    NORMAL,
+    POSITION,
+    RAY_B1,
+    RAY_B2,
+    RAY_LENGTH,
+    offset_origin,
+    size_of,
+)
 from baker.trace.jit import inner
 
 _INV_4_PI = 0.25 / math.pi
@@ -116,13 +128,8 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         spot[0], spot[1] = b1, b2
         b0 = 1.0 - b1 - b2
         path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane] = nx, ny, nz
-        offset_origin(
-            path, lane,
-            b0 * emitter[light, 0] + b1 * emitter[light, 3] + b2 * emitter[light, 6],
-            b0 * emitter[light, 1] + b1 * emitter[light, 4] + b2 * emitter[light, 7],
-            b0 * emitter[light, 2] + b1 * emitter[light, 5] + b2 * emitter[light, 8],
-            min_offset_scale, size_of(emitter, light),
-        )  # fmt: skip
+        x, y, z = point_on_emitter(emitter, light, b0, b1, b2)
+        offset_origin(path, lane, x, y, z, min_offset_scale, size_of(emitter, light))
         dx, dy, dz = cosine_sample(a, b)
         cosine = dz
         dx, dy, dz = to_world(nx, ny, nz, dx, dy, dz)
@@ -282,7 +289,8 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
     value[0] *= path[BETA, lane] * red * scale
     value[1] *= path[BETA + 1, lane] * green * scale
     value[2] *= path[BETA + 2, lane] * blue * scale
-    ray[0], ray[1], ray[2], ray[3], ray[4], ray[5] = dx, dy, dz, max_distance, b1, b2
+    ray[0], ray[1], ray[2] = dx, dy, dz
+    ray[RAY_LENGTH], ray[RAY_B1], ray[RAY_B2] = max_distance, b1, b2
     return light if value[0] + value[1] + value[2] > 0.0 else -1
 
 

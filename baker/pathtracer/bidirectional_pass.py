@@ -6,7 +6,6 @@ tiles, so that sums do not depend on threads, and block by block, which bounds t
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from baker.core.progress import Progress
 from baker.core.scene import Camera
 from baker.core.stage import Stage
 from baker.pathtracer.bidirectional import trace_both_ways
-from baker.pathtracer.bidirectional_weights import CAMERA_COLUMNS, MAX_LIGHT_VERTICES
-from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.bidirectional_weights import MAX_LIGHT_VERTICES
+from baker.pathtracer.camera import CAMERA_COLUMNS, camera_columns, camera_rays
 from baker.pathtracer.estimators import PathSettings
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
@@ -62,17 +61,7 @@ def picture_pass(
     width, height = size
     n, samples, number = width * height, estimate.samples, estimate.rounds
     eye = reference.local(camera.position)
-    lens = np.array(
-        [
-            *eye,
-            *camera.right,
-            *camera.up,
-            *camera.forward,
-            math.tan(0.5 * camera.fov),
-            width,
-            height,
-        ]
-    )
+    lens = camera_columns(camera, eye, width, height)
     seen, splatted = np.zeros((n, 3)), np.zeros((n, 3))
     for block in range(0, n, _BLOCK):
         span = min(_BLOCK, n - block)

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import math
 
-from baker.pathtracer.bsdf import INV_PI, WIDTH, bsdf_cosines, cosines_pdf
+from baker.pathtracer.bsdf import BASE, INV_PI, WIDTH, bsdf_cosines, cosines_pdf
+from baker.pathtracer.camera import FORWARD, PIXELS_ACROSS, PIXELS_DOWN, RIGHT, TAN_HALF_FOV, UP
 from baker.pathtracer.vertex import DENSITY, GO, GRAZE, N_ROWS, NORMAL, SHADED
 from baker.trace.jit import inner
 
@@ -38,10 +39,6 @@ MAX_LIGHT_VERTICES = 8
 #   CHAIN    first of the sums over all techniques further back
 BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3, 4, 5, 6, 7))
 N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
-# Columns of a camera: position, right, up, forward, tangent of half the vertical field of view, pixels across
-# and down.
-EYE, RIGHT, UP, FORWARD, TAN_HALF_FOV, PIXELS_ACROSS, PIXELS_DOWN = 0, 3, 6, 9, 12, 13, 14
-CAMERA_COLUMNS = 15
 
 
 @inner
@@ -69,7 +66,7 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
         if nl <= 0.0:
             return 0.0, 0.0
         for c in range(3):
-            value[c] = row[c, k] * INV_PI * nl / gl
+            value[c] = row[BASE + c, k] * INV_PI * nl / gl
         return nl * INV_PI, max(ne, 0.0) * INV_PI
     el = ex * lx + ey * ly + ez * lz
     # A normal that looks away from the viewer is replaced, as `arrive` does for either direction of travel.
@@ -180,7 +177,7 @@ def towards_light(path, k, density, reverse):
 def pixel_density(camera, direction):
     """Return the density per steradian of a pixel's own rays; 0 behind the camera.
 
-    camera : (15,) float64, see the column names; direction : (3,) float64, unit, from the eye
+    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the eye
     """
     cosine = (
         direction[0] * camera[FORWARD]
@@ -197,7 +194,7 @@ def pixel_density(camera, direction):
 def pixel_of(camera, direction):
     """Return the number of the pixel through which a direction passes, or -1.
 
-    camera : (15,) float64, see the column names; direction : (3,) float64, unit, from the eye
+    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the eye
     """
     z = (
         direction[0] * camera[FORWARD]

@@ -61,7 +61,7 @@ def specular_chance(row, lane, nv):
     if row[WIDTH, lane] < 0.0:
         return 0.0
     metallic = row[METALLIC, lane]
-    base = (row[0, lane] + row[1, lane] + row[2, lane]) / 3.0
+    base = (row[BASE, lane] + row[BASE + 1, lane] + row[BASE + 2, lane]) / 3.0
     specular = fresnel(DIELECTRIC + (base - DIELECTRIC) * metallic, nv)
     diffuse = base * (1.0 - metallic) * (1.0 - specular)
     if diffuse <= 0.0:
@@ -91,7 +91,7 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):
     a = row[WIDTH, lane]
     if a < 0.0:
         for c in range(3):
-            out[c] = row[c, lane] * INV_PI * nl
+            out[c] = row[BASE + c, lane] * INV_PI * nl
         return nl * INV_PI
     metallic = row[METALLIC, lane]
     # h = (v + l) / |v + l|, |v + l|^2 = 2 + 2 v.l
@@ -101,7 +101,7 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):
         lobe = ggx_density((nv + nl) / length, a) * ggx_visibility(nl, nv, a)
     vh = 0.5 * length
     for c in range(3):
-        base = row[c, lane]
+        base = row[BASE + c, lane]
         f = fresnel(DIELECTRIC + (base - DIELECTRIC) * metallic, vh)
         out[c] = (base * (1.0 - metallic) * (1.0 - f) * INV_PI + f * lobe) * nl
     return cosines_pdf(row, lane, nv, nl, vl)
@@ -187,7 +187,7 @@ def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):
         lx, ly, lz = 2.0 * vh * hx - vx, 2.0 * vh * hy - vy, 2.0 * vh * hz - vz
         if a < SMOOTH:
             for c in range(3):
-                f0 = DIELECTRIC + (row[c, lane] - DIELECTRIC) * row[METALLIC, lane]
+                f0 = DIELECTRIC + (row[BASE + c, lane] - DIELECTRIC) * row[METALLIC, lane]
                 weight[c] = fresnel(f0, vz) / chance
             return lx, ly, lz, 0.0, True
     density = bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, weight)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,11 @@ from baker.core.scene import Camera
 from baker.kernels.sampling import hash_u32
 from baker.pathtracer.rng import mix64
 from baker.trace.jit import inner, kernel
+
+# Columns of a camera as kernels take it: position, right, up, forward, tangent of half the vertical field of
+# view, pixels across and down.
+EYE, RIGHT, UP, FORWARD, TAN_HALF_FOV, PIXELS_ACROSS, PIXELS_DOWN = 0, 3, 6, 9, 12, 13, 14
+CAMERA_COLUMNS = 15
 
 
 def parse_camera(text: str) -> Camera:
@@ -67,6 +73,31 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     return Camera("camera", -1, position, x, y, z, math.radians(fov))  # type: ignore[arg-type]
 
 
+def camera_columns(
+    camera: Camera, position: Sequence[float] | NDArray[np.float64], width: int, height: int
+) -> NDArray[np.float64]:
+    """Return a camera as kernels take it.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its position is not used.
+    position : (3,) sequence of float
+        Metres, relative to the geometry's origin.
+    width : int
+        Pixels.
+    height : int
+        Pixels.
+
+    Returns
+    -------
+    (15,) float64
+        See the column names.
+    """
+    axes = [*camera.right, *camera.up, *camera.forward]
+    return np.array([*position, *axes, math.tan(0.5 * camera.fov), width, height])
+
+
 def camera_rays(
     camera: Camera, width: int, height: int, pixel: NDArray[np.int64], samples: int, seed: int, number: int
 ) -> NDArray[np.float64]:
@@ -94,7 +125,7 @@ def camera_rays(
     (n, samples, 3) float64
         Unit, world.
     """
-    lens = np.array([*camera.right, *camera.up, *camera.forward, math.tan(0.5 * camera.fov)])
+    lens = camera_columns(camera, camera.position, width, height)
     direction = np.zeros((len(pixel), samples, 3))
     _fill(lens, width, height, pixel, _salt(seed, 2 * number), _salt(seed, 2 * number + 1), direction)
     return direction
@@ -104,10 +135,10 @@ def camera_rays(
 def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore[no-untyped-def]
     """Write unit directions to `direction` (n, samples, 3).
 
-    lens : (10,) float64, right, up, forward, tangent of half the vertical field of view
+    lens : (15,) float64, see the column names
     pixel : (n,) int64; first, second : uint64, salts
     """
-    high = lens[9]
+    high = lens[TAN_HALF_FOV]
     for i in range(len(pixel)):
         row, column = pixel[i] // width, pixel[i] % width
         u, v = _uniform(pixel[i], first), _uniform(pixel[i], second)
@@ -119,7 +150,7 @@ def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore
             y = (1.0 - 2.0 * (row + y) / height) * high
             square = 0.0
             for a in range(3):
-                direction[i, k, a] = lens[6 + a] + x * lens[a] + y * lens[3 + a]
+                direction[i, k, a] = lens[FORWARD + a] + x * lens[RIGHT + a] + y * lens[UP + a]
                 square += direction[i, k, a] * direction[i, k, a]
             scale = 1.0 / math.sqrt(square)
             for a in range(3):

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.kernels.transmittance import trace_transmittance_packet, transmittance
-from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TEXTURED, TWO_SIDED, Reference
+from baker.pathtracer.scene import (
+    BASE_COLOUR,
+    CORNER,
+    FACE,
+    MATERIAL,
+    SHADING,
+    TEXTURED,
+    TWO_SIDED,
+    Reference,
+)
 from baker.pathtracer.vertex import base_colour
 from baker.trace.jit import kernel, scratch
 from baker.trace.packets import (
@@ -142,7 +151,7 @@ def _meet(origin, direction, buffers, surface, material, shading, triangle, bary
             triangle[i], bary[i, 0], bary[i, 1], depth[i] = prim, u, v, floats[TFAR * width + lane]
             m = np.int64(surface[prim, MATERIAL])
             for c in range(3):
-                albedo[i, c] = material[m, c]
+                albedo[i, c] = material[m, BASE_COLOUR + c]
             if surface[prim, TEXTURED] > 0.0:
                 base_colour(shading, prim, m, u, v, colour)
                 for c in range(3):

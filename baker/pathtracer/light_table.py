@@ -284,6 +284,22 @@ def pick_light(cumulative, u):  # type: ignore[no-untyped-def]
 
 
 @inner
+def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
+    """Return the point of emitter e at barycentrics; emitter : (E, 24) float64, see `emitters`."""
+    return (
+        b0 * emitter[e, EMITTER_CORNER]
+        + b1 * emitter[e, EMITTER_CORNER + 3]
+        + b2 * emitter[e, EMITTER_CORNER + 6],
+        b0 * emitter[e, EMITTER_CORNER + 1]
+        + b1 * emitter[e, EMITTER_CORNER + 4]
+        + b2 * emitter[e, EMITTER_CORNER + 7],
+        b0 * emitter[e, EMITTER_CORNER + 2]
+        + b1 * emitter[e, EMITTER_CORNER + 5]
+        + b2 * emitter[e, EMITTER_CORNER + 8],
+    )
+
+
+@inner
 def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     """Return the vector from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
 
@@ -292,9 +308,8 @@ def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     emitter : (E, 24) float64, see `emitters`; u, w : uniform numbers
     """
     b1, b2 = triangle_barycentric(np.float32(u), np.float32(w))
-    dx = (1.0 - b1 - b2) * emitter[e, 0] + b1 * emitter[e, 3] + b2 * emitter[e, 6] - x
-    dy = (1.0 - b1 - b2) * emitter[e, 1] + b1 * emitter[e, 4] + b2 * emitter[e, 7] - y
-    dz = (1.0 - b1 - b2) * emitter[e, 2] + b1 * emitter[e, 5] + b2 * emitter[e, 8] - z
+    px, py, pz = point_on_emitter(emitter, e, 1.0 - b1 - b2, b1, b2)
+    dx, dy, dz = px - x, py - y, pz - z
     density = emitter_density(emitter, e, dx, dy, dz)
     return dx, dy, dz, density, b1, b2
 

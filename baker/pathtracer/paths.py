@@ -63,7 +63,7 @@ from baker.pathtracer.path_blocks import (
     unsigned,
 )
 from baker.pathtracer.rng import random_lanes, spread_lanes
-from baker.pathtracer.scene import EMISSION, EMITTER, FACE, MATERIAL, SHINES, TEXTURED, TWO_SIDED
+from baker.pathtracer.scene import BASE_COLOUR, EMISSION, EMITTER, FACE, MATERIAL, SHINES, TEXTURED, TWO_SIDED
 from baker.pathtracer.shadow_rays import cast_packet, cast_to_lights
 from baker.pathtracer.vertex import BETA as PATH_BETA
 from baker.pathtracer.vertex import DENSITY as PATH_DENSITY
@@ -73,6 +73,9 @@ from baker.pathtracer.vertex import (
     MOST,
     N_ROWS,
     POSITION,
+    RAY_B1,
+    RAY_B2,
+    RAY_LENGTH,
     SURE,
     aim,
     arrive,
@@ -202,7 +205,7 @@ def fetch_lanes(s, words, base, surface, material):
                 s[base + (TRIANGLE + c) * _L + lane] = surface[prim, c]
             m = unsigned(surface[prim, MATERIAL])
             for c in range(3):
-                s[base + (ALBEDO + c) * _L + lane] = material[m, c]
+                s[base + (ALBEDO + c) * _L + lane] = material[m, BASE_COLOUR + c]
 
 
 @inner
@@ -276,9 +279,9 @@ def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
         s[base + B1 * _L + lane],
         s[base + B2 * _L + lane],
     ) = (
-        ray[3],
-        ray[4],
-        ray[5],
+        ray[RAY_LENGTH],
+        ray[RAY_B1],
+        ray[RAY_B2],
     )
     return light
 

@@ -38,6 +38,8 @@ CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES 
 )
 # Two cache lines.
 ROW_LENGTH = 32
+# Columns of a material: base colour, metallic, roughness, 1 if a texture scales the last two.
+BASE_COLOUR, MATERIAL_METALLIC, MATERIAL_ROUGHNESS, MATERIAL_TEXTURED, MATERIAL_LENGTH = 0, 3, 4, 5, 8
 # Quantile of triangle sizes that is half of `Surfaces.default_size`.
 _SMALL = 0.1
 
@@ -50,7 +52,7 @@ class Surfaces(NamedTuple):
     row : (T, 32) float32
         See the column names.
     material : (M, 8) float32
-        Base colour, metallic, roughness, 1 if a texture scales the last two.
+        See the column names.
     min_offset_scale : float
         Metres; coordinates below count as this when origins of rays are offset.
     default_size : float
@@ -211,12 +213,17 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
     if not lambertian:
         painted = painted | (shading.reflection_texture >= 0)
     row[:, TEXTURED] = painted[material] | (len(shading.colour) > 1)
-    kinds = np.zeros((len(shading.base), 8), np.float32)
-    kinds[:, :3] = shading.base
-    kinds[:, 3], kinds[:, 4] = shading.metallic, shading.roughness
-    kinds[:, 5] = shading.reflection_texture >= 0
+    material_row = np.zeros((len(shading.base), MATERIAL_LENGTH), np.float32)
+    material_row[:, BASE_COLOUR : BASE_COLOUR + 3] = shading.base
+    material_row[:, MATERIAL_METALLIC], material_row[:, MATERIAL_ROUGHNESS] = (
+        shading.metallic,
+        shading.roughness,
+    )
+    material_row[:, MATERIAL_TEXTURED] = shading.reflection_texture >= 0
     min_offset_scale, default_size = max(1e-3 * geometry.diagonal, 1e-12), _small_size(geometry)
-    return Surfaces(row, kinds, min_offset_scale, default_size, int(lambertian), int(row[:, TEXTURED].any()))
+    return Surfaces(
+        row, material_row, min_offset_scale, default_size, int(lambertian), int(row[:, TEXTURED].any())
+    )
 
 
 def _small_size(geometry: Geometry) -> float:

@@ -17,6 +17,7 @@ from baker.kernels.sampling import tangent_frame
 from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 from baker.pathtracer.bsdf import (
+    BASE,
     METALLIC,
     SMOOTH,
     WIDTH,
@@ -36,7 +37,17 @@ from baker.pathtracer.light_table import (
     aim_at_emitter,
     pick_light,
 )
-from baker.pathtracer.scene import CORNER, FACE, MATERIAL, SHADING, TWO_SIDED
+from baker.pathtracer.scene import (
+    BASE_COLOUR,
+    CORNER,
+    FACE,
+    MATERIAL,
+    MATERIAL_METALLIC,
+    MATERIAL_ROUGHNESS,
+    MATERIAL_TEXTURED,
+    SHADING,
+    TWO_SIDED,
+)
 from baker.trace.jit import inner
 
 # Rows of a path: position, next direction, throughput, collected light, density of the last direction (0: no
@@ -55,6 +66,8 @@ POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
     29,
 )
 N_ROWS = 32
+# A ray to a light: unit direction, length, barycentrics of the point on an emitter.
+RAY_LENGTH, RAY_B1, RAY_B2 = 3, 4, 5
 # A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
 GRAZE = 1.0e-3
 # Ray origins are offset from the surface by this share of the largest coordinate or of the triangle's size,
@@ -127,7 +140,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
         return
     for a in range(3):
         path[NORMAL + a, lane] = normal[a]
-        row[a, lane] = 1.0
+        row[BASE + a, lane] = 1.0
     row[METALLIC, lane], row[WIDTH, lane] = 0.0, -1.0
     offset_origin(path, lane, where[0], where[1], where[2], sizes[0], sizes[1])
     set_frame(path, lane, toward[0], toward[1], toward[2])
@@ -171,9 +184,11 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
     # A Lambertian surface has the same radiance in all directions, also below the interpolated horizon.
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
     m = np.int64(surface[prim, MATERIAL])
-    row[0, lane], row[1, lane], row[2, lane] = material[m, 0], material[m, 1], material[m, 2]
-    row[METALLIC, lane] = material[m, 3] if glossy else 0.0
-    row[WIDTH, lane] = material[m, 4] * material[m, 4] if glossy else -1.0
+    for c in range(3):
+        row[BASE + c, lane] = material[m, BASE_COLOUR + c]
+    row[METALLIC, lane] = material[m, MATERIAL_METALLIC] if glossy else 0.0
+    roughness = material[m, MATERIAL_ROUGHNESS]
+    row[WIDTH, lane] = roughness * roughness if glossy else -1.0
     return True
 
 
@@ -186,8 +201,8 @@ def paint(row, lane, shading, prim, u, v, material, rgba):
     m = shading.material[prim]
     base_colour(shading, prim, m, u, v, rgba)
     for c in range(3):
-        row[c, lane] *= rgba[c]
-    if row[WIDTH, lane] >= 0.0 and material[m, 5] > 0.0:
+        row[BASE + c, lane] *= rgba[c]
+    if row[WIDTH, lane] >= 0.0 and material[m, MATERIAL_TEXTURED] > 0.0:
         s, t = uv_at(shading.reflection_uv, shading.triangle, prim, u, v)
         sample_texture(shading.pack, shading.reflection_texture[m], s, t, 0.0, rgba)
         row[METALLIC, lane] *= rgba[2]
@@ -224,7 +239,7 @@ def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
     path : (N_ROWS, n) float64; row : (5, n) float64; lights : `LightTable`
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
     value : (3,) float64, output, light if unblocked, without the emitter's texture
-    ray : (6,) float64, output: unit direction, length, barycentrics of the point on an emitter
+    ray : (6,) float64, output, see the column names
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -277,7 +292,8 @@ def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
     value[0] *= path[BETA, lane] * red * scale
     value[1] *= path[BETA + 1, lane] * green * scale
     value[2] *= path[BETA + 2, lane] * blue * scale
-    ray[0], ray[1], ray[2], ray[3], ray[4], ray[5] = dx, dy, dz, max_distance, b1, b2
+    ray[0], ray[1], ray[2] = dx, dy, dz
+    ray[RAY_LENGTH], ray[RAY_B1], ray[RAY_B2] = max_distance, b1, b2
     return light if value[0] + value[1] + value[2] > 0.0 else -1
 
 
