@@ -2,8 +2,8 @@
 
 This is a second finder beside `lights.emissive.build_emitters`, so that an emitter lost by the bake is still
 in the reference. Which triangles emit, their area, radiance, sides and power are worked out here from the
-resolved materials. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`: the parts
-say where samples go, not how bright a point is, which is looked up in the material.
+resolved materials. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`. The parts
+determine where samples are taken; the radiance of a point is looked up in the material.
 
     power = pi area L (twice that if two-sided)      L: luminance, or mean of RGB of a textured part
 """

@@ -85,7 +85,7 @@ def look_around(
         direction = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
         hits = first_hits(reference, origin, direction)
-        found = np.where(hits.triangle >= 0, reference.tells[hits.triangle], 0)
+        found = np.where(hits.triangle >= 0, reference.hit_kind[hits.triangle], 0)
         inside += found == np.where(hits.front, SOLID_FRONT, SOLID_BACK)
         black += (found == BLACK_BACK) & ~hits.front
     return Views(rays, inside, black)

@@ -4,9 +4,9 @@ A light is chosen with a fixed chance, half of it by power and half equally amon
 nor a candle is starved. Each estimate is divided by the chance of its light: whatever the chances, its
 expectation is the same.
 
-Lights without area come as `EmissionProfile`s, which the files of `baker.lights.kinds` supply. Kernels tell
-four forms of profile apart: even, cone, parallel, and tabulated. A light whose fall-off is none of the first
-three is a table, which the kernels interpolate; new kinds of light need no change here.
+Lights without area come as `EmissionProfile`s, which the files of `baker.lights.kinds` supply. Kernels
+distinguish four forms of profile: even, cone, parallel, and tabulated. A light whose fall-off is none of the
+first three is a table, which the kernels interpolate; new kinds of light need no change here.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.
@@ -201,7 +201,7 @@ def _profile(light: PunctualLight) -> EmissionProfile:
 
 
 def _form(profile: EmissionProfile) -> float:
-    """Return the number by which kernels tell the forms of profiles apart."""
+    """Return the number of the form of a profile."""
     if profile.position is None:
         return PARALLEL
     if profile.table is not None:

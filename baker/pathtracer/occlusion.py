@@ -203,10 +203,10 @@ def open_rays(  # type: ignore[no-untyped-def]
                 copy_points(s, position, normal, face_normal, group, k)
                 start_vertices(s, 0, sizes[0], sizes[1])
             if sample == 0:
-                asked = arguments[1] if extent(s, lanes) < alike else arguments[0]
+                packet_arguments = arguments[1] if extent(s, lanes) < alike else arguments[0]
             number_lanes(words, sobol_points[sample, 0], sobol_points[sample, 1], shared)
             point_lanes(s, max_distance)
-            call_embree_with(occluded, on, scene, s, asked)
+            call_embree_with(occluded, on, scene, s, packet_arguments)
             count_lanes(s)
         for lane in range(lanes):
             out[group + lane, 0] += s[VALUE * BLOCK_WIDTH + lane]

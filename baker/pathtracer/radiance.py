@@ -60,7 +60,7 @@ def radiance_pass(
     SettingsError
         If there is no such estimator.
     Cancelled
-        If `progress` asked to stop.
+        If `progress` returned a truthy value.
     """
     options = estimator_named(estimator)
     samples, number = estimate.samples, estimate.rounds

@@ -86,7 +86,7 @@ class Reference:
     sphere : (4,) float64
         Centre and radius, metres, of a sphere around everything.
     threads : int
-    tells : (T,) uint8
+    hit_kind : (T,) uint8
         Class of each triangle, see `kernels.probe`; 0 if built without `find_solids`.
     """
 
@@ -97,7 +97,7 @@ class Reference:
     rays: RayScene
     sphere: NDArray[np.float64]
     threads: int
-    tells: NDArray[np.uint8]
+    hit_kind: NDArray[np.uint8]
 
     def __enter__(self) -> Reference:
         """Return itself."""
@@ -157,11 +157,11 @@ def build_reference(
     rays = build_ray_tree(geometry, shading, threads=count)
     lights = build_light_table(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lights, lambertian)
-    tells = np.zeros(len(geometry.triangle), np.uint8)
+    hit_kind = np.zeros(len(geometry.triangle), np.uint8)
     if find_solids:
         # For `inside_geometry` only: paths take sides of surfaces from the materials.
-        tells = hide_backs(scene, geometry, shading)[1]
-    return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, tells)
+        hit_kind = hide_backs(scene, geometry, shading)[1]
+    return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, hit_kind)
 
 
 def _no_atlas(scene: Scene) -> Atlas:

@@ -84,7 +84,7 @@ def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
     """Write a ray origin just above (x, y, z), and the frame of the normals that are in the lane.
 
     s : blocks, float32
-    min_offset_scale, size : float32, metres, see `vertex.place_off`
+    min_offset_scale, size : float32, metres, see `vertex.offset_origin`
     """
     far = max(max(abs(x), abs(y)), abs(z))
     off = max(_ROUNDING * max(far, size), _OFFSET * min(max(far, min_offset_scale), size))
@@ -103,15 +103,15 @@ def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
 
 
 @inner
-def start_vertices(s, base, min_offset_scale, most):
+def start_vertices(s, base, min_offset_scale, default_size):
     """Make vertices of the lanes' surface points.
 
-    s : blocks, float32; min_offset_scale, most : float32, metres, see `Surfaces`
+    s : blocks, float32; min_offset_scale, default_size : float32, metres, see `Surfaces`
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
         x, y, z = s[base + ORG_X * _L + lane], s[base + ORG_Y * _L + lane], s[base + ORG_Z * _L + lane]
-        offset_and_frame(s, base, lane, x, y, z, min_offset_scale, most)
+        offset_and_frame(s, base, lane, x, y, z, min_offset_scale, default_size)
 
 
 @inner

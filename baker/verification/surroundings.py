@@ -151,7 +151,7 @@ def _first_look(
     origin = lifted(reference, points.position, points.face_normal)
     direction = _cosine(points.normal.reshape(-1, 3), random)
     hits = first_hits(reference, origin, direction)
-    flags = np.where(hits.triangle >= 0, reference.tells[hits.triangle], 0)
+    flags = np.where(hits.triangle >= 0, reference.hit_kind[hits.triangle], 0)
     inside = flags == np.where(hits.front, SOLID_FRONT, SOLID_BACK)
     black = (inside | ((flags == BLACK_BACK) & ~hits.front)).reshape(n, k)
     width = np.sqrt(points.surface / np.maximum(points.area, 1e-12))
