@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, quad_builder, write
 
+from baker.channels.channel import make_lightmap
 from baker.core.atlas import Atlas, InstanceLayout
-from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.lightmap import BakeResult
 from baker.core.scene import Scene
 from baker.core.settings import make_settings
 from baker.io.load import load_scene
@@ -132,8 +133,8 @@ def quad_result(folder: Path, **settings: object) -> BakeResult:
     scene = load_scene(write(folder / "level.glb", quad_builder(name="wall")))
     rng = np.random.default_rng(4)
     maps = {
-        "irradiance": Lightmap("irradiance", "lx", rng.random((1, 16, 16, 3), np.float32) * 50),
-        "ao": Lightmap("ao", "1", rng.random((1, 16, 16, 1), np.float32)),
+        "irradiance": make_lightmap("irradiance", rng.random((1, 16, 16, 3), np.float32) * 50),
+        "ao": make_lightmap("ao", rng.random((1, 16, 16, 1), np.float32)),
     }
     status = rng.integers(0, 5, (1, 16, 16)).astype(np.uint8)
     return BakeResult(

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 
+from baker.channels.channel import make_lightmap
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
 from baker.core.settings import make_settings
@@ -118,7 +119,7 @@ def _maps(half: bool) -> dict[str, Lightmap]:
     if not half:
         light *= np.float32(1.1)  # no half any more
     occlusion = ((column + 0.5) / SIZE)[..., None].astype(np.float32)
-    return {"irradiance": Lightmap("irradiance", "lx", light), "ao": Lightmap("ao", "1", occlusion)}
+    return {"irradiance": make_lightmap("irradiance", light), "ao": make_lightmap("ao", occlusion)}
 
 
 def _status(layouts) -> np.ndarray:

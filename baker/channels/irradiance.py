@@ -11,12 +11,12 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 
 
 def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
-    """Return sampled lights and gathered light as two layers: sharp shadows apart from soft light.
+    """Return sampled direct light and gathered light as two layers: sharp shadows apart from soft light.
 
-    In gaps about a texel wide both stay as they were sampled. Light falls to a hundredth from one texel to
-    the next there, and a filter smears it. *Measured* at 256 with 64 rays on such texels with and without the
-    filter, mean and median error: +78 and 33 %, +1 and 3 % (hall, 10 to 32 lx); +35 and 17 %, +3 and 12 %
-    (interior, 3 to 10 lx).
+    In gaps about a texel wide neither is denoised. Light falls to a hundredth from one texel to the next
+    there, and a filter smears it. *Measured* at 256 with 64 rays on such texels with and without the filter,
+    mean and median error: +78 and 33 %, +1 and 3 % (hall, 10 to 32 lx); +35 and 17 %, +3 and 12 % (interior,
+    3 to 10 lx).
     """
     direct, gathered = transport.direct, transport.gathered
     if direct is None or gathered is None:
@@ -31,11 +31,11 @@ def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
 CHANNELS.register("irradiance")(
     Channel(
         unit="lx",
-        quantity="irradiance",
-        components=3,
-        upper=float("inf"),
+        quantity="irradiance E on the surface, direct and indirect, without the receiver's albedo",
+        definition="E = integral over the hemisphere of L(w) cos(theta) dw",
+        components=("R", "G", "B"),
+        colour=True,
         needs_light=True,
-        needs_open=False,
         layers=irradiance_layers,
     )
 )

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.channels.channel import Channel, chosen_channels
 from baker.checks.bake_rates import Rates
 from baker.checks.direct_light import Levels, estimate_levels
 from baker.checks.emission import Emission, find_emission
@@ -110,10 +111,20 @@ class CheckContext:
         used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
         return [int(k) for k in np.unique(np.concatenate(used))] if used else []
 
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        """Return the channels to be baked."""
+        return tuple(chosen_channels(self.settings.channels).values())
+
     @property
     def bakes_light(self) -> bool:
-        """Return whether a channel other than AO is baked."""
-        return any(name != "ao" for name in self.settings.channels)
+        """Return whether a channel to be baked needs light."""
+        return any(channel.needs_light for channel in self.channels)
+
+    @property
+    def bakes_ambient_occlusion(self) -> bool:
+        """Return whether a channel to be baked needs ambient occlusion."""
+        return any(channel.needs_ambient_occlusion for channel in self.channels)
 
     @cached_property
     def emission(self) -> Emission:

@@ -27,6 +27,53 @@ class TexelStatus(IntEnum):
 
 
 @dataclass(frozen=True)
+class ChannelDescription:
+    """Meaning of the numbers of a channel.
+
+    Attributes
+    ----------
+    unit : str
+        "lx", "1", ...
+    quantity : str
+        What the numbers are, in words.
+    definition : str
+        The same as a formula.
+    components : tuple of str
+        Names of the components, in the order of the last axis of a map; the EXR channels. ("R", "G", "B") and
+        ("Y",) are an image without layers; "L1.R" is channel R of the layer L1.
+    signed : bool
+        Whether values may be negative.
+    colour : bool
+        Whether R, G and B are linear Rec.709.
+    """
+
+    unit: str
+    quantity: str
+    definition: str
+    components: tuple[str, ...]
+    signed: bool = False
+    colour: bool = False
+
+    @property
+    def colour_space(self) -> str:
+        """Return the colour space in words, "none" if the components are no colours."""
+        return "linear Rec.709, D65" if self.colour else "none"
+
+    @property
+    def groups(self) -> tuple[slice, ...]:
+        """Return the components that make up one colour each; all others, and signed ones, are alone."""
+        groups, start = [], 0
+        while start < len(self.components):
+            three = self.components[start : start + 3]
+            layer = three[0].rpartition(".")[0]
+            prefix = f"{layer}." if layer else ""
+            is_colour = not self.signed and three == tuple(prefix + name for name in "RGB")
+            groups.append(slice(start, start + (3 if is_colour else 1)))
+            start = groups[-1].stop
+        return tuple(groups)
+
+
+@dataclass(frozen=True)
 class Lightmap:
     """One channel of a bake.
 
@@ -34,15 +81,19 @@ class Lightmap:
     ----------
     channel : str
         "irradiance", "ao", ...
-    unit : str
-        "lx" for irradiance, "1" for AO.
     value : (P, H, W, C) float32
-        Pages, rows (row 0 is v = 0), columns; C = 3 (linear Rec.709) or 1.
+        Pages, rows (row 0 is v = 0), columns, components.
+    description : ChannelDescription
     """
 
     channel: str
-    unit: str
     value: NDArray[np.float32]
+    description: ChannelDescription
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the values: "lx" for irradiance, "1" for AO."""
+        return self.description.unit
 
 
 @dataclass(frozen=True, repr=False)

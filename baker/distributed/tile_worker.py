@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
+from baker.core.budget import patch_rays
 from baker.core.parallel import Part, TileRunner
 from baker.core.progress import silent
 from baker.core.scene import Scene
@@ -23,7 +24,6 @@ from baker.core.stage import Stage
 from baker.pipeline.prepare import PreparedScene, prepare_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import (
-    patch_rays,
     trace_ambient_occlusion,
     trace_direct_light,
     trace_final_gather,

@@ -1,7 +1,7 @@
-"""OpenEXR: half or float numbers, ZIP or PIZ, scanlines, channels R G B or Y.
+"""OpenEXR: half or float numbers, ZIP or PIZ, scanlines, channels R G B, Y, or named layers.
 
-Those are the choices that every engine and viewer reads; PXR24, B44 and DWA are not. Files carry no time
-stamp, so the same pixels give the same bytes.
+Every engine and viewer reads ZIP and PIZ; PXR24, B44 and DWA are less widely read. Files carry no time stamp,
+so the same pixels give the same bytes.
 
 Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Standard Optional Attributes").
 """
@@ -91,9 +91,11 @@ def encode_layers(
     Parameters
     ----------
     path : Path
+        File to write; replaced if it exists.
     layers : mapping of channel name to (H, W) float32
         "R", "G", "B" are the picture; "albedo.R", "depth.Z" and so on lie beside it.
     header : mapping of str to str
+        Further attributes.
 
     Raises
     ------

@@ -65,7 +65,7 @@ def denoise_page(
     *,
     standard_error: NDArray[np.float32] | None = None,
     bound: bool = False,
-    threads: int = 1,
+    signed: bool = False,
     denoiser: LightmapDenoiser | None = None,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
@@ -74,7 +74,7 @@ def denoise_page(
     Parameters
     ----------
     value : (H, W, C) float32
-        Linear light, C = 3, or C = 1 (AO; filtered as grey). Buried texels filled before this.
+        Linear light, C = 3, or C = 1 (filtered as grey). Invalid texels are filled before this.
     covered : (H, W) bool
     chart : (H, W) int32
     standard_error : (H, W) float32, optional
@@ -82,9 +82,11 @@ def denoise_page(
         how far a texel may move; without it the noise is estimated from the page.
     bound : bool
         Whether that is an upper bound: it is lowered to `FITTED` of the noise that the page shows.
-    threads : int
+    signed : bool
+        Whether values may be negative; C is 1 then.
     denoiser : LightmapDenoiser, optional
-        Keeps the filter's memory for further pages; without one it is taken and released here.
+        Filter whose memory is kept for further pages; its threads also run the kernels. By default one of a
+        single thread is made and released here.
     progress : Progress
 
     Returns
@@ -95,17 +97,13 @@ def denoise_page(
     Raises
     ------
     ValueError
-        If the arrays do not belong together or C is neither 1 nor 3.
+        If the arrays do not belong together, C is neither 1 nor 3, or signed values have three components.
     ResourceError
         If Open Image Denoise cannot be loaded or runs out of memory.
     Cancelled
         If `progress` asked to stop.
     """
-    check_page(value, chart, covered=covered)
-    if value.shape[2] not in (1, 3):
-        raise ValueError(f"a page to denoise has 1 or 3 channels, this one has {value.shape[2]}")
-    if standard_error is not None:
-        check_page(value, chart, standard_error=standard_error)
+    _check_input(value, covered, chart, standard_error, signed)
     result = np.array(value)
     if not covered.any():
         return result
@@ -114,14 +112,10 @@ def denoise_page(
     inside = np.ascontiguousarray(covered[window])
     charts = np.ascontiguousarray(chart[window])
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
-    # A room of a millionth of the page's light is black to the filter: it came out worse than it went in.
-    level = _levels(noisy, charts, inside)
-    picture = surround_charts(noisy / level, inside, charts, threads=threads)
-    rows, columns = (_margins(side) for side in inside.shape)
-    wide = np.pad(picture, (rows, columns, (0, 0)), mode="symmetric")
     with contextlib.ExitStack() as stack:
-        wide = (denoiser or stack.enter_context(LightmapDenoiser(threads))).filter(wide, progress)
-    filtered = np.ascontiguousarray(wide[rows[0] : -rows[1], columns[0] : -columns[1]] * level)
+        denoiser = denoiser or stack.enter_context(LightmapDenoiser(1))
+        filtered = _filter_window(noisy, charts, inside, signed, denoiser, progress)
+    threads = denoiser.threads
     error = _error_within(window, noisy, charts, inside, standard_error, bound, threads)
     held = np.array(filtered)
     over_rows(
@@ -131,6 +125,42 @@ def denoise_page(
     )
     result[window][inside] = held[inside][:, : value.shape[2]]
     return result
+
+
+def _check_input(
+    value: NDArray[np.float32],
+    covered: NDArray[np.bool_],
+    chart: NDArray[np.int32],
+    standard_error: NDArray[np.float32] | None,
+    signed: bool,
+) -> None:
+    """Raise ValueError for arguments that `denoise_page` does not take."""
+    check_page(value, chart, covered=covered)
+    if value.shape[2] not in (1, 3):
+        raise ValueError(f"a page to denoise has 1 or 3 channels, this one has {value.shape[2]}")
+    if signed and value.shape[2] != 1:
+        raise ValueError("signed components are denoised one by one")
+    if standard_error is not None:
+        check_page(value, chart, standard_error=standard_error)
+
+
+def _filter_window(
+    noisy: NDArray[np.float32],
+    charts: NDArray[np.int32],
+    inside: NDArray[np.bool_],
+    signed: bool,
+    denoiser: LightmapDenoiser,
+    progress: Progress,
+) -> NDArray[np.float32]:
+    """Return the filtered picture (h, w, 3) of a window of noisy values (h, w, 3), gaps filled."""
+    # Charts are scaled to one level: a room of a millionth of the page's light is black to the filter and
+    # came out worse than unfiltered.
+    level = _levels(np.abs(noisy) if signed else noisy, charts, inside)
+    picture = surround_charts(noisy / level, inside, charts, threads=denoiser.threads)
+    rows, columns = (_margins(side) for side in inside.shape)
+    wide = np.pad(picture, (rows, columns, (0, 0)), mode="symmetric")
+    wide = denoiser.filter(wide, progress, signed=signed)
+    return np.ascontiguousarray(wide[rows[0] : -rows[1], columns[0] : -columns[1]] * level)
 
 
 def _margins(side: int) -> tuple[int, int]:

@@ -1,7 +1,9 @@
-"""From values of texels to a finished page: buried texels, noise, borders, surroundings."""
+"""Finished pages from texel values: invalid texels filled, noise removed, values centred, charts grown."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -9,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.progress import Progress
+from baker.core.progress import Progress, silent
 from baker.finish.denoise import denoise_page
 from baker.finish.dilate import dilate
 from baker.finish.invalid import fill_invalid
@@ -19,34 +21,37 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-# A layer is left as it was sampled if the noise of all texels of about one brightness is below this share of
-# their light (RMS): filtering it costs a second pass and gained nothing (Cornell, 64 samples: 0.33 % median
-# error with, 0.35 % without).
+# A layer is not denoised if the RMS noise of all texels of similar brightness is below this share of their
+# light: a second pass of the filter gained nothing (Cornell, 64 samples: 0.33 % median error with it, 0.35 %
+# without).
 NOT_WORTH_FILTERING = 0.02
-# Charts whose mean light lies within such a factor are of about one brightness. Fewer texels do not count.
+# Charts belong to one brightness band if their mean light is within this factor. Bands of fewer texels do
+# not count.
 BAND = 8.0
 FEWEST = 64
-# Where a chart's mean light is more than this times its geometric mean, its blocks are judged like charts.
+# A chart whose mean light exceeds this multiple of its geometric mean is split into blocks for this decision.
 UNEVEN = 2.5
-# Light below this share of that of the page's brightest chart counts as black.
+# Light below this share of the light of the page's brightest chart counts as black.
 BLACK = 1e-10
-# Noise below this share is none.
+# Relative noise below this counts as zero.
 QUIET = 0.002
-# The charts to filter are brought together if that takes less than this share of the charts' area.
+# The charts to filter are packed together if the packed page has less than this share of the charts' area.
 SMALLER = 0.9
-# Side of such a block, texels.
+# Side of a block, texels.
 BLOCK = 16
 
 
 @dataclass(frozen=True)
 class PagePlan:
-    """What lies where on one page, the same for all channels.
+    """Charts and valid texels of one page, the same for all channels.
 
     Attributes
     ----------
     chart : (H, W) int32, -1 = empty
-    valid : (H, W) bool, covered and not buried
-    centroid : (H, W, 2) float32, covered part's centroid from the texel's centre, texels
+    valid : (H, W) bool
+        Covered texels with a valid point.
+    centroid : (H, W, 2) float32
+        Centroid of the covered part of each texel minus the texel centre (column, row), texels.
     """
 
     chart: NDArray[np.int32]
@@ -55,13 +60,13 @@ class PagePlan:
 
     @property
     def covered(self) -> NDArray[np.bool_]:
-        """Return where charts are, (H, W) bool."""
+        """Return the texels of charts, (H, W) bool."""
         covered: NDArray[np.bool_] = self.chart >= 0
         return covered
 
     @cached_property
     def nearest(self) -> NDArray[np.int32]:
-        """Return the number of the covered texel nearest to each texel, (H, W) int32."""
+        """Return the flat index of the covered texel nearest to each texel, (H, W) int32."""
         nearest = np.zeros(self.chart.shape, np.int32)
         nearest_texel(self.covered, nearest)
         return nearest
@@ -70,8 +75,11 @@ class PagePlan:
 class PageLayer(NamedTuple):
     """A part of a page that is denoised by itself.
 
-    value (H, W, C) float32; error (H, W) float32, standard error; bound: whether that is an upper bound;
-    kept (H, W) bool or None: texels that stay as they were sampled.
+    value : (H, W, C) float32
+    error : (H, W) float32, standard error of the mean of the components of each group; or (H, W, G) float32,
+        one for each of G groups
+    bound : bool, whether `error` is an upper bound
+    kept : (H, W) bool or None, texels that are not denoised
     """
 
     value: NDArray[np.float32]
@@ -80,70 +88,151 @@ class PageLayer(NamedTuple):
     kept: NDArray[np.bool_] | None = None
 
 
+@dataclass(frozen=True)
+class ComponentRules:
+    """Bounds of a map's values, and which components are denoised together.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Smallest and largest possible value; `lower` < 0 for signed values.
+    groups : tuple of slice
+        Components that are denoised together: three that are one colour, or a single one. Signed components
+        are in groups of one.
+    """
+
+    lower: float
+    upper: float
+    groups: tuple[slice, ...]
+
+    @property
+    def signed(self) -> bool:
+        """Return whether values may be negative."""
+        return self.lower < 0.0
+
+    def clip(self, value: NDArray[np.float32], like: NDArray[np.float32] | None = None) -> None:
+        """Clip `value` (H, W, C) in place to the bounds, and to the extremes of each component of `like`."""
+        lower, upper = np.float32(self.lower), np.float32(self.upper)
+        if like is None:
+            np.clip(value, lower, upper, out=value)
+            return
+        flat = like.reshape(-1, like.shape[2])
+        highest = np.minimum(flat.max(axis=0, initial=0.0), upper)
+        lowest = np.maximum(flat.min(axis=0, initial=0.0), lower)
+        np.clip(value, lowest, highest, out=value)
+
+
+@dataclass(frozen=True)
+class Finisher:
+    """Resources of the finishing stages, the same for all pages of a bake.
+
+    Attributes
+    ----------
+    threads : int
+    dilation : int
+        Texels by which charts grow into the padding.
+    denoiser : LightmapDenoiser or None
+        None: layers are not denoised.
+    progress : Progress
+    """
+
+    threads: int
+    dilation: int
+    denoiser: LightmapDenoiser | None
+    progress: Progress
+
+
+@contextmanager
+def open_finisher(
+    *, threads: int, dilation: int, denoise: bool, progress: Progress = silent
+) -> Iterator[Finisher]:
+    """Yield a `Finisher` and release the denoiser's memory at the end."""
+    with LightmapDenoiser(threads) as denoiser:
+        yield Finisher(threads, dilation, denoiser if denoise else None, progress)
+
+
 def finish_page(
-    plan: PagePlan,
-    layers: list[PageLayer],
-    *,
-    upper: float,
-    denoiser: LightmapDenoiser | None,
-    dilation: int,
-    threads: int,
-    progress: Progress,
+    plan: PagePlan, layers: list[PageLayer], rules: ComponentRules, finisher: Finisher
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Repair, denoise and add up the layers of one page, then grow its charts.
+    """Fill, denoise and sum the layers of one page, then grow its charts.
 
     Parameters
     ----------
+    plan : PagePlan
     layers : list of PageLayer
-    upper : float
-        Largest possible value of the sum.
-    denoiser : LightmapDenoiser or None
-        None: layers stay as they were sampled.
-    dilation : int
-        Texels by which charts grow into the gaps.
+        At least one; the page is their sum.
+    rules : ComponentRules
+        Of the sum.
+    finisher : Finisher
 
     Returns
     -------
-    value : (H, W, C) float32, finite, 0 to `upper`
-    grown : (H, W) bool, texels filled by the growth
+    value : (H, W, C) float32
+        Finite, within the bounds.
+    grown : (H, W) bool
+        Texels filled by the growth.
+
+    Raises
+    ------
+    ResourceError
+        If Open Image Denoise cannot be loaded or runs out of memory.
+    Cancelled
+        If `progress` asked to stop.
     """
     total = np.zeros_like(layers[0].value)
-    light = _light(plan, layers)
-    for value, error, bound, kept in layers:
-        if not value[plan.valid].any():
+    light = _light(plan, layers, rules)
+    for layer in layers:
+        if not layer.value[plan.valid].any():
             continue
-        repaired, _ = fill_invalid(value, plan.chart, plan.valid)
-        worth = _worth_filtering(plan, error, light) if denoiser else None
-        if denoiser and worth is not None:
-            # The noise of texels inside geometry is none of those around them.
-            error = np.where(plan.valid, error, np.float32(0.0))
-            noisy = PageLayer(repaired, error, bound)
-            chosen = plan.covered & worth[plan.chart]
-            filtered = _denoise(noisy, plan.chart, chosen, denoiser, threads, progress)
-            if kept is not None:
-                chosen &= ~kept
-                filtered = np.where(kept[..., None], repaired, filtered)
-            repaired = keep_light(repaired, filtered, plan.chart, chosen)
-        centred = recentre(repaired, plan.chart, plan.centroid, valid=plan.valid, threads=threads)
-        total += np.minimum(centred, _brightest(repaired), out=centred)
-    np.clip(total, 0.0, upper, out=total)
+        filled, _ = fill_invalid(layer.value, plan.chart, plan.valid)
+        denoised = _denoised(plan, layer._replace(value=filled), light, rules, finisher)
+        centred = recentre(denoised, plan.chart, plan.centroid, valid=plan.valid, threads=finisher.threads)
+        flat = denoised.reshape(-1, denoised.shape[2])
+        np.minimum(centred, flat.max(axis=0, initial=0.0), out=centred)
+        if rules.signed:
+            np.maximum(centred, flat.min(axis=0, initial=0.0), out=centred)
+        total += centred
+    rules.clip(total)
     grown_value, grown = dilate(
-        total, plan.covered, plan.chart, dilation, nearest=plan.nearest, threads=threads
+        total, plan.covered, plan.chart, finisher.dilation, nearest=plan.nearest, threads=finisher.threads
     )
-    np.clip(grown_value, 0.0, np.minimum(_brightest(total), upper), out=grown_value)
+    rules.clip(grown_value, like=total)
     return grown_value, grown
 
 
-def _denoise(
+def _denoised(
+    plan: PagePlan, layer: PageLayer, light: _Light, rules: ComponentRules, finisher: Finisher
+) -> NDArray[np.float32]:
+    """Return a filled layer (H, W, C) float32 with the charts denoised that are worth it.
+
+    Signed components do not get back the sums that the filter took: a share of a sum near 0 means nothing.
+    """
+    denoiser = finisher.denoiser
+    worth = _worth_filtering(plan, _mean_error(layer, rules), light) if denoiser else None
+    if denoiser is None or worth is None:
+        return layer.value
+    # Noise of invalid texels is not that of the texels around them.
+    valid = plan.valid if layer.error.ndim == 2 else plan.valid[..., None]
+    noisy = layer._replace(error=np.where(valid, layer.error, np.float32(0.0)))
+    chosen = plan.covered & worth[plan.chart]
+    filtered = _filter_groups(noisy, plan.chart, chosen, rules, finisher)
+    if layer.kept is not None:
+        chosen &= ~layer.kept
+        filtered = np.where(layer.kept[..., None], layer.value, filtered)
+    return filtered if rules.signed else keep_light(layer.value, filtered, plan.chart, chosen)
+
+
+def _filter_groups(
     layer: PageLayer,
     chart: NDArray[np.int32],
     chosen: NDArray[np.bool_],
-    denoiser: LightmapDenoiser,
-    threads: int,
-    progress: Progress,
+    rules: ComponentRules,
+    finisher: Finisher,
 ) -> NDArray[np.float32]:
-    """Return the page with the chosen texels, whole charts, denoised; a few are brought together first."""
-    value, error = layer.value, layer.error
+    """Return the page with the chosen texels, whole charts, denoised group by group.
+
+    If they are few, they are packed on a smaller page first.
+    """
 
     def filtered(
         value: NDArray[np.float32],
@@ -151,42 +240,57 @@ def _denoise(
         chart: NDArray[np.int32],
         error: NDArray[np.float32],
     ) -> NDArray[np.float32]:
-        return denoise_page(
-            value, chosen, chart,
-            standard_error=error, bound=layer.bound, threads=threads, denoiser=denoiser, progress=progress,
-        )  # fmt: skip
+        parts = [
+            denoise_page(
+                np.ascontiguousarray(value[..., group]), chosen, chart,
+                standard_error=np.ascontiguousarray(error[..., number]) if error.ndim == 3 else error,
+                bound=layer.bound, signed=rules.signed,
+                denoiser=finisher.denoiser, progress=finisher.progress,
+            )
+            for number, group in enumerate(rules.groups)
+        ]  # fmt: skip
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
 
     n_chosen, n_all = np.count_nonzero(chosen), np.count_nonzero(chart >= 0)
     packed = pack_charts(chart, chosen) if n_chosen < n_all else None
     if packed is None or packed.shape[0] * packed.shape[1] > SMALLER * n_all:
-        return filtered(value, chosen, chart, error)
-    part = filtered(packed.take(value), packed.take(chosen), packed.take(chart, fill=-1), packed.take(error))
-    result = np.array(value)
+        return filtered(layer.value, chosen, chart, layer.error)
+    part = filtered(
+        packed.take(layer.value), packed.take(chosen), packed.take(chart, fill=-1), packed.take(layer.error)
+    )
+    result = np.array(layer.value)
     packed.put(part, result)
     return result
 
 
-def _brightest(value: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the largest value of each channel (C,): what is moved or continued must not be brighter."""
-    brightest: NDArray[np.float32] = value.reshape(-1, value.shape[2]).max(axis=0, initial=0.0)
-    return brightest
+def _mean_error(layer: PageLayer, rules: ComponentRules) -> NDArray[np.float32]:
+    """Return the standard error (H, W) float32 of the mean of all components of a layer."""
+    if layer.error.ndim == 2:
+        return layer.error
+    share = np.array(
+        [(group.stop - group.start) / layer.value.shape[2] for group in rules.groups], np.float32
+    )
+    error: NDArray[np.float32] = np.sqrt(np.square(layer.error * share).sum(axis=2))
+    return error
 
 
 class _Light(NamedTuple):
-    """How bright valid texels are, (n,) float64, and the group of texels that each belongs to, (n,) int64."""
+    """Brightness of the valid texels, (n,) float64, and the group of texels that each is in, (n,) int64."""
 
     texel: NDArray[np.float64]
     group: NDArray[np.int64]
 
 
-def _light(plan: PagePlan, layers: list[PageLayer]) -> _Light:
-    """Return the sum of layers; a group is a chart, or a block of an uneven one.
+def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _Light:
+    """Return the brightness of the layers' sum; a group is a chart, or a block of an uneven chart.
 
-    Dark texels are raised to a tenth of their group's mean.
+    Brightness is the mean of the components, of their sizes if they are signed. Dark texels are raised to a
+    tenth of their group's mean.
     """
     total = np.zeros(int(plan.valid.sum()))
     for layer in layers:
-        total += layer.value[plan.valid].mean(axis=1)
+        value = layer.value[plan.valid]
+        total += (np.abs(value) if rules.signed else value).mean(axis=1)
     group = plan.chart[plan.valid].astype(np.int64)
     mean = _mean_of(group, total)
     uneven = mean > UNEVEN * np.exp(_mean_of(group, np.log(np.maximum(total, 1e-6 * mean[group] + 1e-300))))
@@ -200,10 +304,13 @@ def _light(plan: PagePlan, layers: list[PageLayer]) -> _Light:
 
 
 def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
-    """Return which charts (n_charts,) to filter, None if all are little noisy against their own light.
+    """Return the charts to filter, (n_charts,) bool, or None if the noise of each is small against its light.
 
-    The page's mean would say that a dim room beside a sunlit ground has no noise. Charts without any, as that
-    ground, stay out: the filter sets its exposure by all that it sees.
+    Noise is compared within bands of charts of similar brightness: against the mean of the page, a dim room
+    beside sunlit ground would seem free of noise. Charts without noise are left out, since the filter derives
+    its exposure from all texels that it is given.
+
+    error : (H, W) float32, standard error of each texel's brightness
     """
     mean = _mean_of(light.group, light.texel)
     mean = np.maximum(mean, max(BLACK * float(mean.max(initial=0.0)), 1e-30))
@@ -222,5 +329,5 @@ def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) 
 
 
 def _mean_of(group: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of the values (n,) of each group; 0 for those without any."""
+    """Return the mean of the values (n,) of each group; 0 for empty groups."""
     return np.bincount(group, value) / np.maximum(np.bincount(group), 1)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
+from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report, silent
 from baker.core.stage import Stage
 
@@ -98,7 +99,14 @@ class LightmapDenoiser:
     def __init__(self, threads: int = 0, memory_mb: int = MEMORY_MB) -> None:
         self._threads = threads
         self._memory_mb = memory_mb
-        self._open: tuple[Any, Any] | None = None
+        self._device: Any = None
+        # The filters of light and of signed values, made when first needed.
+        self._filters: dict[bool, Any] = {}
+
+    @property
+    def threads(self) -> int:
+        """Return the number of threads, at least 1."""
+        return thread_count(self._threads or None)
 
     def __enter__(self) -> LightmapDenoiser:
         return self
@@ -106,15 +114,21 @@ class LightmapDenoiser:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def filter(self, image: NDArray[np.float32], progress: Progress = silent) -> NDArray[np.float32]:
-        """Denoise one HDR picture of light.
+    def filter(
+        self, image: NDArray[np.float32], progress: Progress = silent, *, signed: bool = False
+    ) -> NDArray[np.float32]:
+        """Denoise one picture of light, or of signed values.
 
         Parameters
         ----------
         image : (H, W, 3) float32
-            Linear light, finite and not negative; every pixel counts, there are no gaps.
+            Linear light, finite and not negative; or finite values of both signs. Every pixel counts, there
+            are no gaps.
         progress : Progress
-            Told the fraction done; a truthy answer stops the filter.
+            Gets the fraction done; a truthy answer stops the filter.
+        signed : bool
+            Use the filter's mode for coefficients of directional lightmaps in [-1, 1]; they are scaled to
+            that range here.
 
         Returns
         -------
@@ -128,20 +142,26 @@ class LightmapDenoiser:
             If `progress` asked to stop.
         """
         library = _library()
-        if self._open is None:
-            device = _new_device(library, self._threads)
-            self._open = device, library.Filter(device, library.OIDN_FILTER_TYPE_RT_LIGHTMAP)
-        device, filter_ = self._open
+        if self._device is None:
+            self._device = _new_device(library, self._threads)
+        if signed not in self._filters:
+            self._filters[signed] = library.Filter(self._device, library.OIDN_FILTER_TYPE_RT_LIGHTMAP)
+        filter_ = self._filters[signed]
         filter_.set_int("maxMemoryMB", self._memory_mb)
-        return _execute(library, device, filter_, {library.OIDN_IMAGE_COLOR: image}, progress)
+        if signed:
+            filter_.set_bool("directional", True)
+            largest = float(np.abs(image).max(initial=0.0))
+            filter_.set_float("inputScale", 1.0 / largest if largest > 0.0 else 1.0)
+        return _execute(library, self._device, filter_, {library.OIDN_IMAGE_COLOR: image}, progress)
 
     def close(self) -> None:
-        """Release the filter's memory; the next picture takes it anew."""
-        if self._open is not None:
-            device, filter_ = self._open
-            self._open = None
+        """Release the filter's memory; the next picture allocates it again."""
+        for filter_ in self._filters.values():
             filter_.release()
-            device.release()
+        self._filters.clear()
+        if self._device is not None:
+            self._device.release()
+            self._device = None
 
 
 def _new_device(library: Any, threads: int) -> Any:

@@ -67,6 +67,7 @@ def _bake(folder: Path) -> dict[str, Any]:
         "baker": manifest["versions"]["baker"],
         "created": manifest.get("created"),
         "input": manifest.get("input"),
+        "channels": manifest.get("channels", {}),
         "pages": manifest.get("pages", []),
         "files": files,
         "instances": manifest.get("instances", []),

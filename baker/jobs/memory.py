@@ -1,34 +1,16 @@
-"""How much memory a bake will take at its peak, and how people write sizes.
-
-An upper estimate from what decides it: texels of the pages, form-factor rays, triangles, textures.
-docs/BATCH.md compares it with measured peaks.
-"""
+"""The memory that a bake takes at its peak, and sizes as people write them."""
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 
-import numpy as np
-
+from baker.channels.channel import chosen_channels
+from baker.core.budget import Workload, image_bytes, surface_area, texels_and_pages
 from baker.core.errors import SettingsError
-from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.io.load import load_for_bake
 
-# Python, libraries and compiled kernels.
-_BASE = 300 * 2**20
-_PER_PIXEL = 250
-_PER_TRIANGLE = 1000
-# Open Image Denoise takes large pages in pieces.
-_DENOISE_PER_PIXEL = 500
-_DENOISE_MOST = 650 * 2**20
-# A form factor, its reciprocal and both merged, for each ray of each patch.
-_PER_PATCH_RAY = 45
-_MOST_PATCHES = 32768
-# Share of a page that charts fill when --density asks for several.
-_FILL = 0.5
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
@@ -70,28 +52,15 @@ def estimate_peak(path: Path, settings: BakeSettings) -> int:
         If the scene cannot be read.
     """
     scene = load_for_bake(path, settings)
-    page = settings.resolution**2
-    pixels = page * _pages(scene, settings)
-    # As many as the pipeline casts from each patch.
-    rays = min(max(settings.hemisphere_samples, 128), 512)
-    patches = min(pixels, _MOST_PATCHES) if "irradiance" in settings.channels else 0
-    textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
-    images = {id(t.image): t.image.nbytes for t in textures if t is not None}
-    # Colours are kept decoded, as floats.
-    lasting = _BASE + _PER_PIXEL * pixels + _PER_TRIANGLE * scene.n_triangles + 5 * sum(images.values())
-    # One after the other.
-    denoising = min(_DENOISE_PER_PIXEL * page, _DENOISE_MOST) if settings.denoise else 0
-    return lasting + max(_PER_PATCH_RAY * rays * patches, denoising)
-
-
-def _pages(scene: Scene, settings: BakeSettings) -> int:
-    if settings.density is None:
-        return 1
-    area = 0.0
-    for instance in scene.instances:
-        mesh, matrix = scene.meshes[instance.mesh], instance.world_from_object
-        corner = (mesh.position.astype(np.float64) @ matrix[:3, :3].T)[mesh.triangle]
-        cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        area += 0.5 * float(np.linalg.norm(cross, axis=1).sum())
-    texels = area * settings.density**2 / _FILL
-    return min(max(math.ceil(texels / settings.resolution**2), 1), settings.max_pages)
+    channels = chosen_channels(settings.channels).values()
+    area = surface_area(scene) if settings.density is not None else 0.0
+    texels, pages = texels_and_pages(settings, area)
+    workload = Workload(
+        texels=texels,
+        pages=pages,
+        triangles=scene.n_triangles,
+        image_bytes=image_bytes(scene),
+        light=any(channel.needs_light for channel in channels),
+        ambient_occlusion=any(channel.needs_ambient_occlusion for channel in channels),
+    )
+    return workload.peak_bytes(settings)

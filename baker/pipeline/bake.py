@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from baker.channels.channel import CHANNELS, Channel
+from baker.channels.channel import Channel, chosen_channels
 from baker.checks.in_bake import bake_warnings
 from baker.core.atlas import Atlas
 from baker.core.error_mapping import memory_errors
@@ -80,10 +80,10 @@ def bake(
     Cancelled
         If `progress` returned a truthy value.
     """
-    channels = _channels(settings)
+    channels = chosen_channels(settings.channels)
     folder = None if out is None else Path(out)
     if folder is not None:
-        check_encodings(settings.encode, {name: c.components for name, c in channels.items()})
+        check_encodings(settings.encode, channels)
         check_exports(settings.export, settings.channels)
         check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
     record, compiling = Record(progress), precompile.start()
@@ -129,8 +129,3 @@ def _trace(
     executor.close()
     texels = prepared.texels.without_surface()
     return TracedTexels(texels, prepared.job.valid_points[: texels.n_front] != 0, transport)
-
-
-def _channels(settings: BakeSettings) -> dict[str, Channel]:
-    """Look up the channels asked for, in the order asked."""
-    return {name: CHANNELS.require(name, "channel", setting="channels") for name in settings.channels}

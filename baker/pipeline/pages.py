@@ -8,17 +8,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.channels.channel import Channel, Layer, Transport
+from baker.channels.channel import Channel, Layer, Transport, make_lightmap
 from baker.core.atlas import Atlas
-from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
+from baker.core.lightmap import BakeResult, TexelStatus
 from baker.core.parallel import thread_count
 from baker.core.progress import Progress
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
-from baker.finish.finish import PageLayer, PagePlan, finish_page
-from baker.finish.oidn import LightmapDenoiser, denoiser_name
+from baker.finish.finish import (
+    ComponentRules,
+    PageLayer,
+    PagePlan,
+    finish_page,
+    open_finisher,
+)
+from baker.finish.oidn import denoiser_name
 from baker.pipeline.record import Record
 
 # A texel counts as not converged if its standard error before denoising exceeds this share of its value.
@@ -76,8 +82,8 @@ def finish_pages(
     with record.stage(Stage.FINISH):
         value = _finished(traced, channels, layers, settings, record.progress, status)
         noisy = np.zeros(n_front, bool)
-        for name in channels:
-            noisy |= _unconverged(layers[name], texels.chart[:n_front])
+        for name, channel in channels.items():
+            noisy |= _unconverged(layers[name], texels.chart[:n_front], channel.signed)
         invalid = int((~valid).sum())
         statistics = {name: _statistics(value[name][chart >= 0], invalid) for name in channels}
     flat = status.reshape(-1)
@@ -87,7 +93,7 @@ def finish_pages(
         scene=scene,
         atlas=atlas,
         settings=settings,
-        lightmaps={name: Lightmap(name, channel.unit, value[name]) for name, channel in channels.items()},
+        lightmaps={name: make_lightmap(name, value[name]) for name in channels},
         status=status,
         texel_count=np.bincount(texels.instance[:n_front], minlength=len(scene.instances)).astype(np.int64),
         statistics=statistics,
@@ -108,26 +114,26 @@ def _finished(
     status: NDArray[np.uint8],
 ) -> dict[str, NDArray[np.float32]]:
     """Return pages (n_pages, H, W, C) of each channel; mark dilated texels in `status` (n_pages, H, W)."""
-    texels, threads = traced.texels, thread_count(settings.threads)
+    texels = traced.texels
     region = texels.page_image(texels.region, fill=-1)
     valid = texels.page_image(traced.valid, fill=False)
     centroid = texels.page_image(texels.centroid)
     value = {
-        name: np.zeros((*status.shape, channel.components), np.float32) for name, channel in channels.items()
+        name: np.zeros((*status.shape, len(channel.components)), np.float32)
+        for name, channel in channels.items()
     }
-    with LightmapDenoiser(threads) as denoiser:
+    with open_finisher(
+        threads=thread_count(settings.threads),
+        dilation=max(2 * settings.padding, 8),
+        denoise=settings.denoise,
+        progress=progress,
+    ) as finisher:
         for page in range(len(status)):
             plan = PagePlan(region[page], valid[page], centroid[page])
             for name, channel in channels.items():
-                value[name][page], grown = finish_page(
-                    plan,
-                    [_page_layer(texels, layer, page) for layer in layers[name]],
-                    upper=channel.upper,
-                    denoiser=denoiser if settings.denoise else None,
-                    dilation=max(2 * settings.padding, 8),
-                    threads=threads,
-                    progress=progress,
-                )
+                images = [_page_layer(texels, layer, page) for layer in layers[name]]
+                rules = ComponentRules(channel.lower, channel.upper, channel.groups)
+                value[name][page], grown = finish_page(plan, images, rules, finisher)
                 status[page][grown] = TexelStatus.DILATED
     return value
 
@@ -142,13 +148,14 @@ def _page_layer(texels: TexelBuffer, layer: Layer, page: int) -> PageLayer:
     )
 
 
-def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Return the texels whose summed standard error exceeds a share of their value.
+def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32], signed: bool) -> NDArray[np.bool_]:
+    """Return the texels whose summed standard error exceeds a share of their value, (n_front,) bool.
 
-    Dark ones count as a twentieth of the geometric mean of their `chart`, (n_front,) int32.
+    The value is the mean of the components, of their sizes if they are signed. Values of dark texels are
+    raised to a twentieth of the geometric mean of their `chart`, (n_front,) int32.
     """
-    value = sum(layer.value.mean(axis=1) for layer in layers)
-    error = np.sqrt(sum(np.square(layer.error) for layer in layers))
+    value = sum((np.abs(layer.value) if signed else layer.value).mean(axis=1) for layer in layers)
+    error = np.sqrt(sum(_mean_square(layer.error) for layer in layers))
     lit = value > 0
     count = np.maximum(np.bincount(chart[lit], minlength=1), 1)
     middle = np.exp(np.bincount(chart[lit], np.log(value[lit]), len(count)) / count)
@@ -156,6 +163,13 @@ def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32]) -> NDArray
     noisy: NDArray[np.bool_] = error > UNCONVERGED * np.maximum(value, floor)
     noisy &= lit
     return noisy
+
+
+def _mean_square(error: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return (n,) float32: the squared error, its mean over groups if there are several."""
+    square = np.square(error)
+    mean: NDArray[np.float32] = square if square.ndim == 1 else square.mean(axis=1)
+    return mean
 
 
 def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:
@@ -166,6 +180,6 @@ def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:
         "min": float(value.min()),
         "max": float(value.max()),
         "mean": float(value.mean(dtype=np.float64)),
-        "clipped": int((value > 65504.0).any(axis=-1).sum()),
+        "clipped": int((np.abs(value) > 65504.0).any(axis=-1).sum()),
         "invalid": invalid,
     }

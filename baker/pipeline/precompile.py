@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from baker.core.progress import Progress, report, silent
+from baker.core.progress import Progress, report
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.stage import Stage
 
@@ -212,8 +212,7 @@ def _one_emitter(kind: str) -> Scene:
 
 def finish_pages() -> None:
     """Finish a page of two charts, one of them with an invalid texel."""
-    from baker.finish.finish import PageLayer, PagePlan, finish_page
-    from baker.finish.oidn import LightmapDenoiser
+    from baker.finish.finish import ComponentRules, PageLayer, PagePlan, finish_page, open_finisher
 
     chart = np.full((_PAGE, _PAGE), -1, np.int32)
     chart[4:20, 4:40] = 0
@@ -225,7 +224,9 @@ def finish_pages() -> None:
     value = noise.random((_PAGE, _PAGE, 3), np.float32)
     error = np.full((_PAGE, _PAGE), 0.3, np.float32)
     layers = [PageLayer(value, error, bound=True)]
-    finish_page(plan, layers, upper=1.0, denoiser=LightmapDenoiser(1), dilation=4, threads=1, progress=silent)
+    rules = ComponentRules(0.0, 1.0, (slice(0, 3),))
+    with open_finisher(threads=1, dilation=4, denoise=True) as finisher:
+        finish_page(plan, layers, rules, finisher)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.channels.channel import Channel, Transport
+from baker.core.budget import patch_rays
 from baker.core.executor import LocalTileExecutor, TileExecutor
 from baker.core.parallel import TileRunner
 from baker.core.scene import SceneWarning
-from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.pipeline.prepare import PreparedScene
 from baker.pipeline.record import Record
@@ -24,9 +24,6 @@ from baker.radiosity.narrow_gaps import gap_level
 from baker.radiosity.patches import NARROW, build_patches
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.trapped_light import light_warnings
-
-# Rays from each patch for its form factors, by hemisphere samples per texel.
-MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
 
 def trace_transport(
@@ -59,15 +56,15 @@ def trace_transport(
     ao_samples = prepared.settings.ao_samples or n_samples
     if any(channel.needs_light for channel in channels.values()):
         transport = _light(prepared, record, executor)
-    if any(channel.needs_open for channel in channels.values()):
+    if any(channel.needs_ambient_occlusion for channel in channels.values()):
         gathered = transport.gathered
         if gathered is not None and ao_samples == n_samples:
-            return replace(transport, open=gathered.open, ao_samples=ao_samples)
+            return replace(transport, ambient_occlusion=gathered.open, ao_samples=ao_samples)
         with record.stage(Stage.AMBIENT_OCCLUSION):
             run = executor.runner(Stage.AMBIENT_OCCLUSION, {"outside": prepared.outside})
             opened = trace_ambient_occlusion(prepared, run)
             record.rays[Stage.AMBIENT_OCCLUSION] = prepared.texels.n_front * ao_samples
-        transport = replace(transport, open=opened, ao_samples=ao_samples)
+        transport = replace(transport, ambient_occlusion=opened, ao_samples=ao_samples)
     return transport
 
 
@@ -176,22 +173,6 @@ def trace_ambient_occlusion(prepared: PreparedScene, run: TileRunner) -> NDArray
         n_samples=settings.ao_samples or settings.hemisphere_samples,
         distance=settings.ao_reach(prepared.geometry.diagonal),
     )
-
-
-def patch_rays(settings: BakeSettings) -> int:
-    """Return the number of rays from each patch for its form factors.
-
-    Parameters
-    ----------
-    settings : BakeSettings
-        Of the bake.
-
-    Returns
-    -------
-    int
-        The hemisphere samples of a texel, from `MIN_PATCH_RAYS` to `MAX_PATCH_RAYS`.
-    """
-    return min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS)
 
 
 def _reflected(

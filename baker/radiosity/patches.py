@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.budget import MAX_PATCHES
 from baker.core.texels import TexelBuffer
 from baker.radiosity.kernels.regions import join_linked
 
-# Largest number of patches outside narrow gaps, and again inside; larger pages get larger blocks.
-MAX_PATCHES = 32768
 # Gap level (`narrow_gaps`) from which blocks are as small as possible.
 NARROW = 2
 

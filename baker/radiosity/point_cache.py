@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.budget import MAX_CACHED_TEXELS
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
 # `place_points` is not asked for triangles and barycentrics.
 _NO_TRIANGLE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
-# Points take 384 bytes per entry: at most 100 MB are stored.
-MAX_CACHED = 262_144
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
 
@@ -79,9 +78,9 @@ def new_point_cache(n: int) -> PointCache | None:
     Returns
     -------
     PointCache or None
-        None for more than `MAX_CACHED` entries.
+        None for more than `core.budget.MAX_CACHED_TEXELS` entries.
     """
-    if n > MAX_CACHED:
+    if n > MAX_CACHED_TEXELS:
         return None
     shape = (n, N_POINTS, 3)
     return PointCache(np.zeros(shape, np.float32), np.zeros(shape, np.float32), set())

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 
+from baker.channels.channel import make_lightmap
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.errors import SettingsError
 from baker.core.export import EXPORTS, check_exports
-from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.lightmap import BakeResult
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
 from baker.exporters.common import template, unique_name
@@ -61,8 +62,8 @@ def result(folder, **settings):
     )
     rng = np.random.default_rng(1)
     maps = {
-        "irradiance": Lightmap("irradiance", "lx", rng.random((2, SIZE, SIZE, 3), np.float32) * 40),
-        "ao": Lightmap("ao", "1", rng.random((2, SIZE, SIZE, 1), np.float32)),
+        "irradiance": make_lightmap("irradiance", rng.random((2, SIZE, SIZE, 3), np.float32) * 40),
+        "ao": make_lightmap("ao", rng.random((2, SIZE, SIZE, 1), np.float32)),
     }
     return BakeResult(
         scene=scene,

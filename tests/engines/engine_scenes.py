@@ -14,8 +14,9 @@ import numpy as np
 from gltf_builder import GltfBuilder, write
 
 import baker
+from baker.channels.channel import make_lightmap
 from baker.core.atlas import Atlas, InstanceLayout
-from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.lightmap import BakeResult
 from baker.core.settings import make_settings
 from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
@@ -92,8 +93,8 @@ def write_probe(folder: Path, exports: str, *, page: np.ndarray | None = None, *
         atlas=Atlas(SIZE, 2, layouts, 2, 0),
         settings=make_settings({"resolution": SIZE, "export": exports, **settings}),
         lightmaps={
-            "irradiance": Lightmap("irradiance", "lx", light),
-            "ao": Lightmap("ao", "1", np.full((2, SIZE, SIZE, 1), 0.5, np.float32)),
+            "irradiance": make_lightmap("irradiance", light),
+            "ao": make_lightmap("ao", np.full((2, SIZE, SIZE, 1), 0.5, np.float32)),
         },
         status=np.ones((2, SIZE, SIZE), np.uint8),
         texel_count=np.full(2, SIZE * SIZE),

@@ -8,20 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.checks.bake_rates import RAY_STAGES, Rates
 from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
+from baker.core.budget import FILLED, Workload, image_bytes, texels_and_pages
 from baker.core.stage import Stage
 
-# Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024.
-FILLED = 0.8
-# Largest resident memory of a bake, measured (docs/PERFORMANCE.md): start, each texel, each triangle.
-_BYTES, _PER_TEXEL, _PER_TRIANGLE = 350e6, 380.0, 600.0
-# Rays a texel that are not the user's choice: against burial, towards a light without area, near emitters.
-_BURIED, _POINTS, _NEAR = 4, 16, 4
-_PATCHES, _LEAST_PATCH_RAYS, _MOST_PATCH_RAYS = 32768, 128, 512
 # With a probe only: rays a bake traces in the time of a probe's ray, and a texel's other seconds a thread.
 # Measured on cornell.glb, hall.glb and interior.glb.
 _OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
@@ -54,51 +49,40 @@ def estimate_cost(context: CheckContext) -> Cost:
     Cost
     """
     settings, world = context.settings, context.world
-    area = np.bincount(world.instance, world.area, len(context.source.instances))
-    page = settings.resolution**2
-    texels, pages = FILLED * page, 1
-    if settings.density is not None:
-        texels = float(area.sum()) * settings.density**2
-        pages = max(1, int(np.ceil(texels / (FILLED * page))))
-        if pages > settings.max_pages:
-            pages = settings.max_pages
-            texels = FILLED * page * pages
-    elif all(context.uv(m).valid for m, f in enumerate(context.meshes) if len(f.good)):
+    area = np.bincount(world.instance, world.area, len(context.source.instances)).astype(np.float64)
+    texels, pages = texels_and_pages(settings, float(area.sum()))
+    if settings.density is None and all(
+        context.uv(m).valid for m, facts in enumerate(context.meshes) if len(facts.good)
+    ):
         laid = sum(float(np.abs(context.uv(i.mesh).signed_area).sum()) for i in context.source.instances)
-        texels = min(laid, FILLED) * page
-    n = round(texels)
+        texels = round(min(laid, FILLED) * settings.resolution**2)
+    workload = Workload(
+        texels=texels,
+        pages=pages,
+        triangles=len(world.triangle),
+        image_bytes=image_bytes(context.scene),
+        light=context.bakes_light,
+        ambient_occlusion=context.bakes_ambient_occlusion,
+    )
+    lit = sum(max(light.intensity) > 0 for light in context.scene.lights)
+    rays = workload.rays(settings, delta_lights=lit, emitters=context.bakes_light and context.emits)
+    need = workload.peak_bytes(settings)
+    return Cost(texels, pages, rays, need, workload.triangles, _shares(context, area, texels))
+
+
+def _shares(context: CheckContext, area: NDArray[np.float64], texels: int) -> list[dict[str, Any]]:
+    """Return the instances of largest `area` (I,), m2, with their share of it and of the texels."""
     order = np.argsort(-area, kind="stable")[:MOST_SHARES]
     total = max(float(area.sum()), 1e-300)
-    shares = [
+    return [
         {
             "object": context.source.instances[k].name,
             "node": context.source.instances[k].node,
             "percent": round(100.0 * float(area[k]) / total, 2),
-            "texels": round(n * float(area[k]) / total),
+            "texels": round(texels * float(area[k]) / total),
         }
         for k in order
     ]
-    need = round(_BYTES + _PER_TEXEL * n + _PER_TRIANGLE * len(world.triangle))
-    return Cost(n, pages, _rays(context, n), need, len(world.triangle), shares)
-
-
-def _rays(context: CheckContext, texels: int) -> dict[Stage, int]:
-    settings = context.settings
-    hemisphere = settings.hemisphere_samples
-    light = settings.light_samples or hemisphere
-    occlusion = settings.ao_samples or hemisphere
-    rays = {Stage.INSIDE_GEOMETRY: _BURIED * texels}
-    if context.bakes_light:
-        n_lights = sum(max(x.intensity) > 0 for x in context.scene.lights)
-        emits = context.emits
-        rays[Stage.DIRECT_LIGHT] = texels * (_POINTS * n_lights + (light + _NEAR) * emits)
-        if settings.bounces != 0:
-            each = min(max(hemisphere, _LEAST_PATCH_RAYS), _MOST_PATCH_RAYS)
-            rays[Stage.FORM_FACTORS] = min(texels, _PATCHES) * each
-        rays[Stage.FINAL_GATHER] = texels * hemisphere
-    if "ao" in settings.channels and not (context.bakes_light and occlusion == hemisphere):
-        rays[Stage.AMBIENT_OCCLUSION] = texels * occlusion
-    return rays
 
 
 def probe(context: CheckContext) -> Rates:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from baker.core.light_kind import kind_of
-from baker.core.lightmap import BakeResult
+from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.scene import SceneWarning
 from baker.core.settings import BakeSettings
 
@@ -72,6 +72,7 @@ def make_manifest(
         "versions": library_versions(),
         "input": {"path": _relative(result.scene.path, out), "sha256": result.scene.sha256 or None},
         "created": moment.isoformat(timespec="seconds").replace("+00:00", "Z"),
+        "channels": {name: _channel(lightmap) for name, lightmap in result.lightmaps.items()},
         "pages": pages,
         "instances": _instances(result, instance_mesh),
         "lights": _lights(result),
@@ -124,6 +125,12 @@ def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
     values["light_samples"] = settings.light_samples or samples
     values["ao_samples"] = settings.ao_samples or samples
     return values
+
+
+def _channel(lightmap: Lightmap) -> dict[str, Any]:
+    """Return what the numbers of a channel mean."""
+    keys = ("unit", "quantity", "components", "signed", "definition")
+    return {key: getattr(lightmap.description, key) for key in keys}
 
 
 def _settings(result: BakeResult) -> dict[str, Any]:

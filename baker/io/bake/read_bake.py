@@ -89,7 +89,7 @@ def read_bake(folder: Path | str) -> StoredBake:
     settings = manifest.get("settings", {})
     scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
-    maps = {name: _pages(folder, pages, name) for name in dict.fromkeys(p["channel"] for p in pages)}
+    maps = {name: _pages(folder, manifest, name) for name in dict.fromkeys(p["channel"] for p in pages)}
     resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
     layouts = tuple(
         _layout(folder, scene, index, rows.get(instance.node))
@@ -125,19 +125,27 @@ def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:
     return SceneWarning("missing-file", f"{name} is missing", name)
 
 
-def _pages(folder: Path, pages: list[dict[str, Any]], channel: str) -> NDArray[np.float32]:
-    """Return (P, H, W, C) float32: the pages of a channel, one above the other."""
+def _pages(folder: Path, manifest: dict[str, Any], channel: str) -> NDArray[np.float32]:
+    """Return (P, H, W, C) float32: the pages of a channel, components in the order of the manifest."""
     images = []
-    for entry in sorted((p for p in pages if p["channel"] == channel), key=lambda p: int(p["page"])):
+    pages = [page for page in manifest["pages"] if page["channel"] == channel]
+    components = manifest.get("channels", {}).get(channel, {}).get("components")
+    for entry in sorted(pages, key=lambda p: int(p["page"])):
         path = _present(folder, entry["file"])
         encoding = encoding_of(path.name)
         if encoding is None:
             raise InputError(f"'{path.suffix}' is not a known image format", file=str(path))
-        pixels = encoding.decode(path).pixels
+        image = encoding.decode(path)
+        pixels = image.pixels
         if pixels.shape[:2] != (entry["height"], entry["width"]):
             height, width = pixels.shape[:2]
             message = f"the map is {width} x {height}, the manifest says {entry['width']} x {entry['height']}"
             raise InputError(message, file=str(path))
+        if components is not None and components != list(image.channels):
+            if sorted(components) != sorted(image.channels):
+                message = f"the map has the channels {', '.join(image.channels)}"
+                raise InputError(f"{message}, the manifest says {', '.join(components)}", file=str(path))
+            pixels = pixels[:, :, [image.channels.index(name) for name in components]]
         images.append(pixels)
     return np.stack(images)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS, Encoding, Loss, measure_loss
 from baker.core.errors import ResourceError, SettingsError
 from baker.core.export import EXPORTS
-from baker.core.lightmap import BakeResult, Lightmap, TexelStatus
+from baker.core.lightmap import BakeResult, ChannelDescription, Lightmap, TexelStatus
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
@@ -33,11 +34,6 @@ STATUS_COLOURS = {
 
 # Share of banded texels of a page above which there is a warning; the manifest lists all.
 BANDED_SHARE = 0.01
-
-_QUANTITY = {
-    "irradiance": "irradiance E on the surface, direct and indirect, without the receiver's albedo",
-    "ao": "ambient occlusion: cosine-weighted open share of the hemisphere, 1 = open",
-}
 
 
 def write_bake(
@@ -159,14 +155,12 @@ def _write_page(
     result: BakeResult, lightmap: Lightmap, page: int, folder: Path
 ) -> tuple[dict[str, Any], list[SceneWarning]]:
     """Write one page of a channel in all formats; return its manifest entry and what got lost."""
-    value = lightmap.value[page]
-    height, width, components = value.shape
-    quantity = _QUANTITY.get(lightmap.channel, lightmap.channel)
-    colour_space = "linear Rec.709, D65" if components == 3 else "none"
+    value, described = lightmap.value[page], lightmap.description
+    height, width, _ = value.shape
     header = {
-        "quantity": quantity,
-        "unit": lightmap.unit,
-        "colourSpace": colour_space,
+        "quantity": described.quantity,
+        "unit": described.unit,
+        "colourSpace": described.colour_space,
         "software": _signature(),
     }
     settings = result.settings
@@ -175,11 +169,11 @@ def _write_page(
     warnings: list[SceneWarning] = []
     for name in (ALWAYS_WRITTEN, *settings.encode):
         encoding = encoding_named(name)
-        if components not in encoding.components:
+        if why_unfit(name, described) is not None:
             continue
         options = encoding.fitted(encoding.options_of(settings), float(lightmap.value.max(initial=0.0)))
         file = f"{lightmap.channel}_{page}{encoding.suffix}"
-        encoding.encode(folder / file, value, options=options, header=header)
+        encoding.encode(folder / file, value, options=options, header=header, names=described.components)
         with (folder / file).open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
         loss = measure_loss(encoding, value, surface, options)
@@ -191,8 +185,12 @@ def _write_page(
     page_entry: dict[str, Any] = {"channel": lightmap.channel, "page": page, **exr}
     for key in ("encoding", "min", "max"):
         del page_entry[key]
-    page_entry |= {"width": width, "height": height, "unit": lightmap.unit}
-    page_entry |= {"quantity": quantity, "colour_space": colour_space, "encodings": others}
+    page_entry |= {"width": width, "height": height, "unit": described.unit}
+    page_entry |= {
+        "quantity": described.quantity,
+        "colour_space": described.colour_space,
+        "encodings": others,
+    }
     return page_entry, warnings
 
 
@@ -218,15 +216,28 @@ def encoding_named(name: str) -> Encoding[Any]:
     return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 
-def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
+def why_unfit(name: str, channel: ChannelDescription) -> str | None:
+    """Return why an encoding cannot hold a channel, as the end of a sentence; None if it can."""
+    encoding = ENCODINGS.require(name, "encoding")
+    n = len(channel.components)
+    if n not in encoding.components:
+        held = sorted(encoding.components)
+        number = "one" if held == [1] else "three" if held == [3] else f"{held[0]} to {held[-1]}"
+        return f"holds maps of {number} component(s), not of {n}"
+    if channel.signed and not encoding.signed:
+        return "holds no negative numbers"
+    return None
+
+
+def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescription]) -> None:
     """Check, before the long work, that each encoding can hold one of the channels.
 
     Parameters
     ----------
     names : tuple of str
         Encodings asked for.
-    components : dict of str to int
-        Number of components of each channel.
+    channels : mapping of channel to its description
+        All that is baked.
 
     Raises
     ------
@@ -234,12 +245,13 @@ def check_encodings(names: tuple[str, ...], components: dict[str, int]) -> None:
         If an encoding is unknown, is EXR, or can hold none of the channels.
     """
     for name in names:
-        encoding = encoding_named(name)
+        encoding_named(name)
         if name == ALWAYS_WRITTEN:
             raise SettingsError("exr is written in any case; name further formats only", object="encode")
-        if not set(encoding.components) & set(components.values()):
-            number = "three" if encoding.components == (3,) else "one"
-            message = f"'{name}' holds maps of {number} component(s), and no such channel is baked"
+        reasons = {channel: why_unfit(name, described) for channel, described in channels.items()}
+        if None not in reasons.values():
+            why = "; ".join(f"{channel}: {reason}" for channel, reason in reasons.items())
+            message = f"'{name}' can hold none of the channels that are baked ({why}); use the EXR"
             raise SettingsError(message, object="encode")
 
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from baker.core.errors import Cancelled, ResourceError
-from baker.core.progress import silent
 from baker.finish import oidn
 from baker.finish.denoise import FITTED, denoise_page, denoiser_name, surround_charts
-from baker.finish.finish import PageLayer, PagePlan, finish_page
+from baker.finish.finish import ComponentRules, PageLayer, PagePlan, finish_page, open_finisher
 from baker.finish.kernels import page_guard
 from baker.finish.kernels.page_guard import hold_to_samples
 from baker.finish.noise import estimate_error
 from baker.finish.oidn import LightmapDenoiser
 
+LIGHT = ComponentRules(0.0, np.inf, (slice(0, 3),))
 TINT = np.array([1.0, 0.85, 0.6], np.float32)
 
 
@@ -49,7 +49,7 @@ def test_noise_falls_inside_and_on_chart_borders(lit, share, inner_gain, border_
     truth, chart = lit
     noisy = with_noise(truth, share)
     error = (share * truth @ np.float32([0.2126, 0.7152, 0.0722])).astype(np.float32) if known_error else None
-    clean = denoise_page(noisy, chart >= 0, chart, standard_error=error, threads=2)
+    clean = denoise_page(noisy, chart >= 0, chart, standard_error=error, denoiser=LightmapDenoiser(2))
     border, inner = rings(chart)
     assert wrong(clean, truth, inner) * inner_gain < wrong(noisy, truth, inner)
     assert wrong(clean, truth, border) * border_gain < wrong(noisy, truth, border)
@@ -107,8 +107,8 @@ def test_ambient_occlusion_is_filtered_as_grey_and_gaps_stay(lit):
 def test_same_bytes_for_any_threads_memory_and_run(lit):
     truth, chart = lit
     noisy = with_noise(truth, 0.2)
-    first = denoise_page(noisy, chart >= 0, chart, threads=1).tobytes()
-    assert denoise_page(noisy, chart >= 0, chart, threads=2).tobytes() == first
+    first = denoise_page(noisy, chart >= 0, chart).tobytes()
+    assert denoise_page(noisy, chart >= 0, chart, denoiser=LightmapDenoiser(2)).tobytes() == first
     assert denoise_page(noisy, chart >= 0, chart, denoiser=LightmapDenoiser(2, 64)).tobytes() == first
 
 
@@ -259,10 +259,8 @@ def test_what_is_worth_filtering_is_judged_by_its_own_light(lit, dim):
     noisy = np.where(own[..., None], with_noise(truth, 0.2), truth) * scale[..., None]
     error = np.where(own, 0.2 * dim * truth @ np.float32([0.2126, 0.7152, 0.0722]), 0.0).astype(np.float32)
     plan = PagePlan(chart, chart >= 0, np.zeros((*chart.shape, 2), np.float32))
-    page, _ = finish_page(
-        plan, [PageLayer(noisy.astype(np.float32), error)],
-        upper=np.inf, denoiser=LightmapDenoiser(1), dilation=2, threads=1, progress=silent,
-    )  # fmt: skip
+    with open_finisher(threads=1, dilation=2, denoise=True) as finisher:
+        page, _ = finish_page(plan, [PageLayer(noisy.astype(np.float32), error)], LIGHT, finisher)
     clean = page / scale[..., None]
     assert wrong(clean, truth, own) < 0.3 * wrong(noisy / scale[..., None], truth, own)
     # Near the noisy chart's border the window holds no texel of others: they keep their bytes.

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from baker.core.progress import silent
-from baker.finish.finish import PageLayer, PagePlan, finish_page
+from baker.finish.finish import ComponentRules, PageLayer, PagePlan, finish_page, open_finisher
 from baker.finish.keep_light import keep_light
-from baker.finish.oidn import LightmapDenoiser
 
 # Texels of a whole window, weighted: 64 in each of 5 x 5 blocks, (1/3 + 2/3 + 1 + 2/3 + 1/3)^2 of them.
 WINDOW = 64 * 9.0
@@ -28,9 +26,9 @@ def _finish(
 ) -> NDArray[np.float32]:
     plan = PagePlan(chart, chart >= 0, np.zeros((*chart.shape, 2), np.float32))
     layer = PageLayer(value, error, kept=kept)
-    page, _ = finish_page(
-        plan, [layer], upper=np.inf, denoiser=LightmapDenoiser(1), dilation=0, threads=1, progress=silent
-    )
+    rules = ComponentRules(0.0, np.inf, (slice(0, 3),))
+    with open_finisher(threads=1, dilation=0, denoise=True) as finisher:
+        page, _ = finish_page(plan, [layer], rules, finisher)
     return page
 
 

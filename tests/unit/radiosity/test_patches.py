@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, box_quads, grey, quad_world
 
-from baker.radiosity.patches import MAX_PATCHES, build_patches
+from baker.core.budget import MAX_PATCHES
+from baker.radiosity.patches import build_patches
 
 
 @pytest.fixture(scope="module")

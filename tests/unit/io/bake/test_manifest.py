@@ -35,14 +35,18 @@ def test_every_promised_key_is_there(tmp_path: Path) -> None:
     jsonschema.Draft202012Validator.check_schema(manifest_schema())
     manifest = bake(quad_result(tmp_path / "in"), tmp_path / "out")
     assert list(manifest) == [
-        "version", "settings", "versions", "input", "created", "pages", "instances", "lights", "timings",
-        "rays", "solve", "statistics", "warnings", "denoise", "files",
+        "version", "settings", "versions", "input", "created", "channels", "pages", "instances", "lights",
+        "timings", "rays", "solve", "statistics", "warnings", "denoise", "files",
     ]  # fmt: skip
     assert {
         (p["channel"], p["page"], p["file"], p["width"], p["height"], p["unit"]) for p in manifest["pages"]
     } == {
         ("irradiance", 0, "irradiance_0.exr", 16, 16, "lx"),
         ("ao", 0, "ao_0.exr", 16, 16, "1"),
+    }
+    assert {name: (entry["components"], entry["unit"]) for name, entry in manifest["channels"].items()} == {
+        "irradiance": (["R", "G", "B"], "lx"),
+        "ao": (["Y"], "1"),
     }
     assert manifest["input"]["path"] == "../in/level.glb"
     assert {"baker", "python", "embree", "xatlas", "numba", "numpy", "openimagedenoise"} <= set(
@@ -160,5 +164,6 @@ def test_the_docs_explain_every_key() -> None:
     for name in ("pages", "instances", "lights", "warnings", "files"):
         keys |= set(schema["properties"][name]["items"]["properties"])
     keys |= set(schema["properties"]["solve"]["properties"])
+    keys |= set(schema["properties"]["channels"]["additionalProperties"]["properties"])
     keys |= set(schema["properties"]["statistics"]["additionalProperties"]["properties"])
     assert [key for key in sorted(keys) if f"`{key}`" not in text] == []

@@ -15,6 +15,7 @@ from glb_reader import Glb
 from io_scenes import quad_result
 from PIL import Image
 
+from baker.channels.channel import CHANNELS
 from baker.core.encoding import ENCODINGS
 from baker.core.errors import Cancelled, ResourceError, SettingsError
 from baker.core.lightmap import TexelStatus
@@ -362,12 +363,13 @@ def test_auto_range_is_the_brightest_texel_of_all_pages(tmp_path: Path) -> None:
 
 
 def test_an_encoding_that_no_channel_fits_is_refused() -> None:
-    check_encodings(("hdr", "png8"), {"irradiance": 3, "ao": 1})
+    light, ao = ({name: CHANNELS.get(name)} for name in ("irradiance", "ao"))
+    check_encodings(("hdr", "png8"), light | ao)
     for names_, components, words in [
-        (("hdr",), {"ao": 1}, "three"),
-        (("png16",), {"irradiance": 3}, "one component"),
-        (("exr",), {"ao": 1}, "in any case"),
-        (("jpeg",), {"ao": 1}, "known are hdr, png16, png8, rgbm"),
+        (("hdr",), ao, "three"),
+        (("png16",), light, "one component"),
+        (("exr",), ao, "in any case"),
+        (("jpeg",), ao, "known are hdr, png16, png8, rgbm"),
     ]:
         with pytest.raises(SettingsError, match=words):
             check_encodings(names_, components)
