@@ -13,7 +13,7 @@ from baker.cli.command import Cluster, Run, command
 from baker.jobs.settings import BatchSettings
 
 if TYPE_CHECKING:
-    from baker.jobs.executor import Bakery
+    from baker.jobs.executor import JobExecutor
     from baker.jobs.run import Outcome
 
 
@@ -49,7 +49,7 @@ def batch(
         raise typer.Exit(code)
 
 
-def _on_cluster(address: str, threads: int | None) -> Bakery:
+def _on_cluster(address: str, threads: int | None) -> JobExecutor:
     from baker.core.parallel import thread_count
     from baker.distributed.connection import Cluster as Connection
     from baker.distributed.job_executor import DistributedJobExecutor

@@ -42,9 +42,10 @@ __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
 # The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
 REACH = 96
-# Mirrored texels around the picture at least, and what its sides are made a multiple of: the filter tints its
-# outermost texels, more where it has to fill up its blocks of 16 itself. Grey with 5 % noise, pages of 225
-# to 240: RMS error of the outermost 8 texels 0.37 to 0.38 % with it, 0.36 to 0.41 % with a margin of 16.
+# Smallest number of mirrored texels around the picture, and the multiple that its sides are extended to: the
+# filter shifts the colour of the outermost texels, more where it has to fill up its blocks of 16 itself. Grey
+# with 5 % noise, pages of 225 to 240: RMS error of the outermost 8 texels 0.37 to 0.38 % with it, 0.36 to
+# 0.41 % with a margin of 16.
 MARGIN, BLOCK = 8, 16
 # Half window of the slopes at chart borders, texels.
 SLOPE_RADIUS = 4
@@ -53,7 +54,7 @@ _BORDER_TEXELS = 4096
 # Share of the noise seen on a page that an upper bound is lowered to: the real error of AO is 0.95 to 1.2
 # times what is seen (Cornell, interior, hall; 16 to 256 rays).
 FITTED = 1.2
-# Charts so many times brighter or darker than the page's median are filtered as if they were not.
+# Charts brighter or darker than the page's median by more than this factor are scaled to it for the filter.
 LEVEL = 8.0
 LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 

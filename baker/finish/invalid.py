@@ -1,4 +1,4 @@
-"""Fills buried texels from the valid ones of their own chart.
+"""Fills invalid texels from the valid ones of their own chart.
 
 A texel inside other geometry sees only back faces; its own value means nothing, yet bilinear lookups of the
 visible surface beside it read it.
@@ -20,7 +20,7 @@ def fill_invalid(
 ) -> tuple[NDArray[np.float32], int]:
     """Replace covered but invalid texels by values grown from their chart's valid texels.
 
-    Grown ring by ring, nearest first: the two sides of a buried strip keep their own light, where a smooth
+    Grown ring by ring, nearest first: the two sides of an invalid strip keep their own light, where a smooth
     membrane between them would carry light from one room into the next.
 
     Parameters
@@ -29,7 +29,7 @@ def fill_invalid(
     chart : (H, W) int32
         Chart of each covered texel, -1 = empty.
     valid : (H, W) bool
-        Covered and not buried.
+        Covered texels with a valid point.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def fill_invalid(
     known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
-    # A chart in which everything is buried may stand in something that looks solid and is not.
+    # A chart without any valid texel may lie in something that looks solid and is not.
     n_charts = int(chart.max()) + 1
     some = np.bincount(chart[known], minlength=n_charts) > 0
     hopeless = covered & ~known & ~some[chart]
@@ -57,7 +57,7 @@ def fill_invalid(
     n_hopeless = int(hopeless.sum())
     if n_hopeless:
         chart, covered = np.where(hopeless, -1, chart), covered & ~hopeless
-    # Whatever a buried texel beside valid ones holds (even NaN) must not survive.
+    # Values of invalid texels beside valid ones are dropped, even NaN.
     filled[covered & ~known] = 0.0
     _grow_rings(filled, chart, known)
     left = covered & ~known

@@ -20,13 +20,13 @@ NORMAL_MEDIAN = 0.6744898
 
 
 def estimate_error(
-    grey: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_], *, threads: int = 1
+    luminance: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_], *, threads: int = 1
 ) -> NDArray[np.float32]:
     """Estimate the standard deviation of the noise of each covered texel.
 
     Parameters
     ----------
-    grey : (H, W) float32
+    luminance : (H, W) float32
     chart : (H, W) int32
     covered : (H, W) bool
     threads : int
@@ -36,15 +36,17 @@ def estimate_error(
     error : (H, W) float32
         Constant over the texels of one chart in one block of 16 x 16; 0 where not covered.
     """
-    passed = np.full(grey.shape, np.nan, np.float32)
-    over_rows(lambda first, end: high_pass(grey, chart, covered, passed, first, end), len(grey), threads)
+    passed = np.full(luminance.shape, np.nan, np.float32)
+    over_rows(
+        lambda first, end: high_pass(luminance, chart, covered, passed, first, end), len(luminance), threads
+    )
     rows, columns = np.nonzero(covered)
-    error = np.zeros(grey.shape, np.float32)
+    error = np.zeros(luminance.shape, np.float32)
     if len(rows) == 0:
         return error
     own = chart[rows, columns].astype(np.int64)
-    n_across = grey.shape[1] // BLOCK + 1
-    n_blocks = n_across * (grey.shape[0] // BLOCK + 1)
+    n_across = luminance.shape[1] // BLOCK + 1
+    n_blocks = n_across * (luminance.shape[0] // BLOCK + 1)
     block = (rows // BLOCK) * n_across + columns // BLOCK
     group = own * n_blocks + block
     size = np.abs(passed[rows, columns])

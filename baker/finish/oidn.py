@@ -85,8 +85,8 @@ def filter_picture(
 class LightmapDenoiser:
     """Denoises pages one after the other; scratch memory is kept until it is closed.
 
-    *Measured*: a new device for each page of 512 takes a seventh longer, for the system clears its scratch
-    memory (160 MB) anew.
+    *Measured*: a new device for each page of 512 takes a seventh longer, since the system clears its scratch
+    memory (160 MB) again.
 
     Parameters
     ----------

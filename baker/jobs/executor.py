@@ -40,7 +40,7 @@ class Event:
     error: dict[str, Any] | None = None
 
 
-class Bakery(Protocol):
+class JobExecutor(Protocol):
     """Bakes a few jobs at a time."""
 
     @property
@@ -57,7 +57,7 @@ class Bakery(Protocol):
         """Stop at once whatever runs; its output folders are as they were."""
 
 
-class LocalBakery:
+class LocalJobExecutor:
     """Bakes in worker processes that stay alive from job to job.
 
     Parameters

@@ -10,7 +10,7 @@ from typing import Any
 
 from baker.core.progress import Progress, silent
 from baker.core.result import Result
-from baker.jobs.executor import Bakery, LocalBakery
+from baker.jobs.executor import JobExecutor, LocalJobExecutor
 from baker.jobs.jobs_file import read_jobs
 from baker.jobs.memory import parse_size
 from baker.jobs.run import BatchOptions, Outcome, batch_json, run_batch
@@ -52,7 +52,7 @@ def run_jobs_file(
     settings: BatchSettings,
     progress: Progress = silent,
     *,
-    executor: Callable[[], Bakery] | None = None,
+    executor: Callable[[], JobExecutor] | None = None,
     starting: Callable[[Path], None] = lambda out: None,
 ) -> BatchReport:
     """Bake the jobs of a file that need it.
@@ -92,5 +92,5 @@ def run_jobs_file(
         dry_run=settings.dry_run,
     )
     todo = read_jobs(jobs_file, {} if settings.seed is None else {"seed": settings.seed})
-    workers = LocalBakery(settings.jobs) if executor is None or settings.dry_run else executor()
+    workers = LocalJobExecutor(settings.jobs) if executor is None or settings.dry_run else executor()
     return BatchReport(run_batch(todo, workers, options, progress, starting), settings.dry_run)

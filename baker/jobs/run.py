@@ -16,7 +16,7 @@ from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.io.bake.lock import OutputLock, dead_writers, sweep
 from baker.io.scene_hash import scene_sha256
-from baker.jobs.executor import Bakery, Event
+from baker.jobs.executor import Event, JobExecutor
 from baker.jobs.jobs_file import Job
 from baker.jobs.up_to_date import Freshness, check_output
 
@@ -89,7 +89,7 @@ class _Ticket:
 
 def run_batch(
     jobs: Sequence[Job],
-    bakery: Bakery,
+    executor: JobExecutor,
     options: BatchOptions,
     progress: Progress,
     starting: Callable[[Path], None] = lambda out: None,
@@ -99,7 +99,7 @@ def run_batch(
     Parameters
     ----------
     jobs : sequence of Job
-    bakery : Bakery
+    executor : JobExecutor
         Does the work; closed at the end.
     options : BatchOptions
     progress : Progress
@@ -118,15 +118,15 @@ def run_batch(
         If `progress` says so. Finished jobs stay whole, the others are as they were.
     """
     try:
-        return _Run(jobs, bakery, options, progress, starting).run()
+        return _Run(jobs, executor, options, progress, starting).run()
     finally:
-        bakery.close()
+        executor.close()
 
 
 @dataclass
 class _Run:
     jobs: Sequence[Job]
-    bakery: Bakery
+    executor: JobExecutor
     options: BatchOptions
     progress: Progress
     starting: Callable[[Path], None]
@@ -142,13 +142,13 @@ class _Run:
                 while self.waiting or self.running:
                     self.start_some()
                     blocked = not self.running and bool(self.waiting)
-                    event = self.bakery.next_event(_LOOK)
+                    event = self.executor.next_event(_LOOK)
                     if event is not None:
                         self.hear(event)
                     self.tell(blocked=blocked)
             finally:
                 # Nobody may bake there before what runs has ended and its leavings are gone.
-                self.bakery.close()
+                self.executor.close()
                 for ticket in self.running.values():
                     _release(ticket)
         return [self.outcomes[number] for number in range(len(self.jobs))]
@@ -202,7 +202,7 @@ class _Run:
     def start_some(self) -> None:
         """Start waiting jobs while there are slots and memory; pass over those locked by other runs."""
         for ticket in list(self.waiting):
-            if len(self.running) >= self.bakery.slots:
+            if len(self.running) >= self.executor.slots:
                 return
             used = sum(other.peak for other in self.running.values())
             if self.options.memory is not None and used + ticket.peak > self.options.memory:
@@ -230,12 +230,12 @@ class _Run:
                     self.finish(ticket, Outcome(job, "unchanged", seen.why))
                     return
             # Threads are shared by those that will run at the same time.
-            beside = min(self.bakery.slots, len(self.running) + 1 + len(self.waiting))
+            beside = min(self.executor.slots, len(self.running) + 1 + len(self.waiting))
             threads = max(thread_count(self.options.threads) // beside, 1)
             ticket.started = time.perf_counter()
             self.running[ticket.number] = ticket
             own = job.settings.threads
-            self.bakery.start(
+            self.executor.start(
                 ticket.number, job, threads=min(threads, own or threads), force=self.options.force
             )
         except OSError as error:

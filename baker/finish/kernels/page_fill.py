@@ -84,7 +84,7 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def reflect_outwards(value, chart, covered, nearest, slope_row, slope, reach, first_row, end_row):  # type: ignore[no-untyped-def]
+def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_distance, first_row, end_row):  # type: ignore[no-untyped-def]
     """Continue every chart's picture into the empty texels by reflection at its border, in place.
 
     An empty texel p with the nearest covered texel q takes the value m as far inside the chart as p lies
@@ -98,11 +98,11 @@ def reflect_outwards(value, chart, covered, nearest, slope_row, slope, reach, fi
     chart : (H, W) int32
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
-    slope_row : (H, W) int32
-        Row of `slope` for each covered texel that is some empty texel's nearest.
-    slope : (n, 3, C) float32
+    plane_row : (H, W) int32
+        Row of `plane` for each covered texel that is some empty texel's nearest.
+    plane : (n, 3, C) float32
         Plane at these texels: value, slope per column, slope per row.
-    reach : int
+    max_distance : int
         Largest depth looked at, in texels.
     """
     height, width, channels = value.shape
@@ -116,7 +116,7 @@ def reflect_outwards(value, chart, covered, nearest, slope_row, slope, reach, fi
             distance = larger(abs(dr), abs(dc))
             depth = 0
             own = chart[qr, qc]
-            for k in range(1, smaller(distance, reach) + 1):
+            for k in range(1, smaller(distance, max_distance) + 1):
                 rr = qr + _round_ratio(dr * k, distance)
                 cc = qc + _round_ratio(dc * k, distance)
                 if rr < 0 or rr >= height or cc < 0 or cc >= width:
@@ -136,14 +136,14 @@ def reflect_outwards(value, chart, covered, nearest, slope_row, slope, reach, fi
             # Beyond SLOPE_REACH texels the plane stays what it is there.
             outside = smaller(1.0, SLOPE_REACH / distance)
             inside = smaller(1.0, SLOPE_REACH / step) if step > 0 else 1.0
-            at = slope_row[qr, qc]
+            at = plane_row[qr, qc]
             for j in range(channels):
-                rise_out = -(slope[at, 1, j] * dc + slope[at, 2, j] * dr) * outside
-                rise_in = (slope[at, 1, j] * (cc - qc) + slope[at, 2, j] * (rr - qr)) * inside
-                at_mirror = slope[at, 0, j] + rise_in
+                rise_out = -(plane[at, 1, j] * dc + plane[at, 2, j] * dr) * outside
+                rise_in = (plane[at, 1, j] * (cc - qc) + plane[at, 2, j] * (rr - qr)) * inside
+                at_mirror = plane[at, 0, j] + rise_in
                 factor = 1.0
                 if at_mirror > 0.0:
-                    factor = smaller(larger((slope[at, 0, j] + rise_out) / at_mirror, 1.0 / MOST), MOST)
+                    factor = smaller(larger((plane[at, 0, j] + rise_out) / at_mirror, 1.0 / MOST), MOST)
                 value[r, c, j] = value[rr, cc, j] * factor
 
 

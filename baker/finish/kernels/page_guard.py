@@ -30,14 +30,14 @@ _three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
 
 
 @kernel
-def high_pass(grey, chart, covered, out, first_row, end_row):
+def high_pass(luminance, chart, covered, out, first_row, end_row):
     """Filter a page by the kernel that is blind to planes, [1 -2 1; -2 4 -2; 1 -2 1] / 6.
 
     For white noise the result has the noise's own standard deviation.
 
     Parameters
     ----------
-    grey : (H, W) float32
+    luminance : (H, W) float32
     chart : (H, W) int32
     covered : (H, W) bool
     out : (H, W) float32
@@ -47,7 +47,7 @@ def high_pass(grey, chart, covered, out, first_row, end_row):
     -----
     Immerkaer, Fast Noise Variance Estimation, 1996.
     """
-    height, width = grey.shape
+    height, width = luminance.shape
     for r in range(larger(first_row, 1), smaller(end_row, height - 1)):
         for c in range(1, width - 1):
             inside = True
@@ -57,7 +57,7 @@ def high_pass(grey, chart, covered, out, first_row, end_row):
                     if not covered[r + a, c + b] or chart[r + a, c + b] != chart[r, c]:
                         inside = False
                     weight = (1.0 if a != 0 else -2.0) * (1.0 if b != 0 else -2.0)
-                    total += weight * grey[r + a, c + b]
+                    total += weight * luminance[r + a, c + b]
             if inside:
                 out[r, c] = total / 6.0
 
@@ -105,7 +105,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
             texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
             mean_error = texel_error * math.sqrt(sww) / sw
-            grey = (
+            luminance = (
                 _RED * float(denoised[r, c, 0])
                 + _GREEN * float(denoised[r, c, 1])
                 + _BLUE * float(denoised[r, c, 2])
@@ -113,8 +113,8 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
             for j in range(3):
                 # A channel's noise stands to its value as the luminance's does to the luminance.
                 scale = 1.0
-                if grey > 0.0:
-                    scale = smaller(larger(float(denoised[r, c, j]) / grey, 0.0), 8.0)
+                if luminance > 0.0:
+                    scale = smaller(larger(float(denoised[r, c, j]) / luminance, 0.0), 8.0)
                 believed = MEAN_SIGMAS * mean_error * scale
                 mean = residual[j] / sw
                 excess = larger(abs(mean) - believed, 0.0)

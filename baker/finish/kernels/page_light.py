@@ -7,7 +7,7 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 # Side of a block, texels; half window of blocks around one, with weights that fall off to its edge.
 BLOCK, REACH = 8, 2
-# A window of so many texels gets half of what it lacks.
+# A window of this number of texels gets half of the light that it lacks.
 HALF = 30.0
 # No texel is made darker or brighter by more than these shares.
 LEAST, MOST = -0.5, 1.0

@@ -126,9 +126,9 @@ def fit_plane(value, chart, covered, offset, r, c, radius, flat, sums, planes, s
 
 
 @inner
-def _step(along, reach):
-    """Return the nearest of -1, 0, 1 to along / reach."""
-    return 1 if along > 0.5 * reach else (-1 if along < -0.5 * reach else 0)
+def _step(along, length):
+    """Return the nearest of -1, 0, 1 to along / length."""
+    return 1 if along > 0.5 * length else (-1 if along < -0.5 * length else 0)
 
 
 @inner
@@ -141,8 +141,8 @@ def _trend(value, chart, covered, r, c, x, y, trend):
     trend : (C, 2) float64 output
     """
     height, width, channels = value.shape
-    reach = larger(abs(x), abs(y))
-    down, across = _step(y, reach), _step(x, reach)
+    length = larger(abs(x), abs(y))
+    down, across = _step(y, length), _step(x, length)
     r2, c2 = r - 2 * down, c - 2 * across
     known = 0 <= r2 < height and 0 <= c2 < width
     if known:
@@ -156,8 +156,8 @@ def _trend(value, chart, covered, r, c, x, y, trend):
         if known:
             one = float(value[r - down, c - across, j])
             last, before = float(value[r, c, j]) - one, CURVED * (one - float(value[r2, c2, j]))
-            trend[j, RISE] = STEEP * reach * larger(smaller(last, before), 0.0)
-            trend[j, FALL] = STEEP * reach * larger(smaller(-last, -before), 0.0)
+            trend[j, RISE] = STEEP * length * larger(smaller(last, before), 0.0)
+            trend[j, FALL] = STEEP * length * larger(smaller(-last, -before), 0.0)
 
 
 @inner
@@ -249,13 +249,13 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
             fit_plane(value, chart, covered, offset, r, c, RADIUS, FLAT, sums, planes, 0)
             _trend(value, chart, covered, r, c, -ox, -oy, trend)
             for j in range(channels):
-                measured, plain = float(value[r, c, j]), float(moved[r, c, j])
+                measured, centred = float(value[r, c, j]), float(moved[r, c, j])
                 others = x * (1.0 - y) * float(moved[r, cc, j]) + (1.0 - x) * y * float(moved[rr, c, j])
                 others += x * y * float(moved[rr, cc, j])
                 estimate = (measured - others) / ((1.0 - x) * (1.0 - y))
-                way = _limited(planes, 0, j, estimate, trend, float(highest[own, j])) - plain
-                excess = larger(abs(way) - NOISY * abs(measured), 0.0)
-                out[r, c, j] = np.float32(plain + (excess if way > 0.0 else -excess))
+                change = _limited(planes, 0, j, estimate, trend, float(highest[own, j])) - centred
+                excess = larger(abs(change) - NOISY * abs(measured), 0.0)
+                out[r, c, j] = np.float32(centred + (excess if change > 0.0 else -excess))
 
 
 @kernel
