@@ -116,7 +116,7 @@ def _let_through(arguments):
         carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
         carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
         carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
-        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 2), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 3), np.int64),
     )
     blend_slot = carray(pointer(data[_BLEND_SLOT]), (data[_BLEND_SLOT + 1],), np.int32)
     blend_row = carray(pointer(data[_BLEND_ROW]), (data[_BLEND_ROW + 1], ROW_LENGTH), np.float32)

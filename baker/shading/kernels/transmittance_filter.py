@@ -76,7 +76,7 @@ def _multiply_colour(arguments):
         carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
         carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
         carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
-        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 2), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 3), np.int64),
     )
     rgba, rgb = _rgba(), _rgb()
     for lane in range(n):

@@ -118,6 +118,20 @@ def test_a_texture_of_one_value_meets_its_cutoff_everywhere():
     assert not hit[near].any()
 
 
+def test_each_texture_of_a_scene_keeps_its_own_wrap_mode():
+    """Close to the left edge a clamped lookup finds the left texel only, a repeated one both."""
+    quads = []
+    for z, wrap in enumerate([("repeat", "repeat"), ("repeat", "repeat"), ("clamp", "clamp")]):
+        quad = sheet("MASK", 1.0, z, image=[[0, 1]], alpha_cutoff=0.3)
+        texture = replace(quad.material.base_colour_texture, wrap=wrap)
+        quads.append(replace(quad, material=replace(quad.material, base_colour_texture=texture)))
+    rays, _ = tree(quads)
+    for z, left in enumerate([True, True, False]):
+        origin = np.float32([[0.02, 0.5, z + 0.5], [0.98, 0.5, z + 0.5]])
+        hit = cast(rays, origin, np.float32([[0, 0, -1]] * 2), far=1.0)[0] >= 0
+        assert hit.tolist() == [left, True]
+
+
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 0.93])
 def test_blend_counts_with_probability_alpha_alone_and_in_layers(alpha):
     n = 40000
