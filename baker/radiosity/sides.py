@@ -25,7 +25,7 @@ from baker.kernels.sampling import shared_bits_mask, sobol_reversed
 from baker.kernels.surface import N_POINTS, Surface, place_points
 from baker.radiosity.kernels.form_factor import SPLIT
 from baker.radiosity.kernels.regions import join_linked, neighbour_pairs
-from baker.radiosity.kernels.side_table import SeenLight, SeenPatch, SideTable, no_sides
+from baker.radiosity.kernels.side_table import SIDE_ROW, SeenLight, SeenPatch, SideTable, no_sides
 from baker.radiosity.kernels.sides import (
     count_backs,
     crossed_texels,
@@ -89,10 +89,10 @@ class Sides:
         Parameters
         ----------
         exitance : (n, 4) float32, lx
-            Light that entries reflect; column 3 is set in place: the number of a split texel from 1, else 0.
+            Light that entries reflect; SIDE_ROW is set in place: the number of a split texel from 1, else 0.
         """
-        exitance[:, 3] = 0
-        exitance[self.owner, 3] = np.arange(1, len(self.owner) + 1)
+        exitance[:, SIDE_ROW] = 0
+        exitance[self.owner, SIDE_ROW] = np.arange(1, len(self.owner) + 1)
         return SeenLight(self.texels.hit_image(exitance), exitance[self.member], self.table)
 
     def seen_patches(self, patch: NDArray[np.int32]) -> SeenPatch:
