@@ -81,33 +81,55 @@ def bake(
         If `progress` returned a truthy value.
     """
     channels = chosen_channels(settings.channels)
-    folder = None if out is None else Path(out)
-    if folder is not None:
-        check_encodings(settings.encode, channels)
-        check_exports(settings.export, settings.channels)
-        check_out(folder, force=force, scene_path=scene.path if isinstance(scene, Scene) else Path(scene))
+    folder = _folder(out, scene, settings, channels, force)
     record, compiling = Record(progress), precompile.start()
     with memory_errors():
-        with record.stage(Stage.LOAD):
-            if isinstance(scene, Scene):
-                check_brightness(scene)
-            else:
-                scene = load_for_bake(scene, settings)
+        scene = _load(scene, settings, record)
         if atlas is not None:
             settings = settings_of_atlas(scene, atlas, settings)
         compiling = precompile.restart_for_materials(compiling, scene)
-        record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
-        with record.stage(Stage.UNWRAP):
-            atlas = atlas or unwrap_scene(scene, settings, progress)
-        record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
+        atlas = _layout(scene, atlas, settings, record)
         traced = _trace(scene, atlas, settings, channels, record, executor or LocalTileExecutor(), compiling)
         precompile.finish(compiling, progress)
         result = finish_pages(scene, atlas, traced, channels, settings, record)
         if folder is not None:
-            with record.stage(Stage.WRITE):
-                manifest = write_bake(result, folder, force=force, progress=progress)
-            result = replace(result, out=folder, manifest=manifest)
+            result = _write(result, folder, force, record)
     return result
+
+
+def _folder(
+    out: Path | str | None,
+    scene: Scene | str | Path,
+    settings: BakeSettings,
+    channels: Mapping[str, Channel],
+    force: bool,
+) -> Path | None:
+    """Return the output folder; raises an error now if the bake could not be written in the end."""
+    if out is None:
+        return None
+    check_encodings(settings.encode, channels)
+    check_exports(settings.export, settings.channels)
+    scene_path = scene.path if isinstance(scene, Scene) else Path(scene)
+    check_out(Path(out), force=force, scene_path=scene_path)
+    return Path(out)
+
+
+def _load(scene: Scene | str | Path, settings: BakeSettings, record: Record) -> Scene:
+    """Return the scene, read from a file unless it is loaded already."""
+    with record.stage(Stage.LOAD):
+        if not isinstance(scene, Scene):
+            return load_for_bake(scene, settings)
+        check_brightness(scene)
+        return scene
+
+
+def _layout(scene: Scene, atlas: Atlas | None, settings: BakeSettings, record: Record) -> Atlas:
+    """Return the lightmap uv, unwrapped unless it is given, and record the warnings so far."""
+    record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
+    with record.stage(Stage.UNWRAP):
+        atlas = atlas or unwrap_scene(scene, settings, record.progress)
+    record.warnings.extend([*atlas.warnings, *coarse_warnings(scene, atlas)])
+    return atlas
 
 
 def _trace(
@@ -129,3 +151,10 @@ def _trace(
     executor.close()
     texels = prepared.texels.without_surface()
     return TracedTexels(texels, prepared.job.valid_points[: texels.n_front] != 0, transport)
+
+
+def _write(result: BakeResult, folder: Path, force: bool, record: Record) -> BakeResult:
+    """Write the output folder and return the result with its manifest."""
+    with record.stage(Stage.WRITE):
+        manifest = write_bake(result, folder, force=force, progress=record.progress)
+    return replace(result, out=folder, manifest=manifest)
