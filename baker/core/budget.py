@@ -57,6 +57,7 @@ def patch_rays(settings: BakeSettings) -> int:
     Returns
     -------
     int
+        From `MIN_PATCH_RAYS` to `MAX_PATCH_RAYS`.
     """
     return min(max(settings.hemisphere_samples, MIN_PATCH_RAYS), MAX_PATCH_RAYS)
 
@@ -67,12 +68,14 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
     Parameters
     ----------
     settings : BakeSettings
+        Resolution, density and `max_pages` are read.
     area : float
         Area of all surfaces, m2.
 
     Returns
     -------
     texels : int
+        Texels on surfaces, of all pages.
     pages : int
         1 unless a density is set, at most `max_pages`.
     """
@@ -85,7 +88,18 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
 
 
 def surface_area(scene: Scene) -> float:
-    """Return the area of all instances of a scene, m2."""
+    """Sum the area of all instances of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Meshes and instances are read.
+
+    Returns
+    -------
+    float
+        Square metres, world.
+    """
     area = 0.0
     for instance in scene.instances:
         mesh, matrix = scene.meshes[instance.mesh], instance.world_from_object
@@ -96,7 +110,18 @@ def surface_area(scene: Scene) -> float:
 
 
 def image_bytes(scene: Scene) -> int:
-    """Return the size of the pixels of all images that a bake reads, as decoded."""
+    """Sum the sizes of all images that a bake reads.
+
+    Parameters
+    ----------
+    scene : Scene
+        Textures of base colour and emission are read.
+
+    Returns
+    -------
+    int
+        Bytes of pixels as decoded.
+    """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
     return sum({id(t.image): t.image.nbytes for t in textures if t is not None}.values())
 

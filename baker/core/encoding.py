@@ -152,7 +152,9 @@ def measure_loss(
     Parameters
     ----------
     encoding : Encoding
+        The format.
     pixels : (H, W, C) float32
+        The page.
     surface : (H, W) bool
         Texels that are shown.
     options : EncodingOptions
@@ -161,6 +163,7 @@ def measure_loss(
     Returns
     -------
     Loss
+        Numbers of texels.
 
     Notes
     -----
@@ -188,6 +191,7 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     Parameters
     ----------
     pixels : ndarray of float32
+        What is to be written.
     components : tuple of int
         Numbers of components that the format holds.
     name : str
@@ -213,7 +217,18 @@ ENCODINGS: Registry[Encoding[Any]] = Registry("baker.encodings")
 
 
 def encoding_of(name: str) -> Encoding[Any] | None:
-    """Return the encoding whose suffix ends a file's name (the longest one that does), or None."""
+    """Find the encoding of a file by its name.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file; upper and lower case are the same.
+
+    Returns
+    -------
+    Encoding or None
+        The one with the longest suffix that ends the name.
+    """
     plugins = [ENCODINGS.require(key, "encoding") for key in ENCODINGS.names()]
     fitting = [plugin for plugin in plugins if name.lower().endswith(plugin.suffix)]
     return max(fitting, key=lambda plugin: len(plugin.suffix), default=None)

@@ -31,7 +31,14 @@ EXPORTS: Registry[Export] = Registry("baker.exporters")
 
 
 def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
-    """Make sure that exports exist and that what they need is baked.
+    """Make sure that exports exist and that the channels they need are baked.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Exports asked for.
+    channels : tuple of str
+        Channels to be baked.
 
     Raises
     ------

@@ -132,8 +132,8 @@ class Settings(BaseModel):
             first = error.errors()[0]
             name = str(first["loc"][0]) if first["loc"] else ""
             text = first["msg"]
-            told = f"`{name}`{text[5:]}" if text.startswith("Input ") else f"`{name}`: {text}"
-            raise SettingsError(f"{told} (was {first['input']!r})", object=name) from None
+            message = f"`{name}`{text[5:]}" if text.startswith("Input ") else f"`{name}`: {text}"
+            raise SettingsError(f"{message} (was {first['input']!r})", object=name) from None
         self.check()
 
     def check(self) -> None:

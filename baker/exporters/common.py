@@ -59,8 +59,8 @@ def write_json(path: Path, value: dict[str, Any]) -> None:
     write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def place(source: Path, target: Path) -> None:
-    """Put a file of the bake at another place too, without a second copy on disk where that is possible."""
+def link_file(source: Path, target: Path) -> None:
+    """Put a file of the bake into another folder as well, as a hard link where that is possible."""
     try:
         os.link(source, target)
     except OSError:
@@ -71,9 +71,9 @@ def place(source: Path, target: Path) -> None:
 def place_bake(bake: Path, target: Path) -> dict[str, Any]:
     """Put scene, irradiance pages and their description into `target`; return the description."""
     description = describe(read_manifest(bake))
-    place(bake / SCENE_NAME, target / SCENE_NAME)
+    link_file(bake / SCENE_NAME, target / SCENE_NAME)
     for page in description["pages"]:
-        place(bake / page["file"], target / page["file"])
+        link_file(bake / page["file"], target / page["file"])
     write_json(target / DESCRIPTION_NAME, description)
     return description
 
@@ -132,7 +132,7 @@ def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
     """Put pages, description and the scene with names of its own into `target`; return the description."""
     description = place_named_scene(bake, target)
     for page in description["pages"]:
-        place(bake / page["file"], target / page["file"])
+        link_file(bake / page["file"], target / page["file"])
     write_json(target / DESCRIPTION_NAME, description)
     return description
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from baker.core.export import EXPORTS
-from baker.exporters.common import SCENE_NAME, place, write_readme
+from baker.exporters.common import SCENE_NAME, link_file, write_readme
 
 
 class GltfExport:
@@ -15,7 +15,7 @@ class GltfExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the folder."""
-        place(bake / SCENE_NAME, target / SCENE_NAME)
+        link_file(bake / SCENE_NAME, target / SCENE_NAME)
         write_readme(
             target,
             "Plain glTF",

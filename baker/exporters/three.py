@@ -24,7 +24,7 @@ class ThreeExport:
                 "Serve this folder and load it with the module beside this file (three.js r151 or newer):",
                 "`const { gltf } = await loadBake('three/'); scene.add(gltf.scene);`",
                 "The lights of the file are baked in and so are hidden; AO is in the light and so is off.",
-                "Materials become matt ones; with `{ matte: false }` they stay what they are (1.5 % darker).",
+                "Materials become matte; with `{ matte: false }` they stay what they are (1.5 % darker).",
             ),
             scale="EXR holds irradiance E in lx, `lightMap` takes just that: shown is albedo x E / pi, in "
             "cd/m2. `{ exposure: x }` multiplies all of it.",

@@ -73,8 +73,8 @@ def radiance(bake: StoredBake) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     covered : (P, H, W) bool
     """
     texels, albedo = _texel_colour(bake, bake.scene)
-    glowing = _with_materials(bake.scene, tuple(_glow(m) for m in bake.scene.materials))
-    emission = _texel_colour(bake, glowing)[1]
+    emissive = _with_materials(bake.scene, tuple(_emissive_only(m) for m in bake.scene.materials))
+    emission = _texel_colour(bake, emissive)[1]
     alpha = _texel_colour(bake, _with_materials(bake.scene, tuple(map(_alpha, bake.scene.materials))))[1]
     chart = texels.page_image(texels.chart[: texels.n_front], fill=-1)
     covered = chart >= 0
@@ -110,10 +110,10 @@ def unlit_glb(bake: StoredBake, page: NDArray[np.float32], exposure: float) -> b
     meshes = list(bake.scene.meshes)
     for instance, layout in zip(bake.scene.instances, bake.atlas.layouts, strict=True):
         mesh = meshes[instance.mesh]
-        used, place = np.unique(mesh.material, return_inverse=True)
+        used, index = np.unique(mesh.material, return_inverse=True)
         wanted = [(layout.page, _kind(bake.scene.materials[m])) for m in used.tolist()]
         kinds += [kind for kind in dict.fromkeys(wanted) if kind not in kinds]
-        renumbered = np.array([kinds.index(kind) for kind in wanted], np.int32)[place]
+        renumbered = np.array([kinds.index(kind) for kind in wanted], np.int32)[index]
         meshes[instance.mesh] = replace(mesh, material=renumbered, texcoord=(None, None), colour=None)
     scene = replace(
         bake.scene, meshes=tuple(meshes), materials=tuple(m for _, m in kinds), lights=(), source=None
@@ -176,7 +176,7 @@ def _with_materials(scene: Scene, materials: tuple[Material, ...]) -> Scene:
     return replace(scene, materials=materials, meshes=meshes)
 
 
-def _glow(material: Material) -> Material:
+def _emissive_only(material: Material) -> Material:
     """Return a material whose base colour is the emission of another."""
     return Material(
         base_colour=(*material.emission, 1.0),

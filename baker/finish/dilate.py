@@ -31,7 +31,9 @@ def dilate(
     Parameters
     ----------
     value : (H, W, C) float32
+        The page.
     covered : (H, W) bool
+        Texels of charts.
     chart : (H, W) int32
         Chart of each covered texel.
     pixels : int
@@ -39,6 +41,7 @@ def dilate(
     nearest : (H, W) int32, optional
         From `nearest_texel`, if known.
     threads : int
+        Threads of the kernel.
 
     Returns
     -------

@@ -146,7 +146,24 @@ class Finisher:
 def open_finisher(
     *, threads: int, dilation: int, denoise: bool, progress: Progress = silent
 ) -> Iterator[Finisher]:
-    """Yield a `Finisher` and release the denoiser's memory at the end."""
+    """Yield a `Finisher` and release the denoiser's memory at the end.
+
+    Parameters
+    ----------
+    threads : int
+        Threads of the kernels and of the denoiser.
+    dilation : int
+        Texels by which charts grow into the padding.
+    denoise : bool
+        Whether layers are denoised.
+    progress : Progress
+        Gets the denoiser's progress; may cancel.
+
+    Yields
+    ------
+    Finisher
+        Valid until the context ends.
+    """
     with LightmapDenoiser(threads) as denoiser:
         yield Finisher(threads, dilation, denoiser if denoise else None, progress)
 
@@ -159,11 +176,13 @@ def finish_page(
     Parameters
     ----------
     plan : PagePlan
+        Charts and valid texels of the page.
     layers : list of PageLayer
         At least one; the page is their sum.
     rules : ComponentRules
         Of the sum.
     finisher : Finisher
+        Threads, denoiser, dilation.
 
     Returns
     -------

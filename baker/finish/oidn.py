@@ -27,6 +27,11 @@ MEMORY_MB = 1000
 def denoiser_name() -> dict[str, str]:
     """Return name, version and filter of the denoiser, for the manifest.
 
+    Returns
+    -------
+    dict of str to str
+        `name`, `version`, `filter` and `pyoidn`.
+
     Raises
     ------
     ResourceError
@@ -53,10 +58,21 @@ def filter_picture(
 
     Parameters
     ----------
-    image, albedo, normal : (H, W, 3) float32
+    image : (H, W, 3) float32
+        Radiance.
+    albedo : (H, W, 3) float32
+        Base colour at the first hits.
+    normal : (H, W, 3) float32
+        Normal at the first hits.
     threads : int
         0 = all of the machine.
     progress : Progress
+        Gets the fraction done; may cancel.
+
+    Returns
+    -------
+    image : (H, W, 3) float32
+        The denoised picture.
 
     Raises
     ------

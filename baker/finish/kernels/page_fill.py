@@ -36,7 +36,11 @@ def nearest_texel(mask: NDArray[np.bool_], out: NDArray[np.int32]) -> None:
 
 @kernel
 def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
-    """Do the work of `nearest_texel`; row_of (H, W) int32 full of -1, apex and start (W,) are its memory."""
+    """Write the flat index of the nearest set texel to each texel, see `nearest_texel`.
+
+    mask : (H, W) bool; out : (H, W) int32 output
+    row_of : (H, W) int32 full of -1, apex and start : (W,) int64, scratch
+    """
     height, width = mask.shape
     # Nearest set row of each column, kept as a row number; -1 = column is empty.
     for r in range(height):

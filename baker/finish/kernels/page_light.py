@@ -44,7 +44,10 @@ def group_blocks(chart, chosen, label, first, owner):
 
 @inner
 def _group_of(begin, end, owner, chart):
-    """Return the group of a chart among the groups begin to end, or -1."""
+    """Return the group of `chart` among the groups `begin` to `end`, or -1.
+
+    owner : (n,) int32, chart of each group
+    """
     for group in range(begin, end):
         if owner[group] == chart:
             return group
@@ -84,7 +87,9 @@ def sum_groups(noisy, filtered, label, light, sums):
 def missing_shares(first, owner, across, sums, share):
     """Write the share (G, C) float64 of light that windows around groups lack, as far as it is believed.
 
-    across : int, blocks in a row; others as above
+    first : (blocks + 1,) int64, where the groups of each block begin; owner : (n,) int32, chart of each group
+    across : int, blocks in a row
+    sums : (G, 2 C + 1) float64, from `sum_groups`
     """
     channels = share.shape[1]
     blocks = len(first) - 1
@@ -110,7 +115,12 @@ def missing_shares(first, owner, across, sums, share):
 
 @kernel
 def add_shares(label, first, owner, across, share, page):
-    """Multiply a page (H, W, C) float32 by 1 + share, interpolated between the middles of blocks."""
+    """Multiply a page (H, W, C) float32 by 1 + share, interpolated between the middles of blocks.
+
+    label : (H, W) int32, first : (blocks + 1,) int64, owner : (n,) int32 from `group_blocks`
+    across : int, blocks in a row
+    share : (G, C) float64
+    """
     height, width, channels = page.shape
     down = (len(first) - 1) // across
     for r in range(height):
@@ -134,6 +144,6 @@ def add_shares(label, first, owner, across, share, page):
 
 @inner
 def _group_or(block, first, owner, chart, otherwise):
-    """Return a chart's group in a block, or another one."""
+    """Return the group of `chart` in `block`, or `otherwise`; `first` and `owner` from `group_blocks`."""
     group = _group_of(first[block], first[block + 1], owner, chart)
     return group if group >= 0 else otherwise

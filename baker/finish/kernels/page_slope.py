@@ -60,7 +60,8 @@ NO_OFFSET = np.zeros((0, 0, 2), np.float32)
 def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
     """Sum over the texels of one chart around texel (r, c), weighted by 1 / (flat + distance^2).
 
-    offset : (H, W, 2) float32, column and row offset of each value's place from its texel centre, texels;
+    value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
+    offset : (H, W, 2) float32, column and row offset of each value's position from its texel centre, texels;
         (0, 0, 2) where all are zero
     sums : output, see the column names; x and y are counted from the place of texel (r, c)
     """
@@ -102,7 +103,12 @@ def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
 
 @inner
 def fit_plane(value, chart, covered, offset, r, c, radius, flat, sums, planes, slot):
-    """Fit a plane per channel to the texels of one chart around texel (r, c); written to planes[slot]."""
+    """Fit a plane per channel to the texels of one chart around texel (r, c).
+
+    value, chart, covered, offset, radius, flat : see `_sum_window`
+    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64, scratch
+    planes : (slots, C, N_PLANE) float64, row `slot` is written
+    """
     _sum_window(value, chart, covered, offset, r, c, radius, flat, sums)
     weight = sums[W]
     mx, my = sums[WX] / weight, sums[WY] / weight
@@ -138,6 +144,7 @@ def _trend(value, chart, covered, r, c, x, y, trend):
     The two steps between a texel and those behind it must go the same way: then the value goes on as it
     came. At the edge of a shadow, between faces that differ and in noise they do not.
 
+    value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     trend : (C, 2) float64 output
     """
     height, width, channels = value.shape
@@ -166,6 +173,8 @@ def _limited(planes, slot, j, estimate, trend, highest):
 
     Light never turns negative, and is brighter than the brightest texel of its chart, `highest`, only where
     it rises as evenly as a plane.
+
+    planes : (slots, C, N_PLANE) float64, row `slot`; trend : (C, 2) float64; highest : float
     """
     low, high = planes[slot, j, LOWEST], planes[slot, j, HIGHEST]
     room = HEADROOM * (high - low)
@@ -181,7 +190,10 @@ def _limited(planes, slot, j, estimate, trend, highest):
 
 @inner
 def _off_centre(covered, offset, smallest, r, c):
-    """Return whether texel (r, c) is covered and its centroid further than `smallest` from its centre."""
+    """Return whether texel (r, c) is covered and its centroid further than `smallest` from its centre.
+
+    covered : (H, W) bool; offset : (H, W, 2) float32, texels; smallest : float, texels
+    """
     return covered[r, c] and larger(abs(offset[r, c, 0]), abs(offset[r, c, 1])) >= smallest
 
 

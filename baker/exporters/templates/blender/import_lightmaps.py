@@ -58,17 +58,17 @@ def lit_material(material, image, uv, entry, exposure):
     output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL" and node.is_active_output)
     surface = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
 
-    place = nodes.new("ShaderNodeMapping")
+    mapping = nodes.new("ShaderNodeMapping")
     scale, offset = entry["uv_scale"], entry["uv_offset"]
-    place.inputs["Scale"].default_value = (scale[0], scale[1], 1.0)
+    mapping.inputs["Scale"].default_value = (scale[0], scale[1], 1.0)
     # Both v run upwards here: 1 - ((1 - v) * scale + offset) = v * scale + (1 - scale - offset).
-    place.inputs["Location"].default_value = (offset[0], 1.0 - scale[1] - offset[1], 0.0)
+    mapping.inputs["Location"].default_value = (offset[0], 1.0 - scale[1] - offset[1], 0.0)
     source = nodes.new("ShaderNodeUVMap")
     source.uv_map = uv
-    links.new(source.outputs["UV"], place.inputs["Vector"])
+    links.new(source.outputs["UV"], mapping.inputs["Vector"])
     page = nodes.new("ShaderNodeTexImage")
     page.image, page.interpolation, page.extension = image, "Linear", "EXTEND"
-    links.new(place.outputs["Vector"], page.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], page.inputs["Vector"])
 
     product = nodes.new("ShaderNodeVectorMath")
     product.operation = "MULTIPLY"
@@ -79,15 +79,15 @@ def lit_material(material, image, uv, entry, exposure):
     links.new(product.outputs["Vector"], light.inputs["Color"])
     shown = light.outputs["Emission"]
     if surface is not None:
-        glow, strength = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMath")
+        emission, strength = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeMath")
         strength.operation = "MULTIPLY"
         strength.inputs[1].default_value = exposure
-        feed(links, surface, "Emission Color", glow.inputs["Color"], (0.0, 0.0, 0.0))
+        feed(links, surface, "Emission Color", emission.inputs["Color"], (0.0, 0.0, 0.0))
         feed(links, surface, "Emission Strength", strength.inputs[0], 0.0)
-        links.new(strength.outputs["Value"], glow.inputs["Strength"])
+        links.new(strength.outputs["Value"], emission.inputs["Strength"])
         both = nodes.new("ShaderNodeAddShader")
         links.new(shown, both.inputs[0])
-        links.new(glow.outputs["Emission"], both.inputs[1])
+        links.new(emission.outputs["Emission"], both.inputs[1])
         shown = both.outputs["Shader"]
         if surface.inputs["Alpha"].is_linked or surface.inputs["Alpha"].default_value < 1.0:
             clear, mix = nodes.new("ShaderNodeBsdfTransparent"), nodes.new("ShaderNodeMixShader")

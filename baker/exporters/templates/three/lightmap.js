@@ -10,7 +10,7 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 // Loads the folder of this file. Options:
 //   exposure  factor on all light, 1 by default: shown is radiance in cd/m2
-//   matte     true (default): matt materials, which show exactly albedo * E / pi; false: keep the file's materials
+//   matte     true (default): matte materials, which show exactly albedo * E / pi; false: keep the file's materials
 //   lights    false (default): hide the lights of the file, for they are in the light maps
 export async function loadBake(folder, options = {}) {
   const base = folder.endsWith('/') ? folder : folder + '/';
