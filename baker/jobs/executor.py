@@ -19,7 +19,7 @@ from baker.jobs.jobs_file import Job
 
 @dataclass(frozen=True)
 class Event:
-    """News of a job.
+    """Progress or the end of a job.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class JobExecutor(Protocol):
         """Begin a job; no more than `slots` at a time."""
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait for news, at most `timeout` seconds."""
+        """Wait at most `timeout` seconds for an event of any job."""
 
     def close(self) -> None:
         """Stop at once whatever runs; its output folders are as they were."""
@@ -79,7 +79,7 @@ class LocalJobExecutor:
         worker.begin(job, threads=threads, force=force)
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait for news of any worker."""
+        """Wait at most `timeout` seconds for an event of any worker."""
         try:
             worker, message = self._heard.get(timeout=timeout)
         except queue.Empty:
@@ -121,7 +121,7 @@ class _Worker:
         settings = job.settings.model_dump(mode="json", exclude_none=True) | {"threads": threads}
         task = {"scene": os.fspath(job.scene), "out": str(job.out), "settings": settings, "force": force}
         assert self.process.stdin is not None
-        # If it has died meanwhile, the listening thread tells.
+        # If it has died meanwhile, the listening thread reports it.
         with contextlib.suppress(OSError):
             self.process.stdin.write(json.dumps(task).encode() + b"\n")
             self.process.stdin.flush()

@@ -193,16 +193,16 @@ def _check_outputs(path: Path, jobs: list[Job]) -> None:
     for job in jobs:
         if job.out is None:
             continue
-        place = os.path.normcase(job.out.resolve())
-        if place in owner:
+        folder = os.path.normcase(job.out.resolve())
+        if folder in owner:
             raise SettingsError(
-                f"'{owner[place].scene}' and '{job.scene}' would both be baked into '{job.out}'; "
+                f"'{owner[folder].scene}' and '{job.scene}' would both be baked into '{job.out}'; "
                 "give them different folders, for example with {parent} or {stem} in out",
                 file=str(path),
             )
-        owner[place] = job
-    for place, job in owner.items():
-        for parent in Path(place).parents:
+        owner[folder] = job
+    for folder, job in owner.items():
+        for parent in Path(folder).parents:
             other = owner.get(str(parent))
             if other is not None:
                 raise SettingsError(

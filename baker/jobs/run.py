@@ -136,7 +136,7 @@ class _Run:
 
     def run(self) -> list[Outcome]:
         """Look at every job, then bake."""
-        self.look_at_all()
+        self.survey()
         if not self.options.dry_run:
             try:
                 while self.waiting or self.running:
@@ -145,7 +145,7 @@ class _Run:
                     event = self.executor.next_event(_LOOK)
                     if event is not None:
                         self.hear(event)
-                    self.tell(blocked=blocked)
+                    self.report_all(blocked=blocked)
             finally:
                 # Nobody may bake there before what runs has ended and its leavings are gone.
                 self.executor.close()
@@ -153,13 +153,13 @@ class _Run:
                     _release(ticket)
         return [self.outcomes[number] for number in range(len(self.jobs))]
 
-    def look_at_all(self) -> None:
+    def survey(self) -> None:
         """Sort the jobs into unchanged, failed already, and to be baked."""
         pool = ThreadPoolExecutor(thread_count(self.options.threads))
         try:
-            looks = [pool.submit(self.look, number, job) for number, job in enumerate(self.jobs)]
-            for number, look in enumerate(looks):
-                found = look.result()
+            examined = [pool.submit(self.examine, number, job) for number, job in enumerate(self.jobs)]
+            for number, job_state in enumerate(examined):
+                found = job_state.result()
                 if isinstance(found, Outcome):
                     self.outcomes[number] = found
                 elif self.options.dry_run:
@@ -170,7 +170,7 @@ class _Run:
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def look(self, number: int, job: Job) -> Outcome | _Ticket:
+    def examine(self, number: int, job: Job) -> Outcome | _Ticket:
         """Decide about one job."""
         start = time.perf_counter()
         if job.out is None:
@@ -256,8 +256,8 @@ class _Run:
             self.finish(ticket, Outcome(ticket.job, "baked", ticket.seen.why, seconds))
             return
         error = event.error
-        told = BakerError(error["message"], file=error["file"], object=error["object"])
-        self.finish(ticket, Outcome(ticket.job, "failed", str(told), seconds, error["code"]))
+        failure = BakerError(error["message"], file=error["file"], object=error["object"])
+        self.finish(ticket, Outcome(ticket.job, "failed", str(failure), seconds, error["code"]))
         if self.options.fail_fast:
             for other in self.waiting:
                 why = f"not run, since '{ticket.job.scene}' failed (`fail_fast`)"
@@ -269,7 +269,7 @@ class _Run:
         self.outcomes[ticket.number] = outcome
         _release(ticket)
 
-    def tell(self, *, blocked: bool) -> None:
+    def report_all(self, *, blocked: bool) -> None:
         """Report all jobs as one stage."""
         n = len(self.jobs)
         names = [f"{t.job.scene.stem}: {t.stage} {t.fraction:.0%}" for t in self.running.values()]
@@ -308,6 +308,13 @@ def batch_json(outcomes: Sequence[Outcome], *, dry_run: bool) -> dict[str, Any]:
 
 def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
     """Write one JUnit case for each job.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    outcomes : sequence of Outcome
+        In the order of the jobs.
 
     Raises
     ------

@@ -57,13 +57,13 @@ def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, 
     from baker.core.settings import make_settings
     from baker.pipeline.bake import bake
 
-    told = 0.0
+    last_report = 0.0
 
     def progress(stage: str, fraction: float, detail: str = "", /) -> object:
-        nonlocal told
+        nonlocal last_report
         now = time.monotonic()
-        if now - told >= _INTERVAL:
-            told = now
+        if now - last_report >= _INTERVAL:
+            last_report = now
             _answer(sink, {"stage": stage, "fraction": fraction})
         return stop.is_set()
 
@@ -76,16 +76,27 @@ def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, 
 
 
 def describe(error: BaseException) -> dict[str, Any]:
-    """Return an error as plain values, with the exit code it stands for."""
+    """Return an error as plain values.
+
+    Parameters
+    ----------
+    error : BaseException
+        Errors that are not the user's count as `internal`.
+
+    Returns
+    -------
+    dict
+        {kind, message, file, object, code}; `code` is the exit code.
+    """
     known = explain(error)
     kind = "internal" if known is None else known.kind
-    told: BakerError = bug(error) if known is None else known
+    reported: BakerError = bug(error) if known is None else known
     return {
         "kind": kind,
-        "message": told.message,
-        "file": told.file,
-        "object": told.object,
-        "code": told.exit_code,
+        "message": reported.message,
+        "file": reported.file,
+        "object": reported.object,
+        "code": reported.exit_code,
     }
 
 
