@@ -241,7 +241,7 @@ def test_godot_shaders_read_uv2_and_divide_by_pi():
     for name, pi in (("lightmap.gdshader", "PI"), ("godot3/lightmap.shader", "3.14159265359")):
         source = template("godot", name)
         assert "texture(page, UV2 * uv_scale + uv_offset).rgb" in source
-        assert f"base * irradiance / {pi} + glow" in source
+        assert f"base * irradiance / {pi} + emitted" in source
         # No hint that would decode sRGB on the page.
         assert not re.search(r"sampler2D page\s*:.*(source_color|hint_albedo)", source)
 

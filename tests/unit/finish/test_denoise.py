@@ -17,13 +17,13 @@ from baker.finish.noise import estimate_error
 from baker.finish.oidn import LightmapDenoiser
 
 LIGHT = ComponentRules(0.0, np.inf, (slice(0, 3),))
-TINT = np.array([1.0, 0.85, 0.6], np.float32)
+COLOUR = np.array([1.0, 0.85, 0.6], np.float32)
 
 
 @pytest.fixture(scope="module")
 def lit():
     value, chart, _ = pages.make_page(pages.contact)
-    return value * TINT, chart
+    return value * COLOUR, chart
 
 
 def with_noise(value, share, seed=0):
@@ -95,13 +95,13 @@ def test_an_upper_bound_is_lowered_to_the_noise_that_is_seen(lit):
 
 def test_ambient_occlusion_is_filtered_as_grey_and_gaps_stay(lit):
     truth, chart = lit
-    open_share = np.ascontiguousarray(truth[..., :1] / truth.max())
-    noisy = with_noise(open_share, 0.1)
+    occlusion = np.ascontiguousarray(truth[..., :1] / truth.max())
+    noisy = with_noise(occlusion, 0.1)
     noisy[chart < 0] = 0.125
     clean = denoise_page(noisy, chart >= 0, chart)
     assert clean.shape == noisy.shape
     assert (clean[chart < 0] == 0.125).all()
-    assert wrong(clean, open_share, chart >= 0) < 0.4 * wrong(noisy, open_share, chart >= 0)
+    assert wrong(clean, occlusion, chart >= 0) < 0.4 * wrong(noisy, occlusion, chart >= 0)
 
 
 def test_same_bytes_for_any_threads_memory_and_run(lit):
@@ -251,7 +251,7 @@ def test_a_dim_chart_is_filtered_as_well_beside_bright_ones(lit, dim):
 
 
 @pytest.mark.parametrize("dim", [1.0, 1e-5])
-def test_what_is_worth_filtering_is_judged_by_its_own_light(lit, dim):
+def test_what_is_worth_filtering_depends_on_its_own_light(lit, dim):
     """A noisy chart beside a bright one without noise is filtered, and the bright one stays what it is."""
     truth, chart = lit
     own, others = chart == 0, chart > 0

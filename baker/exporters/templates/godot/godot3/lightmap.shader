@@ -1,4 +1,4 @@
-// Shows albedo * E / pi and the surface's own glow: E is the irradiance of a page, read through UV2.
+// Shows albedo * E / pi and its emission: E is the irradiance of a page, read through UV2.
 shader_type spatial;
 render_mode unshaded;
 
@@ -15,6 +15,6 @@ uniform float exposure = 1.0;
 void fragment() {
 	vec3 irradiance = texture(page, UV2 * uv_scale + uv_offset).rgb;
 	vec3 base = albedo.rgb * texture(albedo_texture, UV).rgb;
-	vec3 glow = emission.rgb * texture(emission_texture, UV).rgb * emission_energy;
-	ALBEDO = (base * irradiance / 3.14159265359 + glow) * exposure;
+	vec3 emitted = emission.rgb * texture(emission_texture, UV).rgb * emission_energy;
+	ALBEDO = (base * irradiance / 3.14159265359 + emitted) * exposure;
 }
