@@ -27,6 +27,7 @@ from report import put_into, table
 from baker.core.parallel import thread_count
 from baker.io.load import load_scene
 from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import new_estimate
@@ -82,11 +83,11 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
         met = np.flatnonzero(hits.lit)
         where = [a[met][:, None] for a in (hits.position, hits.normal, hits.face_normal)]
         reach = 0.1 * reference.geometry.diagonal
-        how = {"estimator": "mis", "max_bounces": SEGMENTS - 2}
         for turn in range(repeat + 1):
+            options = PassOptions("mis", max_bounces=SEGMENTS - 2, seed=turn)
             estimate = new_estimate(n, 3, spp)
             start = perf_counter()
-            radiance_pass(reference, estimate, camera, WIDTH, HEIGHT, seed=turn, **how)
+            radiance_pass(reference, estimate, camera, WIDTH, HEIGHT, options=options)
             own = perf_counter() - start
             start = perf_counter()
             picture = mi.render(other, integrator=path_type, spp=spp, seed=turn)

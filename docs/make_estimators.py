@@ -22,7 +22,7 @@ from PIL import Image
 from baker.core.scene import Camera, Instance, Material, Mesh, Scene
 from baker.io.png import srgb_levels
 from baker.pathtracer.camera import look_at
-from baker.pathtracer.estimators import ESTIMATORS
+from baker.pathtracer.estimators import ESTIMATORS, PassOptions
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.radiance import radiance_pass
 from baker.pathtracer.scene import build_reference
@@ -193,7 +193,7 @@ def render(view: View, name: str, *, width: int, height: int, passes: int, rays:
         while estimate.rounds < 2 or (
             estimate.rays * (1 + 0.5 / estimate.rounds) < rays if rays else estimate.rounds < passes
         ):
-            radiance_pass(reference, estimate, view.camera, width, height, estimator=name)
+            radiance_pass(reference, estimate, view.camera, width, height, options=PassOptions(name))
     return estimate
 
 

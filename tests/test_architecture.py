@@ -106,6 +106,33 @@ def test_no_file_is_long():
     assert len(found) > 60
 
 
+def long_functions(tree):
+    """Yield (name, lines without docstring, parameters without self) of the functions that are no kernels."""
+    marks = {"kernel", "inner", "cfunc"}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        names = {n.id for mark in node.decorator_list for n in ast.walk(mark) if isinstance(n, ast.Name)}
+        if names & marks:
+            continue
+        first = node.body[0]
+        text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+        docstring = first.end_lineno - first.lineno + 1 if text else 0
+        arguments = [a.arg for a in node.args.posonlyargs + node.args.args + node.args.kwonlyargs]
+        lines = node.end_lineno - node.lineno + 1 - docstring
+        yield node.name, lines, len([name for name in arguments if name not in ("self", "cls")])
+
+
+def test_no_function_is_long():
+    found = [
+        (name_of(path), *function)
+        for path in sources(*PACKAGES)
+        for function in long_functions(tree_of(path))
+    ]
+    assert [f for f in found if f[2] > 60 or f[3] > 8] == []
+    assert len(found) > 1000
+
+
 @pytest.mark.parametrize("library", HEAVY)
 def test_a_heavy_library_has_one_home(library):
     homes = [name_of(path) for path in sources(*PACKAGES) if library in imported(path)]

@@ -10,6 +10,7 @@ simulation, 1997, ch. 8 and 9.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from baker.core.names import unknown_name
@@ -38,6 +39,32 @@ class Estimator(NamedTuple):
     strata: int = 0
     power: int = 0
     both: int = 0
+
+
+@dataclass(frozen=True)
+class PassOptions:
+    """How a pass samples paths.
+
+    Attributes
+    ----------
+    estimator : str
+        A key of `ESTIMATORS`.
+    stratify : bool
+        Stratify the first directions at points of surfaces, even if the estimator does not.
+    max_bounces : int or None
+        Reflections before light arrives at a point, or between light and the first surface that a camera
+        sees; None is unlimited.
+    seed : int
+        Of all random numbers.
+    """
+
+    estimator: str = "mis"
+    stratify: bool = True
+    max_bounces: int | None = None
+    seed: int = 0
+
+
+DEFAULT_OPTIONS = PassOptions()
 
 
 class PathSettings(NamedTuple):

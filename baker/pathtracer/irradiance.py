@@ -17,9 +17,10 @@ from baker.core.parallel import run_tiles
 from baker.core.progress import Progress, silent
 from baker.core.stage import Stage
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed
-from baker.pathtracer.estimators import Estimator, PathSettings, estimator_named
+from baker.pathtracer.estimators import DEFAULT_OPTIONS, PassOptions, estimator_named
 from baker.pathtracer.occlusion import alike_within, are_dense, near_together, open_rays
 from baker.pathtracer.path_blocks import new_path_memory
+from baker.pathtracer.path_settings import path_settings
 from baker.pathtracer.paths import trace_paths
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.rng import seed_salt
@@ -36,10 +37,7 @@ def irradiance_pass(
     normal: NDArray[np.float64],
     face_normal: NDArray[np.float64],
     *,
-    estimator: str = "mis",
-    stratify: bool = True,
-    max_bounces: int | None = None,
-    seed: int = 0,
+    options: PassOptions = DEFAULT_OPTIONS,
     chosen: NDArray[np.int64] | None = None,
     progress: Progress = silent,
 ) -> None:
@@ -58,31 +56,25 @@ def irradiance_pass(
         Shading normals, unit, world.
     face_normal : (n, k, 3) float64
         Geometric normals, unit, world, on the side at which light arrives.
-    estimator : str
-        A key of `ESTIMATORS`.
-    stratify : bool
-        Stratify a pass's first directions, even if the estimator does not.
-    max_bounces : int, optional
-        Reflections before light arrives; None is unlimited.
-    seed : int
-        Of all random numbers.
+    options : PassOptions
+        Estimator, stratification, number of reflections and seed.
     chosen : (m,) int64, optional
         Only these points, all by default.
     progress : Progress
         Called with stage, fraction and detail.
     """
-    options = estimator_named(estimator)
+    estimator = estimator_named(options.estimator)
     number, samples = estimate.rounds, estimate.samples
     picked = np.arange(len(position)) if chosen is None else chosen
-    sobol_points = sobol_reversed(samples, seed, 1 + number)
-    settings = path_settings(options, options.strata or stratify, max_bounces, seed, number)
+    sobol_points = sobol_reversed(samples, options.seed, 1 + number)
+    settings = path_settings(estimator, estimator.strata or options.stratify, options, number)
     counted = np.zeros((-(-len(picked) // _TILE), 2), np.int64)
 
     def work(begin: int, end: int) -> None:
         rows = picked[begin:end]
         out = np.zeros((end - begin, 3))
         points = (position[rows], normal[rows], face_normal[rows])
-        if options.both:
+        if estimator.both:
             # Imported here: other estimators do not load its kernels.
             from baker.pathtracer.bidirectional_pass import surface_tile
 
@@ -165,32 +157,3 @@ def ambient_occlusion_pass(
     )
     estimate.rounds += 1
     estimate.rays += len(position) * samples
-
-
-def path_settings(
-    options: Estimator, strata: int | bool, max_bounces: int | None, seed: int, number: int
-) -> PathSettings:
-    """Return the settings of a pass for kernels.
-
-    Parameters
-    ----------
-    options : Estimator
-        Its `strata` is replaced by the next parameter.
-    strata : int or bool
-        Whether the first two random pairs of a path are stratified.
-    max_bounces : int or None
-        None: no limit.
-    seed : int
-        Of all random numbers.
-    number : int
-        The pass.
-
-    Returns
-    -------
-    PathSettings
-        All numbers are int, so that kernels are compiled once.
-    """
-    bounces = -1 if max_bounces is None else max_bounces
-    return PathSettings(
-        options.hemisphere, options.aim, int(strata), options.power, bounces, seed, number, seed_salt(seed)
-    )

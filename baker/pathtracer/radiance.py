@@ -10,9 +10,9 @@ from baker.core.scene import Camera
 from baker.core.stage import Stage
 from baker.kernels.sampling import sobol_reversed
 from baker.pathtracer.camera import camera_rays
-from baker.pathtracer.estimators import estimator_named
-from baker.pathtracer.irradiance import path_settings
+from baker.pathtracer.estimators import DEFAULT_OPTIONS, PassOptions, estimator_named
 from baker.pathtracer.path_blocks import new_path_memory
+from baker.pathtracer.path_settings import path_settings
 from baker.pathtracer.paths import trace_paths
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
@@ -27,9 +27,7 @@ def radiance_pass(
     width: int,
     height: int,
     *,
-    estimator: str = "mis",
-    max_bounces: int | None = None,
-    seed: int = 0,
+    options: PassOptions = DEFAULT_OPTIONS,
     progress: Progress = silent,
 ) -> None:
     """Add one pass of path-traced radiance, cd/m2, through every pixel to an estimate.
@@ -46,12 +44,8 @@ def radiance_pass(
         Pixels.
     height : int
         Pixels.
-    estimator : str
-        A key of `ESTIMATORS`.
-    max_bounces : int, optional
-        Reflections between light and camera beyond the first; None is unlimited.
-    seed : int
-        Of all random numbers.
+    options : PassOptions
+        Estimator, number of reflections beyond the first, and seed.
     progress : Progress
         Called with stage, fraction and detail.
 
@@ -62,11 +56,11 @@ def radiance_pass(
     Cancelled
         If `progress` returned a truthy value.
     """
-    options = estimator_named(estimator)
+    estimator = estimator_named(options.estimator)
     samples, number = estimate.samples, estimate.rounds
-    sobol_points = sobol_reversed(samples, seed, 1 + number)
-    settings = path_settings(options, options.strata, max_bounces, seed, number)
-    if options.both:
+    sobol_points = sobol_reversed(samples, options.seed, 1 + number)
+    settings = path_settings(estimator, estimator.strata, options, number)
+    if estimator.both:
         # Here: other estimators need not load its kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
@@ -77,7 +71,7 @@ def radiance_pass(
 
     def work(begin: int, end: int) -> None:
         pixel = np.arange(begin, end)
-        direction = camera_rays(camera, width, height, pixel, samples, seed, number)
+        direction = camera_rays(camera, width, height, pixel, samples, options.seed, number)
         out = np.zeros((end - begin, 3))
         cast = trace_paths(
             eye, direction, direction, begin, False, reference.surfaces, reference.lights, reference.shading,

@@ -18,6 +18,7 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Camera
 from baker.core.stage import Stage
 from baker.pathtracer.camera import camera_rays
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.first_hit import FirstHits, first_hits
 from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import PointEstimate, add_pass, new_estimate
@@ -124,11 +125,11 @@ def traced(run: Run) -> PointEstimate:
     settings = run.settings
     estimate = new_estimate(run.pixels, 3, run.samples(_PASS, _RATE))
     bounces = None if settings.max_depth is None else settings.max_depth - 1
+    options = PassOptions(settings.estimator, max_bounces=bounces, seed=settings.seed)
     while not run.enough(estimate):
         radiance_pass(
             run.reference, estimate, run.camera, settings.width, settings.height,
-            estimator=settings.estimator, max_bounces=bounces, seed=settings.seed,
-            progress=run.within(estimate),
+            options=options, progress=run.within(estimate),
         )  # fmt: skip
     return estimate
 

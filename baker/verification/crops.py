@@ -16,6 +16,7 @@ from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import surface_points
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.scene import Reference
@@ -135,11 +136,12 @@ def _trace(
     estimate = new_estimate(len(pixel), 1 if occlusion else 3)
     metres = bake.manifest.get("settings", {}).get("ao_distance_metres")
     distance = np.inf if metres is None else float(metres)
+    options = PassOptions(max_bounces=bounces, seed=seed)
     for _ in range(_PASSES):
         if occlusion:
             ambient_occlusion_pass(reference, estimate, *where, distance=distance, seed=seed)
         else:
-            irradiance_pass(reference, estimate, *where, max_bounces=bounces, seed=seed)
+            irradiance_pass(reference, estimate, *where, options=options)
         if time.monotonic() > end:
             break
     truth[row, column] = estimate.mean

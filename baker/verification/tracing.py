@@ -19,6 +19,7 @@ from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.metrics.error_metrics import dark_floor
 from baker.metrics.texel_area import SurfacePoints
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
@@ -146,7 +147,7 @@ def trace_irradiance(
     while True:
         irradiance_pass(
             reference, estimate, points.position, points.normal, points.face_normal,
-            max_bounces=bounces, seed=effort.seed, chosen=chosen,
+            options=PassOptions(max_bounces=bounces, seed=effort.seed), chosen=chosen,
         )  # fmt: skip
         if goal is not None:
             report(progress, Stage.PATH_TRACING, estimate.rounds / goal)

@@ -16,6 +16,7 @@ import baker.pathtracer.bidirectional_pass as bidirectional_pass
 from baker.core.scene import PunctualLight
 from baker.pathtracer.bsdf import bsdf_eval
 from baker.pathtracer.camera import look_at
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.irradiance import irradiance_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.radiance import radiance_pass
@@ -30,7 +31,7 @@ def picture(scene, camera, estimator, passes, *, sky=(0, 0, 0), samples=16, size
     with build_reference(scene, sky=sky, threads=threads) as reference:
         estimate = new_estimate(size * size, 3, samples)
         for _ in range(passes):
-            radiance_pass(reference, estimate, camera, size, size, estimator=estimator, **how)
+            radiance_pass(reference, estimate, camera, size, size, options=PassOptions(estimator, **how))
     shape = (size, size, 3)
     return estimate.mean.reshape(shape), estimate.standard_error.reshape(shape), estimate.rays
 
@@ -141,7 +142,7 @@ def test_connections_win_where_light_comes_through_a_gap():
         with build_reference(gap_room(), lambertian=True, threads=2) as reference:
             estimate = new_estimate(128, 3, 16)
             for _ in range(40):
-                irradiance_pass(reference, estimate, position, up, up, estimator=name)
+                irradiance_pass(reference, estimate, position, up, up, options=PassOptions(name))
         mean[name] = estimate.mean[:, 0], estimate.standard_error[:, 0]
         cost[name] = (estimate.standard_error[:, 0] ** 2).mean() * estimate.rays
     away = abs(mean["mis"][0].sum() - mean["bdpt"][0].sum())

@@ -12,6 +12,7 @@ from baker.checks.context import CheckContext
 from baker.comparison.compare import compare
 from baker.core.settings import make_settings
 from baker.pathtracer.camera import look_at
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.irradiance import ambient_occlusion_pass
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.radiance import radiance_pass
@@ -93,7 +94,7 @@ def test_pictures_are_taken_from_cameras_in_the_world(estimator):
         moved = replace(camera, position=tuple(np.array(camera.position) + at))
         with build_reference(room(at if at.any() else None), threads=2) as reference:
             estimate = new_estimate(16 * 16, 3, 16)
-            radiance_pass(reference, estimate, moved, 16, 16, estimator=estimator)
+            radiance_pass(reference, estimate, moved, 16, 16, options=PassOptions(estimator))
         seen.append(estimate.mean)
     assert seen[0].mean() > 0.01
     np.testing.assert_allclose(seen[1].mean(), seen[0].mean(), rtol=0.01)

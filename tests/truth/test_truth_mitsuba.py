@@ -14,6 +14,7 @@ import pytest
 from ztest import critical
 
 from baker.io.load import load_scene
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.irradiance import irradiance_pass
 from baker.pathtracer.point_estimate import new_estimate
@@ -77,9 +78,10 @@ def test_pictures(mi, name, estimator):
         expected = batches(np.stack(seen).astype(float).reshape(shape).mean(axis=(2, 4)))
         own = []
         for k in range(BATCHES):
+            options = PassOptions(estimator, seed=k)
             estimate = new_estimate(WIDTH * HEIGHT, 3, 32)
             for _ in range(2):
-                radiance_pass(reference, estimate, camera, WIDTH, HEIGHT, estimator=estimator, seed=k)
+                radiance_pass(reference, estimate, camera, WIDTH, HEIGHT, options=options)
             own.append(estimate.mean)
     compare(batches(np.stack(own).reshape(shape).mean(axis=(2, 4))), expected, 0.01)
 
@@ -137,7 +139,7 @@ def test_irradiance(mi, name):
             expected.append(seen)
             estimate = new_estimate(len(flat), 3, n_places)
             for _ in range(128):
-                irradiance_pass(reference, estimate, place, normal, normal, seed=seed)
+                irradiance_pass(reference, estimate, place, normal, normal, options=PassOptions(seed=seed))
             own.append(estimate.mean)
     compare(batches(np.array(own)), batches(np.array(expected, float)), 0.02)
 

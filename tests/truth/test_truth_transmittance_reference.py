@@ -14,6 +14,7 @@ from tiny_scenes import Quad, box_quads, grey, quad_scene
 from ztest import critical
 
 from baker.core.scene import Camera, Material, PunctualLight
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.point_estimate import new_estimate
 from baker.pathtracer.radiance import radiance_pass
@@ -68,7 +69,7 @@ def test_a_pane_before_the_sky_in_a_picture(estimator):
     estimate = new_estimate(64, 3, 16)
     with build_reference(quad_scene([pane]), sky=(1.0, 1.0, 1.0), lambertian=True, threads=2) as reference:
         for _ in range(16):
-            radiance_pass(reference, estimate, VIEW, 8, 8, estimator=estimator)
+            radiance_pass(reference, estimate, VIEW, 8, 8, options=PassOptions(estimator))
     found, error = estimate.mean.mean(axis=0), np.sqrt((estimate.standard_error**2).sum(axis=0)) / 64
     assert (np.abs(found - passed(COLOUR, HALF) - HALF * COLOUR) < 4 * error + 1e-4).all()
     assert (error < 0.005).all()
