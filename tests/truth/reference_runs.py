@@ -12,6 +12,7 @@ import numpy as np
 from scipy import stats
 
 from baker.core.scene import Scene
+from baker.pathtracer.estimators import PassOptions
 from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.scene import Reference, build_reference
@@ -59,7 +60,8 @@ def traced(
 ) -> PointEstimate:
     """Return path-traced irradiance; `where` is position and normal, or a function of the pass number."""
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
-        return _passes(irradiance_pass, reference, where, 3, passes, samples, {"seed": SEED, **how})
+        options = PassOptions(**{"seed": SEED, **how})
+        return _passes(irradiance_pass, reference, where, 3, passes, samples, {"options": options})
 
 
 def traced_ao(
