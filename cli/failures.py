@@ -75,11 +75,16 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
 
 
 def _line(error: BakerError) -> str:
-    """Return file, object and message in one line; a message that begins with its object repeats nothing."""
+    """Return file, object and message in one line; a message that begins with its object repeats nothing.
+
+    The object of a wrong setting that no file holds is a flag.
+    """
     if error.object and error.message.startswith((f"`{error.object}`", f"'{error.object}'")):
         parts = [error.file, error.message]
     else:
-        parts = [error.file, error.object, error.message]
+        of_flag = isinstance(error, SettingsError) and error.object and not error.file
+        named = in_flags(f"`{error.object}`").strip("`") if of_flag else error.object
+        parts = [error.file, named, error.message]
     return in_flags(_sentence(": ".join(part for part in parts if part)))
 
 

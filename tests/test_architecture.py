@@ -106,6 +106,13 @@ def test_no_file_is_long():
     assert len(found) > 60
 
 
+def test_no_two_tests_have_one_name():
+    """Files of tests are imported by their name alone: two of one name cannot be collected."""
+    names = [path.name for path in sources("tests") if path.name.startswith("test_")]
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+    assert len(names) > 150
+
+
 def long_functions(tree):
     """Yield (name, lines without docstring, parameters without self) of the functions that are no kernels."""
     marks = {"kernel", "inner", "cfunc"}

@@ -164,17 +164,18 @@ def test_limits_decide_the_exit_code(sound):
 @pytest.mark.parametrize(
     ("argv", "code", "said"),
     [
-        (["--fail-if", "irradiance.p59 > 1"], 2, "did you mean"),
+        (["--fail-if", "irradiance.p59 > 1"], 2, "there is no figure 'p59'; did you mean"),
         (["--fail-if", "nonsense"], 2, "not of the form"),
         (["--texels", "0"], 2, "--texels"),
         (["--spp", "0"], 2, "--spp"),
         (["--time-limit", "-1"], 2, "--time-limit"),
     ],
 )
-def test_wrong_use(sound, argv, code, said):
+def test_wrong_use(sound, argv, code, said, capsys):
     got, found = told(sound, *argv)
     assert got == code
     assert said in found["error"]["message"]
+    assert capsys.readouterr().err.startswith(f"baker: {argv[0]}")
 
 
 def test_what_is_no_bake(tmp_path):

@@ -83,7 +83,6 @@ def _short(text: str) -> str:
 
 def _check_consistency(manifest: dict[str, Any]) -> None:
     """Raise ValueError if parts of a manifest that is valid by the schema contradict each other."""
-    _finite(manifest["pages"], "pages")
     _finite(manifest["instances"], "instances")
     by_channel: dict[str, list[int]] = {}
     sizes = set()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import pytest
 from io_scenes import quad_result
 
 from baker.core.errors import InputError, SettingsError
-from baker.io.bake.output_folder import OutputFolder, check_out, own_files
+from baker.core.settings import make_settings
+from baker.io.bake.output_folder import OutputFolder, check_out, own_files, remove_leftovers
 from baker.io.bake.read_bake import read_bake
 from baker.io.bake.read_manifest import read_manifest
 from baker.io.bake.write_bake import write_bake
 from baker.io.inspect import inspect_path
+from baker.io.temporary import temporaries
 
 
 @pytest.fixture
@@ -105,6 +108,15 @@ def test_any_value_of_any_other_type_is_refused_or_read(out: Path) -> None:
     assert min(refused, read) > 50
 
 
+def test_the_ranges_of_encodings_are_read_back(tmp_path: Path) -> None:
+    """The largest number that an encoding holds may be the largest of float32."""
+    result = quad_result(tmp_path / "in")
+    settings = make_settings({"encode": ["hdr", "rgbm"]})
+    manifest = write_bake(replace(result, settings=settings), tmp_path / "out")
+    assert max(e["max"] for page in manifest["pages"] for e in page["encodings"]) > 1e38
+    assert read_manifest(tmp_path / "out")["pages"] == manifest["pages"]
+
+
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, '{"a":' * 900 + "1" + "}" * 900, "NaN", "[1]", '"bake"', "\x00"]
 )
@@ -142,9 +154,6 @@ def test_a_manifest_that_names_a_file_outside_is_not_bakers(out: Path, tmp_path:
 
 
 def test_leftovers_are_not_put_back_through_a_link(tmp_path: Path) -> None:
-    from baker.io.bake.output_folder import remove_leftovers
-    from baker.io.temporary import temporaries
-
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     elsewhere.mkdir()
     (out / ".baker-1-00000000-old" / "link").mkdir(parents=True)
