@@ -1,20 +1,20 @@
 """Denoises a lightmap page without darkening chart borders and without inventing light.
 
-1. Every chart's picture is continued into the gaps by reflection, since the filter takes the page for a
-   photograph and would draw the empty texels' black over the borders.
+1. Empty texels are filled by reflection at the borders of charts, since the filter would mix the black of
+   empty texels into the borders.
 2. Open Image Denoise's lightmap filter runs over the part of the page that has charts.
-3. The result is held to the samples: see `baker.finish.kernels.page_guard`.
+3. The change of each texel is limited by the error of the samples: see `baker.finish.kernels.page_guard`.
 
-Call it for direct and indirect light apart and add the results, after `recentre` and before `dilate`.
-*Measured* on a sharp shadow edge over noisy indirect light, RMS error together and apart: 1.5 and 0.9 % with
-exact direct light and 5 % noise, 4.0 and 3.0 % with 10 and 20 % noise; at the edge itself 2.5 and 0.6 %,
-7.7 and 4.8 %.
-*Measured* with 20 % noise and contact shadows, outermost ring of charts: 16 % too dark with black gaps;
-RMS error 11.6 % with the nearest texel's value in the gaps, 8.7 % (bias +2.7 %) with a plain reflection,
-6.1 % (bias +0.2 %) with the reflection along the slope.
-*Measured* on AO with 256 rays, told the binomial error and what the page shows of it: RMS error in shares of
-the mean 0.0095 and 0.0067 in the hall (not denoised 0.0080; worst texel 0.21 and 0.09), 0.0061 and 0.0056 in
-the interior, 0.0022 and 0.0029 in Cornell. Told too much, contact shadows are blurred.
+Call it separately for direct and indirect light and add the results, after `recentre` and before `dilate`.
+*Measured* on a sharp shadow edge over noisy indirect light, RMS error of the sum denoised at once and of the
+separate parts: 1.5 and 0.9 % with exact direct light and 5 % noise, 4.0 and 3.0 % with 10 and 20 % noise; at
+the edge itself 2.5 and 0.6 %, 7.7 and 4.8 %. *Measured* with 20 % noise and contact shadows, outermost ring
+of charts: 16 % too dark with black gaps; RMS error 11.6 % with the nearest texel's value in the gaps, 8.7 %
+(bias +2.7 %) with reflection only, 6.1 % (bias +0.2 %) with reflection along the fitted plane. *Measured* on
+AO with 256 rays, with the binomial error and with that error lowered to the noise estimated from the page:
+RMS error relative to the mean 0.0095 and 0.0067 in the hall (not denoised 0.0080; worst texel 0.21 and 0.09),
+0.0061 and 0.0056 in the interior, 0.0022 and 0.0029 in Cornell. An error that is too large blurs contact
+shadows.
 
 Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the page filling follows from what
 the filter does at gaps.
@@ -40,9 +40,9 @@ from baker.finish.tiles import over_rows
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
-# The filter looks this far (its tile overlap): no chart's reflection needs to reach deeper.
+# Radius of the filter, texels (its tile overlap); reflections need no larger distance.
 REACH = 96
-# Smallest number of mirrored texels around the picture, and the multiple that its sides are extended to: the
+# Smallest number of mirrored texels around the image, and the multiple that its sides are extended to: the
 # filter shifts the colour of the outermost texels, more where it has to fill up its blocks of 16 itself. Grey
 # with 5 % noise, pages of 225 to 240: RMS error of the outermost 8 texels 0.37 to 0.38 % with it, 0.36 to
 # 0.41 % with a margin of 16.
@@ -51,8 +51,8 @@ MARGIN, BLOCK = 8, 16
 SLOPE_RADIUS = 4
 # Texels whose slopes are fitted at a time.
 _BORDER_TEXELS = 4096
-# Share of the noise seen on a page that an upper bound is lowered to: the real error of AO is 0.95 to 1.2
-# times what is seen (Cornell, interior, hall; 16 to 256 rays).
+# An upper bound of the error is lowered to this multiple of the noise estimated from the page: the error of
+# AO is 0.95 to 1.2 times that noise (Cornell, interior, hall; 16 to 256 rays).
 FITTED = 1.2
 # Charts brighter or darker than the page's median by more than this factor are scaled to it for the filter.
 LEVEL = 8.0
@@ -98,11 +98,12 @@ def denoise_page(
     Raises
     ------
     ValueError
-        If the arrays do not belong together, C is neither 1 nor 3, or signed values have three components.
+        If shapes or types of the arrays do not match, C is neither 1 nor 3, or signed values have three
+        components.
     ResourceError
         If Open Image Denoise cannot be loaded or runs out of memory.
     Cancelled
-        If `progress` asked to stop.
+        If `progress` returned a truthy value.
     """
     _check_input(value, covered, chart, standard_error, signed)
     result = np.array(value)
@@ -173,7 +174,7 @@ def _margins(side: int) -> tuple[int, int]:
 def _levels(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Return (H, W, 1) what to divide each chart by; 1 for charts about as bright as the page's median."""
+    """Return (H, W, 1) the divisor of each chart; 1 for charts about as bright as the page's median."""
     n = int(chart.max(initial=-1)) + 1
     total, count = np.zeros(n), np.zeros(n, np.int64)
     chart_sums(value, LUMINANCE, chart, covered, total, count)
@@ -216,8 +217,8 @@ def surround_charts(
 ) -> NDArray[np.float32]:
     """Fill every empty texel of a page with the reflection of the nearest chart.
 
-    This is the place for surroundings that know more: the texels across a chart's seam, resampled from the
-    neighbouring chart on the surface, belong here instead of the reflection.
+    Values resampled from the neighbouring chart across a seam would be better than the reflection; they would
+    be inserted here.
 
     Parameters
     ----------

@@ -22,8 +22,8 @@ from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
 # A layer is not denoised if the RMS noise of all texels of similar brightness is below this share of their
-# light: a second pass of the filter gained nothing (Cornell, 64 samples: 0.33 % median error with it, 0.35 %
-# without).
+# light: a second pass of the filter did not lower the error (Cornell, 64 samples: 0.33 % median error with
+# it, 0.35 % without).
 NOT_WORTH_FILTERING = 0.02
 # Charts belong to one brightness band if their mean light is within this factor. Bands of fewer texels do
 # not count.
@@ -196,7 +196,7 @@ def finish_page(
     ResourceError
         If Open Image Denoise cannot be loaded or runs out of memory.
     Cancelled
-        If `progress` asked to stop.
+        If `progress` returned a truthy value.
     """
     total = np.zeros_like(layers[0].value)
     light = _light(plan, layers, rules)
@@ -222,9 +222,10 @@ def finish_page(
 def _denoised(
     plan: PagePlan, layer: PageLayer, light: _Light, rules: ComponentRules, finisher: Finisher
 ) -> NDArray[np.float32]:
-    """Return a filled layer (H, W, C) float32 with the charts denoised that are worth it.
+    """Return a filled layer (H, W, C) float32 with the noisy charts denoised.
 
-    Signed components do not get back the sums that the filter took: a share of a sum near 0 means nothing.
+    The sums that the filter changed are not restored in signed components, since relative changes of a sum
+    near 0 are meaningless.
     """
     denoiser = finisher.denoiser
     worth = _worth_filtering(plan, _mean_error(layer, rules), light) if denoiser else None

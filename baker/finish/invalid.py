@@ -1,7 +1,7 @@
 """Fills invalid texels from the valid ones of their own chart.
 
-A texel inside other geometry sees only back faces; its own value means nothing, yet bilinear lookups of the
-visible surface beside it read it.
+The rays of a texel inside other geometry hit only back faces, so its value is meaningless; but bilinear
+lookups on the visible surface beside it read it.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ _RING_WEIGHTS = (0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5)
 def fill_invalid(
     value: NDArray[np.float32], chart: NDArray[np.int32], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], int]:
-    """Replace covered but invalid texels by values grown from their chart's valid texels.
+    """Replace covered but invalid texels by means of their chart's valid texels.
 
-    Grown ring by ring, nearest first: the two sides of an invalid strip keep their own light, where a smooth
-    membrane between them would carry light from one room into the next.
+    Values are propagated ring by ring, nearest first, so the two sides of an invalid strip are not mixed, as
+    a smooth interpolation between two rooms would do.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def fill_invalid(
     value : (H, W, C) float32
         A new page; valid and empty texels are unchanged.
     n_hopeless : int
-        Texels of charts without any valid texel; they keep what was measured, 0 if that is no number.
+        Texels of charts without any valid texel; they keep their values, 0 if these are not finite.
 
     Raises
     ------
     ValueError
-        If the arrays do not belong together.
+        If shapes or types of the arrays do not match.
     """
     check_page(value, chart, valid=valid)
     filled = np.array(value, order="C")
@@ -78,7 +78,8 @@ def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDA
     """Fill the unknown texels of each chart ring by ring from its known ones, in place.
 
     A texel of the next ring takes the mean of its known 8-neighbours of the same chart (edge neighbours
-    weigh 1, diagonal ones 1/2). A ring is finished before its values are used, so no order of texels matters.
+    weigh 1, diagonal ones 1/2). A ring is finished before its values are used, so the result does not depend
+    on the order of texels.
 
     value (H, W, C) float32 and known (H, W) bool change at the texels that get filled; chart : (H, W) int32,
     -1 = empty

@@ -1,7 +1,7 @@
-"""Estimates a page's noise from the page itself, for callers that have no error bars.
+"""Estimates a page's noise from the page itself, for callers without standard errors.
 
-The filter is blind to planes, and the median over a block to the few texels on a shadow's edge; what is left
-is the texel-to-texel noise.
+The high-pass filter is 0 on planes, and the median over a block ignores the few texels on a shadow's edge;
+the rest is the noise between texels.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from baker.finish.kernels.page_guard import high_pass
 from baker.finish.tiles import over_rows
 
 BLOCK = 16
-# Fewer texels than this in a block say too little: the chart's (then the page's) median stands in.
+# In a block of fewer texels, the median of the chart is used, or that of the page.
 FEWEST = 12
 # Median of |x| of a standard normal variable.
 NORMAL_MEDIAN = 0.6744898
@@ -64,7 +64,7 @@ def _grouped_median(
     known: NDArray[np.bool_],
     otherwise: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    # Upper median of the known sizes of each element's group, `otherwise` where the group knows too few.
+    # Upper median of the known sizes of each element's group, `otherwise` if fewer than FEWEST are known.
     _, index = np.unique(group, return_inverse=True)
     count = np.bincount(index[known], minlength=int(index.max()) + 1)
     order = np.lexsort((size[known], index[known]))

@@ -1,4 +1,4 @@
-"""Runs Open Image Denoise's filters; the only file that knows `pyoidn`.
+"""Runs Open Image Denoise's filters; the only file that imports `pyoidn`.
 
 *Measured* with OIDN 2.5.1 on the CPU: the same bytes for 1 and 2 threads, from run to run, and for any
 `memory_mb` (its tiles overlap by the network's whole field of view). The lightmap filter has one network:
@@ -54,7 +54,7 @@ def filter_picture(
     threads: int = 0,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
-    """Denoise one HDR picture of a camera with what its first hits are made of.
+    """Denoise one HDR picture of a camera, guided by albedo and normals of its first hits.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class LightmapDenoiser:
             Linear light, finite and not negative; or finite values of both signs. Every pixel counts, there
             are no gaps.
         progress : Progress
-            Gets the fraction done; a truthy answer stops the filter.
+            Called with the fraction done; a truthy return value stops the filter.
         signed : bool
             Use the filter's mode for coefficients of directional lightmaps in [-1, 1]; they are scaled to
             that range here.
@@ -155,7 +155,7 @@ class LightmapDenoiser:
         ResourceError
             If the library cannot be loaded or runs out of memory.
         Cancelled
-            If `progress` asked to stop.
+            If `progress` returned a truthy value.
         """
         library = _library()
         if self._device is None:
@@ -233,7 +233,7 @@ class _Monitor:
         return self._caught is None
 
     def finish(self) -> None:
-        """Raise what was caught while the filter ran."""
+        """Raise the exception that was caught while the filter ran."""
         if self._caught is not None:
             raise self._caught
 

@@ -1,4 +1,4 @@
-"""What every finishing stage asks of page arrays: do they fit together, how bright are their charts."""
+"""Checks of the shapes of page arrays, and the largest values of charts, for all finishing stages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from baker.finish.kernels.page_charts import chart_maxima
 
 
 def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: NDArray[Any]) -> None:
-    """Refuse page arrays that do not belong together.
+    """Check that page arrays have matching shapes and types.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: ND
     Raises
     ------
     ValueError
-        If shapes or types do not fit; this is a mistake in the calling code, not in a scene.
+        If shapes or types differ from these; this is an error of the caller, not of a scene.
     """
     if value.ndim != 3 or value.dtype != np.float32:
         raise ValueError(f"value must be (H, W, C) float32, it is {value.shape} {value.dtype}")

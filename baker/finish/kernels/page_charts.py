@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""What the charts of a lightmap page hold: largest values, mean light, boxes."""
+"""Statistics of the charts of a lightmap page: largest values, mean light, bounding boxes."""
 
 from __future__ import annotations
 

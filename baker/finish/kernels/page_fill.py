@@ -1,7 +1,7 @@
-"""Kernels that carry values over a lightmap page: nearest texel, reflection.
+"""Kernels that fill empty texels of a lightmap page: nearest texel, reflection at chart borders.
 
-All of them know charts: a value never crosses from one chart into another.
-The nearest texel is exact (Euclidean), in linear time.
+`nearest_texel` computes exact Euclidean distances in linear time. `reflect_outwards` reads only texels of the
+chart that the nearest texel belongs to.
 
 Based on: Meijster, Roerdink, Hesselink, A General Algorithm for Computing Distance Transforms in Linear
 Time, 2000.
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# A reflected picture follows its border's slope this far, texels, and never by more than this factor.
+# Largest distance, texels, over which reflected values follow the plane fit at the border, and largest factor
+# by which it changes them.
 SLOPE_REACH = 6.0
 MOST = 4.0
 
@@ -26,8 +27,8 @@ def nearest_texel(mask: NDArray[np.bool_], out: NDArray[np.int32]) -> None:
     ----------
     mask : (H, W) bool
     out : (H, W) int32
-        Receives row * W + column of the nearest set texel, -1 everywhere if none is set. Among equally
-        near ones the choice depends on the mask alone.
+        Receives row * W + column of the nearest set texel, -1 everywhere if none is set. Which of several
+        equally near texels is chosen depends on the mask only.
     """
     row_of = np.full(mask.shape, -1, np.int32)
     apex, start = np.zeros((2, mask.shape[1]), np.int64)
@@ -42,7 +43,7 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
     row_of : (H, W) int32 full of -1, apex and start : (W,) int64, scratch
     """
     height, width = mask.shape
-    # Nearest set row of each column, kept as a row number; -1 = column is empty.
+    # Find the nearest set row in the column of each texel; -1 if the column has none.
     for r in range(height):
         for c in range(width):
             if mask[r, c]:
@@ -54,7 +55,7 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
             below = row_of[r + 1, c]
             if below >= 0 and (row_of[r, c] < 0 or below - r < r - row_of[r, c]):
                 row_of[r, c] = below
-    # Lower envelope of the columns' parabolas, row by row; all in integers, so exact.
+    # Compute the lower envelope of the columns' parabolas in each row, exactly, in integers.
     for r in range(height):
         n = 0
         for c in range(width):
@@ -89,12 +90,12 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_distance, first_row, end_row):  # type: ignore[no-untyped-def]
-    """Continue every chart's picture into the empty texels by reflection at its border, in place.
+    """Fill the empty texels around charts by reflection at the charts' borders, in place.
 
-    An empty texel p with the nearest covered texel q takes the value m as far inside the chart as p lies
-    outside, times (plane at p) / (plane at m), where the plane is fitted at q: noise looks the same on both
-    sides of the border, and a slope goes on where a plain mirror would put a crease. Where the chart is
-    thinner than needed, the way back and forth through it is folded.
+    Let q be the covered texel nearest to an empty texel p, and m the texel of q's chart opposite to p at the
+    same distance from q. Then value(p) = value(m) * plane(p) / plane(m), where the plane is fitted at q. So
+    the noise has the same statistics on both sides of the border, and gradients continue. Where the chart is
+    thinner than the distance, m is found by repeated reflection at its two borders.
 
     Parameters
     ----------
@@ -107,7 +108,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
     plane : (n, 3, C) float32
         Plane at these texels: value, slope per column, slope per row.
     max_distance : int
-        Largest depth looked at, in texels.
+        Largest distance between q and m, in texels.
     """
     height, width, channels = value.shape
     for r in range(first_row, end_row):
@@ -137,7 +138,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
                     step = 2 * depth - step
             rr = qr + _round_ratio(dr * step, distance)
             cc = qc + _round_ratio(dc * step, distance)
-            # Beyond SLOPE_REACH texels the plane stays what it is there.
+            # Beyond SLOPE_REACH texels the plane is constant.
             outside = smaller(1.0, SLOPE_REACH / distance)
             inside = smaller(1.0, SLOPE_REACH / step) if step > 0 else 1.0
             at = plane_row[qr, qc]

@@ -1,10 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that hold a denoised page to what its noisy samples allow.
+"""Kernels that limit the change of a denoised page by the error of its noisy samples.
 
-A denoiser may remove noise, not light: over a small in-chart window the difference between noisy and
-denoised page must vanish within its own standard error. No texel may move by more than a few standard errors,
-or out of the range of the samples around it. What is left is mixed with the samples by inverse variance: a
-converged page stays as it is.
+A denoiser should remove noise, not light, so the mean difference between noisy and denoised page over a small
+window of a chart is reduced to a few of its standard errors. No texel changes by more than a few standard
+errors, or to a value outside the range of the samples around it. The result is mixed with the samples by
+inverse variance, so a converged page does not change.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.trace.jit import kernel, larger, scratch, smaller
 
 RADIUS = 2
-# Size of the window's mean difference that is believed to be noise, in its standard errors.
+# Largest mean difference of a window that is attributed to noise, in its standard errors.
 MEAN_SIGMAS = 2.5
-# How far one texel may move, in standard errors of the texel.
+# Largest change of a texel, in its standard errors.
 TEXEL_SIGMAS = 5.0
 # The filter's own relative error: 0.1 to 0.5 % on noise-free pages with contact shadows.
 OWN_ERROR = 0.005
@@ -111,7 +111,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                 + _BLUE * float(denoised[r, c, 2])
             )
             for j in range(3):
-                # A channel's noise stands to its value as the luminance's does to the luminance.
+                # Assume the same relative noise for each channel as for the luminance.
                 scale = 1.0
                 if luminance > 0.0:
                     scale = smaller(larger(float(denoised[r, c, j]) / luminance, 0.0), 8.0)

@@ -1,25 +1,25 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that give a filtered page the light of its samples, by sums over blocks of texels of one chart."""
+"""Kernels that restore the light that the denoiser removed from a page, from sums over blocks of texels."""
 
 from __future__ import annotations
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Side of a block, texels; half window of blocks around one, with weights that fall off to its edge.
+# Side of a block, texels; radius of a window, blocks. Weights of blocks fall off linearly from its centre.
 BLOCK, REACH = 8, 2
-# A window of this number of texels gets half of the light that it lacks.
+# Weighted number of texels in a window at which half of the missing light is restored.
 HALF = 30.0
-# No texel is made darker or brighter by more than these shares.
+# Limits of the relative change of a texel.
 LEAST, MOST = -0.5, 1.0
 
 
 @kernel
 def group_blocks(chart, chosen, label, first, owner):
-    """Number the groups: chosen texels of one chart in one block. Returns how many there are.
+    """Number the groups, which are the chosen texels of one chart in one block; return the number of groups.
 
     chart : (H, W) int32; chosen : (H, W) bool
     label : (H, W) int32, receives the group of each texel, -1 for none
-    first : (blocks + 1,) int64, receives where the groups of each block begin
+    first : (blocks + 1,) int64, receives the first group of each block
     owner : (n,) int32 for n chosen texels, receives the chart of each group
     """
     height, width = chart.shape
@@ -56,7 +56,7 @@ def _group_of(begin, end, owner, chart):
 
 @kernel
 def sum_groups(noisy, filtered, label, light, sums):
-    """Add up what the filter took and what it left, relative to the mean light of each group.
+    """Sum the light that the filter removed and that it kept, relative to the mean light of each group.
 
     noisy, filtered : (H, W, C) float32; label : (H, W) int32
     light : (G, 2) float64 zeros, receives the filtered light of each group's texels and their number
@@ -85,9 +85,12 @@ def sum_groups(noisy, filtered, label, light, sums):
 
 @kernel
 def missing_shares(first, owner, across, sums, share):
-    """Write the share (G, C) float64 of light that windows around groups lack, as far as it is believed.
+    """Write the relative change (G, C) float64 that restores the missing light of each group's window.
 
-    first : (blocks + 1,) int64, where the groups of each block begin; owner : (n,) int32, chart of each group
+    It is removed light / kept light, times n / (n + HALF) for a window of n texels, since sums over few
+    texels are noisy.
+
+    first : (blocks + 1,) int64, first group of each block; owner : (n,) int32, chart of each group
     across : int, blocks in a row
     sums : (G, 2 C + 1) float64, from `sum_groups`
     """
@@ -115,7 +118,7 @@ def missing_shares(first, owner, across, sums, share):
 
 @kernel
 def add_shares(label, first, owner, across, share, page):
-    """Multiply a page (H, W, C) float32 by 1 + share, interpolated between the middles of blocks.
+    """Multiply a page (H, W, C) float32 by 1 + share, bilinearly interpolated between the centres of blocks.
 
     label : (H, W) int32, first : (blocks + 1,) int64, owner : (n,) int32 from `group_blocks`
     across : int, blocks in a row

@@ -15,20 +15,22 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 RADIUS = 2
 # A ridge in the normal equations: where the texels lie on one line, the slope across it comes out 0.
 RIDGE = 1e-3
-# How far a result may leave the range of the window's values, as a share of that range, and in units of the
-# steps between the three texels behind it: the last step and, times CURVED, the one before.
+# Largest distance of a result from the range of the window's values: as a share of that range, and in units
+# of the steps between the last three texels, that is, of the last step and CURVED times the one before.
 HEADROOM = 0.5
 STEEP, CURVED = 2.0, 3.0
-# A plane must explain this share of the spread in a window before a value may leave the range of its chart.
+# A value may exceed the range of its chart only if a plane explains more than this share of the variance in
+# the window.
 STRAIGHT = 0.95
 # Extrapolation stops growing this many texels outside the chart.
 MAX_STEP = 2.0
-# A value taken from a few texels must differ by this share to be believed instead of a plane's.
+# Share of a value by which differences between it and a plane's are reduced: few texels are noisier than a
+# plane.
 NOISY = 0.03
-# A noisy slope counts by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
+# A noisy slope is multiplied by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
 DOUBT = 3.0
-# Added to squared distances, texels: the weight of a texel is 1 / (FLAT + distance^2). Wide windows of noisy
-# pages weigh more evenly.
+# Added to squared distances, texels: the weight of a texel is 1 / (FLAT + distance^2). The weights of noisy
+# pages are more uniform.
 FLAT, NOISY_FLAT = 1.0, 4.0
 
 # Sums over a window: of the weights w, w x, w y, w x x, w x y, w y y, and the number of texels; then for each
@@ -37,7 +39,7 @@ W, WX, WY, WXX, WXY, WYY, COUNT = range(7)
 WV, WXV, WYV, WVV, LOW, HIGH = range(6)
 N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
 # Columns of a plane, per channel: value at the texel, slope per column and per row, smallest and largest
-# value in the window, weighted sum of squares about the mean, and what of it the plane explains.
+# value in the window, weighted sum of squares about the mean, and the part of it that the plane explains.
 CENTRE, ACROSS, DOWN, LOWEST, HIGHEST, SPREAD, EXPLAINED = range(7)
 N_PLANE = 7
 # How much further values may rise and fall; see `_trend`.
@@ -139,10 +141,10 @@ def _step(along, length):
 
 @inner
 def _trend(value, chart, covered, r, c, x, y, trend):
-    """Write how much further values may rise and fall from texel (r, c) along (x, y) texels, both >= 0.
+    """Write the largest increase and decrease of values from texel (r, c) along (x, y) texels, both >= 0.
 
-    The two steps between a texel and those behind it must go the same way: then the value goes on as it
-    came. At the edge of a shadow, between faces that differ and in noise they do not.
+    They are 0 unless the last two steps between texels along that direction have the same sign. At the edge
+    of a shadow, between different faces and in noise, the signs differ.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     trend : (C, 2) float64 output
@@ -169,10 +171,10 @@ def _trend(value, chart, covered, r, c, x, y, trend):
 
 @inner
 def _limited(planes, slot, j, estimate, trend, highest):
-    """Return an estimate cut to the window's range, and a little more where there is a trend.
+    """Return an estimate limited to the window's range, which is extended where there is a trend.
 
-    Light never turns negative, and is brighter than the brightest texel of its chart, `highest`, only where
-    it rises as evenly as a plane.
+    Values never become negative, and exceed the largest value of the chart, `highest`, only where a plane
+    fits the window well.
 
     planes : (slots, C, N_PLANE) float64, row `slot`; trend : (C, 2) float64; highest : float
     """
@@ -230,10 +232,11 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
 
 @kernel
 def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row):
-    """Set each partly covered texel so that a bilinear lookup at its centroid finds what was measured there.
+    """Set each partly covered texel so that a bilinear lookup at its centroid returns its mean.
 
-    Only where all texels of that lookup are covered and of one chart. What differs from `move_to_centre` by
-    some per cent is left to that: a plane through many texels is less noisy.
+    Only texels of which all texels of that lookup are covered and of one chart are changed. The change
+    relative to `move_to_centre` is reduced by the share NOISY of the mean, since a plane through many texels
+    is less noisy.
 
     Parameters
     ----------
