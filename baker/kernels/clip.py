@@ -102,7 +102,8 @@ def polygon_point(corner, n, u, v):
 
 @inner
 def square_touches(corner, x0, y0):
-    """Return how a triangle meets the unit square at (x0, y0): 0 apart, 1 in part, 2 square inside it.
+    """Return the overlap of a triangle and the unit square at (x0, y0): 0 none, 1 partial, 2 square inside
+    it.
 
     corner : (3, 2) float64, texels
     """

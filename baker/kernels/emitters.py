@@ -30,11 +30,12 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 #     TWO_SIDED                    1 if the back emits, too, else 0
 #     SHARE                        probability of the emitter inside its cluster
 #     CUMULATIVE                   running sum of these probabilities, this one included
-#     CLUSTER                      a whole number
+#     CLUSTER                      index of the cluster
 #     RADIANCE                     RGB, cd/m2, without the texture (3)
 #     TEXTURED                     1 if the texture has to be looked up, 0 if not, or NO_CLOSED_FORM
-#     INSIDE                       part of its triangle: barycentrics b1, b2 of corner 0, then edge length as
-#                                  a share of the triangle's, negative for turned parts; whole: (0, 0, 1)
+#     INSIDE                       position in the scene's triangle: barycentrics b1, b2 of corner 0; edge
+#                                  length as a share of the triangle's, negative for parts rotated by 180
+#                                  degrees; (0, 0, 1) for a whole triangle
 CORNER, CORNER_1, CORNER_2, NORMAL, AREA, TWO_SIDED = 0, 3, 6, 9, 12, 13
 SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = 14, 15, 16, 17, 20, 21
 ROW_LENGTH = 24
@@ -94,8 +95,8 @@ class TileEmitters(NamedTuple):
     cumulative : (C,) float32
         Running sum of `chance`.
     apart : (C,) uint8
-        1 for clusters that are sampled apart from the others: rays that hit them count even at texels whose
-        light from all other emitters is complete.
+        1 for clusters that are sampled as a separate stratum: gather rays that hit them contribute also at
+        texels that have the complete light of all other emitters.
     """
 
     row: NDArray[np.float32]
@@ -120,7 +121,7 @@ def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitte
     Returns
     -------
     TileEmitters
-        With `apart` 0.
+        With all clusters in one stratum (`apart` is 0).
     """
     chance = np.zeros(len(emitters.power), np.float32)
     cumulative = np.zeros_like(chance)
@@ -197,8 +198,8 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
         weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
 
     `angle` is the smallest angle between a normal of the cluster and a direction to the sphere. A cluster's
-    probability is 0 only if no point of the sphere can see the front of its triangles. The lit ones share 5 %
-    of the probability evenly.
+    probability is 0 only if no point of the sphere can see the front of its triangles. 5 % of the probability
+    are divided equally among the others.
 
     emitters : Emitters; origin : (m, w, 3) float32, metres
     chance, cumulative : (C,) float32 output, see `TileEmitters`
@@ -226,7 +227,7 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
             if angle >= 0.5 * math.pi:
                 weight = 0.0
             elif angle > 0.0:
-                # The bound is rough: no probability falls far below the others.
+                # Limit the factor, since the bound of the angle is rough.
                 weight *= larger(math.cos(angle), 0.05)
         chance[c] = weight
         total += weight
@@ -299,7 +300,7 @@ def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
 
     node : (K, 4) int32, see `Emitters`
     code : of the triangle: m >= 0, it is emitter m; -1, it emits nothing; -2 - k, it is cut into four parts
-        whose codes are node[k]: at corners 0, 1, 2, then the turned one in the middle
+        whose codes are node[k]: at corners 0, 1, 2, then the rotated one in the middle
     """
     while code < -1:
         k = -2 - code

@@ -14,7 +14,7 @@ def cache_warnings() -> list[SceneWarning]:
     list of SceneWarning
         Empty if kernels are kept.
     """
-    # All kernels lie in the same install: one of them answers for all.
+    # All kernels are in the same install, so one of them is checked.
     if place_points._cache.cache_path is not None:
         return []
     message = (

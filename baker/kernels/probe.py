@@ -10,14 +10,14 @@ from baker.kernels.triangle_lookup import front_facing
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PACKET_WIDTH, PRIM_ID, trace_lanes
 
-# What a triangle proves of a point whose ray hits it first (`hit_kind`):
+# Meaning of the first hit of a ray on a triangle for the ray's origin (`hit_kind`):
 #
 #     0             nothing
-#     BLACK_BACK    its back is black: a point that sees only such backs is enclosed
+#     BLACK_BACK    its back is black: a point all of whose rays hit such backs is enclosed
 #     SOLID_BACK    hit from behind: the point is inside a solid
 #     SOLID_FRONT   the same for faces of a solid that are wound inwards: hit from the front
 BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
-# Rays from the inside of a solid that prove a point to be inside: a single one may slip through an edge.
+# Rays from the inside of a solid that prove a point to be inside: a single one may pass through an edge.
 PROOF = 2
 # A count is n_inside + ELSEWHERE * n_elsewhere: rays that start inside a solid, and rays that hit neither a
 # solid from inside nor a black back.
@@ -38,7 +38,7 @@ def inside_hits(
     buffers : PacketBuffers
     begin : number of the first of the m items, for its random numbers and its row of `hits`
     sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
-    proof : rays from the inside of solids that decide a point
+    proof : number of rays from the inside of solids after which a point is inside
     hits : (n, w) uint8, counts are added, see `ELSEWHERE`
     Returns the number of rays cast.
     """
@@ -75,7 +75,7 @@ def inside_hits(
                 rays, words, frame, seeds, sobol_points[sample, 0], sobol_points[sample, 1], shared, FAR
             )
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-            # Count what the hits prove.
+            # Count the hits by their meaning.
             for lane in range(lanes):
                 kind = np.int64(0)
                 front = 0

@@ -34,7 +34,7 @@ BORDER = 0.01
 # than this (cosine): a hard edge, not a smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
-# Rows of what `load_flat` writes: corner 0, edges 1 and 2, signed face normal, and the triangle's size (1).
+# Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal, and the triangle's size (1).
 _CORNER, _EDGE_1, _EDGE_2, _NORMAL, _SIZE = 0, 1, 2, 3, 4
 _flat_row = scratch((5, 3), np.float64)
 

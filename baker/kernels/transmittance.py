@@ -7,8 +7,8 @@ Shadow rays: the filter function multiplies T at each surface on the way (`alpha
 
 Rays to the first hit: at each hit the filter function lets the ray pass with probability 1 - a, and the light
 of one that passed is multiplied by lerp(1, c, a). Embree reports hits in no particular order, some of them
-behind the end of the ray. So the colours are multiplied along a second ray, which ends where the first one
-did, in a second tree that holds the BLEND triangles only.
+beyond the first hit. So the colours are multiplied along a second ray, which ends where the first one did, in
+a second tree that holds the BLEND triangles only.
 
     c = factor * texture(base uv) * vertex colour, each clamped to [0, 1]
 
@@ -239,8 +239,8 @@ def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, s
     """Trace sixteen gather rays to their first hit.
 
     With BLEND surfaces each ray is traced twice. In turn 0 it stops at them with probability alpha, which
-    finds the light that these surfaces send. In turn 1 it passes all of them (where alpha < 1) and always
-    finds the light behind, which is multiplied by T.
+    samples the light from these surfaces. In turn 1 it passes all of them (where alpha < 1), and the light of
+    its hit is multiplied by T.
     blend, scene, width, query : of `PacketBuffers`; intersect : its `intersect`
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
     spare_on, spare : packet memory of the native width, of `PacketBuffers`

@@ -27,7 +27,7 @@ UV, UV_EDGE_1, UV_EDGE_2, PAGE, DOUBLE_SIDED = 0, 2, 4, 6, 7
 FACE_NORMAL, FACE_AREA, EMITTER, MATERIAL = 8, 11, 12, 13
 # Two columns are unused: a row is 64 bytes.
 ROW_LENGTH = 16
-# Answer of `hit_pixel` for the black back of a one-sided surface.
+# Return value of `hit_pixel` for the black back of a one-sided surface.
 BACK_FACE = -1
 
 

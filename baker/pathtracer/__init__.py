@@ -3,8 +3,8 @@
 A bake is verified against this package, so it computes light without the bake's code. Both read the same
 scene, resolved materials, textures, alpha and solids, cast rays with the same tree and filters, and take
 random numbers and directions from `kernels.sampling`; both divide emissive textures with
-`lights.emissive_texture.cut`, which decides where samples go. Emitters, lights without area, shading,
-estimators and sums are this package's own.
+`lights.emissive_texture.cut`, which determines sampling densities only. Emitters, lights without area,
+shading, estimators and sums are this package's own.
 """
 
 from baker.trace.kernel_cache import keep_kernels

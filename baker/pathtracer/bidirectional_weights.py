@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""MIS weights of `bidirectional`: densities of all techniques relative to the one that made the path.
+"""MIS weights of `bidirectional`: densities of all techniques relative to the one that sampled the path.
 
 A path x_0 (light) .. x_k-1 (eye) can be made with s vertices from the light and t = k - s from the eye, with
 density p_s (per area):
@@ -7,10 +7,10 @@ density p_s (per area):
     p_s+1 / p_s = pL(x_s) / pE(x_s)    w_s = 1 / (1 + sum over s' != s of p_s' / p_s)    (balance heuristic)
 
 pL and pE are the densities of a vertex sampled from the light side and from the eye side. Both sums are
-updated while a subpath grows, so that a connection costs the same for subpaths of any length. All techniques
-with fewer light vertices exist. The number of light vertices is bounded, so an eye subpath carries one sum
-for each number of light vertices that may be added. Mirror reflections have density 1, since theirs cancels
-in the ratio, and weight 0 as ends of a connection.
+updated while a subpath grows, so that a connection costs the same for subpaths of any length. A light subpath
+has one sum, since all techniques with fewer light vertices exist. An eye subpath has one sum for each number
+of light vertices that may be added, since that number is bounded. The density of a mirror reflection is set
+to 1, since it cancels in the ratio; connections at mirrors have weight 0.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 5.3 (shading normals), 8
 and 10; van Antwerpen, Unbiased physically based rendering on the GPU, 2011 (recursive sums); Georgiev,
@@ -26,17 +26,18 @@ from baker.pathtracer.camera import FORWARD, PIXELS_ACROSS, PIXELS_DOWN, RIGHT, 
 from baker.pathtracer.vertex import DENSITY, GO, GRAZE, N_ROWS, NORMAL, SHADED
 from baker.trace.jit import inner
 
-# Most vertices of a light subpath, the one on the light among them.
+# Largest number of vertices of a light subpath, including the vertex on the light.
 MAX_LIGHT_VERTICES = 8
 # Further rows of a path:
 #   BACK     unit direction to the previous vertex
 #   INVERSE  1 / density of this vertex, per area
-#   OPEN     weight of the technique that connects this vertex to the previous one: 1; 0 at mirrors; the
-#            number of subpaths where techniques differ in it
+#   OPEN     weight of the technique that connects the previous vertex to this one: 1, but 0 if the previous
+#            one reflected as a mirror, the number of light subpaths of a pixel if it is the camera, and
+#            the ratio of densities in `reach_vertex` if it is the sky
 #   LEAVE    cosine to the geometric normal of the direction in which the path leaves
-#   ORIGIN   the light it started at: 0 at a finite distance, 1 parallel light, 2 the sky; 0 from the second
-#            vertex
-#   CHAIN    first of the sums over all techniques further back
+#   ORIGIN   kind of the light at which it started: 0 finite distance, 1 parallel light, 2 sky; 0 from the
+#            second vertex
+#   CHAIN    first of the sums over all techniques that end at earlier vertices
 BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3, 4, 5, 6, 7))
 N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 
@@ -69,7 +70,8 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
             value[c] = row[BASE + c, k] * INV_PI * nl / gl
         return nl * INV_PI, max(ne, 0.0) * INV_PI
     el = ex * lx + ey * ly + ez * lz
-    # A normal that looks away from the viewer is replaced, as `arrive` does for either direction of travel.
+    # Where the shading normal faces away from the viewer, use the geometric normal, as `arrive` does. For the
+    # density from the light, the viewer is the light.
     if ne > GRAZE:
         from_eye = bsdf_cosines(row, k, ne, nl, el, value)
     else:
@@ -144,7 +146,7 @@ def reach_vertex(path, lane, distance, depth):
         # Parallel light: its density per area does not change with the distance.
         path[INVERSE, lane] = 1.0 / (path[DENSITY, lane] * cosine)
         if path[ORIGIN, lane] == 2.0:
-            # The sky is aimed at with density c / pi and started from with density 1 / 4 pi.
+            # Density of light samples of the sky, cosine / pi, relative to that of light subpaths, 0.25 / pi.
             path[OPEN, lane] = 4.0 * cosine
     return cosine
 

@@ -131,7 +131,7 @@ def cosines_pdf(row, lane, nv, nl, vl):
 
 @inner
 def visible_normal(vx, vy, vz, a, u, w):
-    """Return a half vector, distributed as the GGX normals that v sees (Heitz 2018, listing 1)."""
+    """Return a half vector, distributed as the GGX normals visible from v (Heitz 2018, listing 1)."""
     sx, sy, sz = a * vx, a * vy, vz
     length = math.sqrt(sx * sx + sy * sy + sz * sz)
     sx, sy, sz = sx / length, sy / length, sz / length

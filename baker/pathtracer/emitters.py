@@ -47,9 +47,10 @@ class FoundEmitters(NamedTuple):
     power : (E,) float64
         lm.
     code : (T,) int32
-        What each triangle of the scene is: a row, -1 for none, -2 - k for the parts in `node[k]`.
+        Code of each triangle of the scene: its row, -1 if it emits nothing, -2 - k for the parts in
+        `node[k]`.
     node : (K, 4) int32
-        Codes of the four parts of what was cut, see `kernels.emitters.emitter_at`.
+        Codes of the four parts of each subdivision, see `kernels.emitters.emitter_at`.
     """
 
     row: NDArray[np.float64]
@@ -83,7 +84,7 @@ def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PAR
     part = np.concatenate([np.tile([0.0, 0.0, 1.0], (len(whole), 1)), parts.inside])
     radiance = shading.emission[geometry.material[whole]].astype(np.float64)
     level = np.concatenate([radiance @ _LUMINANCE, brightness(parts.mean)])
-    # Codes of whole triangles, and of parts behind them.
+    # Codes of whole triangles, then of parts.
     code = np.full(len(geometry.triangle), -1, np.int32)
     code[whole] = np.arange(len(whole))
     code[image] = np.where(parts.root >= 0, parts.root + len(whole), parts.root)
@@ -105,7 +106,7 @@ def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PAR
     row[:, EMITTER_RADIANCE : EMITTER_RADIANCE + 3] = shading.emission[material]
     row[:, EMITTER_TEXTURED] = shading.emission_texture[material] >= 0
     row[:, EMITTER_PART : EMITTER_PART + 3] = part[order]
-    # Numbers before ordering to rows; what has no power is none.
+    # Map numbers before ordering to rows; emitters without power are left out.
     rank = np.full(len(power) + 1, -1, np.int32)
     rank[order] = np.arange(len(order))
     code, node = (

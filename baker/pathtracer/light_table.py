@@ -90,7 +90,7 @@ class LightTable(NamedTuple):
     triangle : (E,) int32
         The scene's triangle of each emitter.
     code : (T,) int32
-        What each triangle of the scene is, see `FoundEmitters`.
+        Code of each triangle of the scene, see `FoundEmitters`.
     node : (K, 4) int32
         See `FoundEmitters`.
     cumulative : (E + P + 1,) float64
@@ -120,7 +120,7 @@ class LightTable(NamedTuple):
 def build_light_table(
     scene: Scene, geometry: Geometry, shading: Shading, sky: tuple[float, float, float]
 ) -> LightTable:
-    """Collect what emits.
+    """Collect emitters, lights without area and the sky.
 
     Parameters
     ----------

@@ -54,7 +54,9 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Return whether most points (n, 3) are closer than `alike` to the next one; only then sorting pays."""
+    """Return whether most points (n, 3) are closer than `alike` to the next one; only then sorting saves
+    time.
+    """
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
     return bool(2 * np.count_nonzero(step < alike) > len(first))

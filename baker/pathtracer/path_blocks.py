@@ -1,9 +1,9 @@
 """Blocks of eight paths, in which the paths of a tile are stored between two rays.
 
 A block is a ray packet, followed by further rows of eight numbers. Rays are traced and shaded in place. All
-rows of a block are at constant distances in one array: only then the compiler proves that rows do not overlap
-and vectorizes loops over lanes (loops of eight only if they access a single array). Gaps that ended paths
-leave are filled with paths of the last blocks, so that packets stay full.
+rows of a block are at constant offsets in one array, since the compiler vectorizes loops over lanes only if
+it can prove that rows do not overlap, and loops of eight only if they access a single array. Slots of ended
+paths are filled with paths of the last blocks, so that packets stay full.
 
 Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van
 Antwerpen, Improving SIMD efficiency for parallel Monte Carlo light transport on the GPU, 2011 (compaction).
@@ -38,7 +38,7 @@ from baker.trace.pointers import prefetch
 # Paths in a block, blocks of a tile.
 BLOCK_WIDTH, BLOCKS = 8, 32
 _L = BLOCK_WIDTH
-# Rows behind those of the packet. State of a path: throughput; density of the direction, per steradian (0: no
+# Rows after those of the packet. State of a path: throughput; density of the direction, per steradian (0: no
 # MIS weight for emission); its cosine to the shading normal; bounces (-1 before the hit of a camera ray);
 # point in the tile; 1 for a path. As uint32: point, sample, twice the number of vertices.
 BETA, DENSITY, COSINE, BOUNCES, POINT, ALIVE = (ROWS + i for i in (0, 3, 4, 5, 6, 7))
@@ -49,13 +49,13 @@ ALBEDO, NORMAL, SHADED, TANGENT, BITANGENT = (ROWS + i for i in (11, 14, 17, 20,
 # that choose a light and a lobe.
 U_LIGHT, W_LIGHT, U_DIRECTION, W_DIRECTION, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
 CHOICE, LOBE = ROWS + 31, ROWS + 32
-# Ray to a light: direction, length, light if unblocked, barycentrics of its end.
+# Ray to a light: direction, length, contribution if unblocked, barycentrics of its end.
 TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
 # Copies of the hit triangle's first columns and of the chosen light's row.
 TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
 BLOCK = N_ROWS * _L
-# Packets of pending shadow rays, by light; behind the rows of the rays: light, point.
+# Packets of pending shadow rays, by light; after the rows of the rays: contribution, point.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 
@@ -96,7 +96,7 @@ def new_path_memory(rays: RayScene) -> PathMemory:
 
 @inner
 def unsigned(index):  # type: ignore[no-untyped-def]
-    """Return an index below 2^32 in a form that the compiler proves to be at least 0: no wraparound."""
+    """Return an index below 2^32 as a value that the compiler can prove to be non-negative: no wraparound."""
     return np.int64(np.uint32(index))
 
 
@@ -131,7 +131,7 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
     Returns
     -------
     int
-        Rays.
+        Number of rays.
     """
     n = 0
     for block in range(blocks):

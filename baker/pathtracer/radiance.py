@@ -1,4 +1,4 @@
-"""Radiance along camera rays, pass by pass; see `irradiance` for what a pass is."""
+"""Radiance along camera rays, in passes; see `irradiance` for the definition of a pass."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def radiance_pass(
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Of (height * width, 3), row 0 on top; changed in place.
+        Of (height * width, 3) values, cd/m2, row 0 on top; changed in place.
     camera : Camera
-        World space.
+        The camera, in world space.
     width : int
-        Pixels.
+        Width of the picture, pixels.
     height : int
-        Pixels.
+        Height of the picture, pixels.
     options : PassOptions
         Estimator, number of reflections beyond the first, and seed.
     progress : Progress
@@ -61,7 +61,7 @@ def radiance_pass(
     sobol_points = sobol_reversed(samples, options.seed, 1 + number)
     settings = path_settings(estimator, estimator.strata, options, number)
     if estimator.both:
-        # Here: other estimators need not load its kernels.
+        # Import here, so that other estimators do not load its kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
         picture_pass(reference, estimate, camera, (width, height), sobol_points, settings, progress)

@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One vertex of a path: made from a hit, aiming at a light, sampling the next direction.
+"""Functions for one vertex of a path: set it up at a hit, sample a light, sample the next direction.
 
-The numbers of a path are in column `lane` of `path` (see the row names), those of its surface in column
-`lane` of `row` (see `bsdf`). Directions in `path` are in world space, except `TO`, the direction back along
-the path, which is in the frame of the normal.
+Column `lane` of `path` holds the state of a path (see the row names), column `lane` of `row` the BSDF
+parameters of its surface (see `bsdf`). Directions in `path` are in world space, except `TO`, the direction
+back along the path, which is in the frame of the normal.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
 N_ROWS = 32
 # A ray to a light: unit direction, length, barycentrics of the point on an emitter.
 RAY_LENGTH, RAY_B1, RAY_B2 = 3, 4, 5
-# A glossy lobe around an interpolated normal needs at least this cosine towards the viewer.
+# Least cosine between interpolated normal and view direction at which glossy lobes use that normal.
 GRAZE = 1.0e-3
 # Ray origins are offset from the surface by this share of the largest coordinate or of the triangle's size,
 # whichever is less, but at least by sixteen float32 steps of either (as in `kernels.surface`).
@@ -112,7 +112,10 @@ def offset_origin(path, lane, x, y, z, min_offset_scale, size):
 
 @inner
 def size_of(corner, t):
-    """Return the largest component of the edges from corner 0 of row t, whose first columns are corners."""
+    """Return the largest absolute component of the two edges at corner 0 of a triangle, metres.
+
+    corner : (T, 9 or more) float32, row t begins with the three corners
+    """
     size = 0.0
     for a in range(3):
         size = max(size, max(abs(corner[t, 3 + a] - corner[t, a]), abs(corner[t, 6 + a] - corner[t, a])))
@@ -121,10 +124,11 @@ def size_of(corner, t):
 
 @inner
 def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
-    """Start a path at a white Lambertian point, whose radiance is E / pi, or as a ray.
+    """Start a path at a white Lambertian surface point, whose radiance is E / pi, or with a camera ray.
 
     path : (N_ROWS, n) float64; row : (5, n) float64
-    where, toward, normal : (3,) position, shading normal, geometric normal; or ray origin, direction, unused
+    where, toward, normal : (3,) float64, position, shading normal, geometric normal; or ray origin,
+        direction, unused
     sizes : `Surfaces.min_offset_scale` and `.default_size`
     """
     for c in range(3):
@@ -149,7 +153,7 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
 
 @inner
 def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian):
-    """Make a vertex of a hit; return False at the back of a one-sided surface, which is black.
+    """Set up the vertex at a hit; return False at the back of a one-sided surface, which is black.
 
     path : (N_ROWS, n) float64; row : (5, n) float64; surface : (T, 32), material : (M, 8) float32, see
         `Surfaces`
@@ -234,11 +238,11 @@ def heuristic(own, other, power):
 
 @inner
 def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
-    """Aim at one light; return its number, or -1 if it cannot light the vertex.
+    """Sample a ray to one light; return the light's index, or -1 if it contributes nothing.
 
     path : (N_ROWS, n) float64; row : (5, n) float64; lights : `LightTable`
     mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) float64, output, light if unblocked, without the emitter's texture
+    value : (3,) float64, output, contribution if unblocked, without the emitter's texture
     ray : (6,) float64, output, see the column names
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
@@ -302,7 +306,8 @@ def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
     """Multiply `value` (3,) by the emission texture of triangle prim.
 
     rgba : (4,) float64, working memory
-    aimed : whether to multiply by alpha, too; rays that hit the triangle have accounted for it
+    aimed : whether to multiply by alpha, too; false for rays that hit the triangle, whose hit filter applies
+        it
     """
     m = shading.material[prim]
     there = opacity_at(shading, prim, u, v) if aimed else 1.0

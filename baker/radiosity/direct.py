@@ -1,7 +1,8 @@
 """Direct light of every texel: emissive triangles, then lights without area.
 
-There are two estimates. `weighted` leaves out what the rays of the final gather find at emitters (MIS), which
-adds it. `complete` stands alone: the light that surfaces reflect in later bounces.
+There are two estimates. `weighted` has the MIS weights of light samples; the final gather adds the weighted
+emitter hits of its rays. `complete` has no part in the final gather; it is the light that surfaces reflect in
+later bounces.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class DirectLight:
 
     Attributes
     ----------
-    weighted : (n, 3) float32, lx, without what gather rays find at emitters
+    weighted : (n, 3) float32, lx, without the weighted emitter hits of gather rays
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
     analytic : (n,) uint8, 1 where `weighted` is complete, too
@@ -150,7 +151,7 @@ class _EmitterLight:
 
     @classmethod
     def build(cls, job: TraceJob, sampling: EmitterSampling) -> _EmitterLight:
-        """Return what all tiles of a job share."""
+        """Return the data that all tiles of a job share."""
         chooser = sampling.chooser(job.chart)
         return cls(
             lookup=job.lookup,

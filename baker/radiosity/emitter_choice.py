@@ -1,11 +1,12 @@
 """Chooses which emitters the texels of a tile sample, and with how many samples.
 
 `emitters.cluster_chances` estimates the unoccluded irradiance of each cluster of emitters. It ignores
-occlusion: an emitter behind a wall that is ten thousand times as bright would take nearly all samples. So a
-few shadow rays from the tile find the clusters that it can see, and only these share the samples. Clusters
-that no ray reached are sampled apart, with a small number of samples, and gather rays that find them count as
-well (MIS), so that no light is lost where they are visible after all, as through a keyhole. Where a
-bright cluster is visible from part of a tile only, each block of sixteen neighbours chooses for itself.
+occlusion: nearly all samples would go to an emitter behind a wall that is ten thousand times as bright.
+Therefore a few shadow rays from the tile to each cluster estimate its visibility, and the samples are
+distributed over visible clusters. Clusters that no ray reached are a separate stratum with few samples,
+combined with gather rays that hit them (MIS), so that their light is not lost where they are visible through
+a small opening. If a bright cluster is visible from a part of the tile only, clusters are chosen for each
+block of sixteen neighbours.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -38,12 +39,13 @@ from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 # Probe rays to each cluster from a tile, and their total as a share of the tile's shadow rays.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
 _COST = 0.06
-# With at most _FEW clusters, all hidden ones are sampled apart. With more, the dimmest hidden ones stay with
-# the visible ones, up to this share of the weight of the visible ones.
+# With at most _FEW clusters, all hidden ones are in the separate stratum. With more, the dimmest hidden ones
+# are sampled with the visible ones, up to this share of the weight of the visible ones.
 _FEW = 32
 _HARMLESS = 0.25
-# Blocks choose for themselves if a cluster that only part of the tile sees is this many times as bright as
-# another visible one. Blocks end where a chart ends or the cosine of neighbouring normals is below _TURN.
+# Clusters are chosen for each block if one that is visible from a part of the tile is this many times as
+# bright as another visible one. Blocks end where a chart ends or the cosine of neighbouring normals is below
+# _TURN.
 _OUTSHINES = 4.0
 _TURN = 0.5
 # Touching emitters whose power per area differs by at most this factor are one light: no choice is needed.
@@ -110,7 +112,7 @@ class EmitterChooser:
     n_light, n_hidden : int
         Samples of a texel, and those of clusters hidden from its tile.
     single : bool
-        Whether all emitters count as one light.
+        Whether all emitters are treated as one light, without a choice.
     chart : (n,) int32 or None
         Chart of each texel entry.
     """
@@ -222,7 +224,7 @@ class EmitterChooser:
         return np.where(all_emitters.chance > 0, weight, 0.0)
 
     def _hidden(self, weight: NDArray[np.float64], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return which clusters (C,) are sampled apart; none if no cluster is visible."""
+        """Return the clusters of the separate stratum, (C,) bool; none if no cluster is visible."""
         hidden: NDArray[np.bool_] = (seen == 0) & (weight > 0)
         if not (seen > 0).any():
             return np.zeros_like(hidden)
@@ -240,7 +242,8 @@ class EmitterChooser:
         if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():
             return Choice(part, all_emitters, None, all_emitters, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # Never evaluate hidden emitters analytically: a few unblocked shadow rays would stand for all others.
+        # Never evaluate hidden emitters analytically: too few shadow rays would decide that they are
+        # unoccluded.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
         chance = np.zeros_like(all_emitters.chance)

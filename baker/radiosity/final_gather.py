@@ -37,7 +37,7 @@ class Gathered:
     direct : (n_front, 3) float32, lx
         Light of the sky, and of emitters with the weight that gather rays have in MIS.
     open : (n_front,) float32
-        Ambient occlusion within the distance asked for.
+        Ambient occlusion within the distance, 1: unoccluded.
     variance : (n_front,) float32, lx2
         Of the mean of RGB of indirect + direct.
     rays : int

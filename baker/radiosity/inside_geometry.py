@@ -1,11 +1,10 @@
 """Finds the points of texels that lie inside geometry.
 
-A point is inside if it lies in a solid (`topology.solids`), or if all that its rays meet is black: backs of
-one-sided surfaces. The first surface that a ray from inside a solid meets is the solid's own, from behind, or
-another one inside it; a ray from outside never meets the back of a closed surface first. So two rays that
-meet such backs prove a point to be inside, whatever else is in there. A few rays from every texel find
-candidates; candidates and their neighbours are then tested point by point, so a texel half under a box keeps
-the other half.
+A point is inside if it lies in a solid (`topology.solids`), or if all its rays hit black backs of one-sided
+surfaces. The first hit of a ray from inside a solid is the back of the solid or an object inside it; the
+first hit of a ray from outside is never the back of a closed surface. So two rays that hit such backs prove a
+point to be inside. A few rays from every texel find candidates. All points of candidates and of their
+neighbours are then tested, so a texel half under a box keeps its points in the other half.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ def find_inside_geometry(
     job : TraceJob
         Its `valid_points` are not read: all points are tested.
     hit_kind : (T,) uint8
-        Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
+        Meaning of a first hit on each triangle, see `kernels.probe`.
 
     Returns
     -------
@@ -105,7 +104,7 @@ def _test_points(
 
 
 def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Add to suspects the texels around them in their page (fronts and backs apart)."""
+    """Add the neighbours in the page to the candidates, separately for fronts and backs."""
     out = suspect.copy()
     for back in (False, True):
         side = np.flatnonzero(texels.back == back)

@@ -1,8 +1,8 @@
 """Assigns regions to invalid texels, which are filled from their neighbours later.
 
 The strip of a ceiling above a wall lies between a dark room and a bright outside. Engines interpolate between
-texel centres, so lookups in the room read these texels: filled with light from outside, they would draw a
-bright line along the ceiling. So each invalid texel belongs to the region whose visible points have the
+texel centres, so lookups in the room read these texels: filled with light from outside, they would appear as
+a bright line along the ceiling. So each invalid texel belongs to the region whose visible points have the
 largest bilinear weight at it, or to the nearest region if no region has any.
 """
 

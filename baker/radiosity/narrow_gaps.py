@@ -1,7 +1,8 @@
 """Finds texels in narrow gaps: under a rug, between books, between a cupboard and the wall.
 
-Light falls off within the width of a gap from its opening. A patch that extended from the lit floor to below
-the rug would carry the light of the floor there: texels in gaps share no patch with others.
+Inside a gap, light falls off over a distance of about the gap's width. A patch that extends from the lit
+floor to below a rug would have the floor's radiosity there, so texels in gaps share no patch with texels
+outside.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from baker.radiosity.direct import TILE
 from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.trace_job import TraceJob
 
-# Sixteen neighbouring texels are outside gaps if, of the first rays of each, at most one was blocked.
+# Sixteen neighbouring texels are outside gaps if at most one of the first _EARLY_OUT rays of each is blocked.
 _RAYS, _EARLY_OUT = 16, 4
-# A texel lies in a gap if less than _OPEN of its rays are free up to a number of texel sides: _NEAR for gaps
-# about as wide as a texel, _FAR for gaps about as wide as a patch.
+# A texel lies in a gap if less than the share _OPEN of its rays is unblocked up to a distance in texel sides:
+# _NEAR for gaps about as wide as a texel, _FAR for gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 
@@ -31,7 +32,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     texels : TexelBuffer
         The n entries of the job.
     job : TraceJob
-        Where rays start.
+        Points and ray buffers of these entries.
 
     Returns
     -------
@@ -46,7 +47,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     cast = np.zeros(-(-n // TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
-        # Texels of a tile are neighbours: the median side stands for all of them.
+        # Use the median side for all texels of a tile, which are neighbours.
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = job.tile_points(begin, end)
         for share, sides in ((far, _FAR), (near, _NEAR)):

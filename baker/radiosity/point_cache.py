@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from baker.core.budget import MAX_CACHED_TEXELS
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
-# `place_points` is not asked for triangles and barycentrics.
+# Empty outputs of `place_points` for triangles and barycentrics, which are not needed.
 _NO_TRIANGLE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 

@@ -1,8 +1,8 @@
 """Splits texels that lie on both sides of a surface passing through them, and groups texels into regions.
 
 A floor that continues under a wall, a ceiling above walls, a beam through a wall: a texel there has points on
-both sides of the other surface. One value for both would average the light of both sides and carry it from
-one to the other. Its points are grouped by mutual visibility (`radiosity.kernels.sides`), and each group
+both sides of the other surface. A single value would be the mean of the light on both sides and would be
+visible on both. Its points are grouped by mutual visibility (`radiosity.kernels.sides`), and each group
 becomes an entry. The texel's own entry keeps the side with the largest valid area and is stored in the page;
 the other sides follow fronts and backs, take part in light transport, and are stored in no page.
 
@@ -43,8 +43,8 @@ _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
 # Pairs of neighbours are tested with one point of each, then with all.
 _ONE = np.zeros((1, 1), np.uint8)
-# A side is the outside of one-sided geometry if more than _MANY_BACKS of its rays meet backs; its points then
-# count with the weight _OUTSIDE.
+# A side is outside of one-sided geometry if more than the share _MANY_BACKS of its rays hit backs; its points
+# then have the weight _OUTSIDE.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -365,7 +365,7 @@ def _keep_largest(
 
 
 def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDArray[np.float64], int]:
-    """Return the share (S, groups) of rays of each side that meet black backs, and the number of rays."""
+    """Return the share (S, groups) of rays of each side that hit black backs, and the number of rays."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
     sobol_points = sobol_reversed(N_POINTS, job.seed, 9)
     cast = 0
@@ -389,9 +389,9 @@ def _order_sides(
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
     """Choose the side that gets the own entry of a split texel: the one with most points.
 
-    Points of a side whose rays meet backs of one-sided surfaces count less: it is the outside of a room whose
-    walls have no outside, or the underside of a floor that has none. A side whose region contains no whole
-    texel loses: for example the strip of a wall below the floor that is narrower than a texel.
+    Points of a side whose rays hit backs of one-sided surfaces have a smaller weight: it is the outside of a
+    room whose walls have no outside, or the underside of a floor that has none. A side whose region contains
+    no whole texel loses: for example the strip of a wall below the floor that is narrower than a texel.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The radiosity solve: what all bounces add to the light that arrives at each patch.
+"""The radiosity solve: the irradiance of each patch from light reflected once or more.
 
     E = F (s + rho E)        s: exitance of the first reflection, rho: albedo, for three colours at once
 

@@ -25,7 +25,7 @@ _TILE = 4096
 def build_texels(
     geometry: Geometry, shading: Shading, atlas: Atlas, *, seed: int, threads: int, progress: Progress
 ) -> tuple[TexelBuffer, Surface]:
-    """Find the texels of all pages: coverage, and the mean of what covers each.
+    """Find the texels of all pages: coverage, and the mean attributes of the covering triangles.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class _Means(NamedTuple):
 def _surface(
     geometry: Geometry, atlas: Atlas, found: _Overlaps, front: NDArray[np.int32], seed: int
 ) -> Surface:
-    """Return what kernels read of the entries; `front` (n,) is the front entry of each."""
+    """Return the data of the entries for kernels; `front` (n,) is the front entry of each."""
     return Surface(
         position=geometry.position,
         normal=geometry.normal,

@@ -20,7 +20,7 @@ from baker.trace.packets import PacketBuffers, new_packet_buffers
 
 @dataclass(frozen=True)
 class TraceJob:
-    """Where rays start, what they are traced against, and who works on the tiles of a stage.
+    """Origins of rays, the scene that they are traced in, and the runner of the tiles of a stage.
 
     Attributes
     ----------
@@ -29,11 +29,11 @@ class TraceJob:
     valid_points : (n,) uint16
         Bit k is set where point k of an entry is valid: not inside geometry, and on the entry's side.
     lookup : TriangleLookup
-        From hits to texels.
+        Maps hits to texels.
     tracer : Tracer
         Embree scene that rays are traced against.
     seed : int
-        Start of all random sequences.
+        Seed of all random numbers.
     threads : int
         Threads of this process that work on tiles.
     progress : Progress

@@ -293,8 +293,9 @@ def light_samples(
                             hidden = on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                        # A BLEND surface on the way counts as a blocker: each ray has its own transmittance.
-                        # Without any, all are 1, and remain so for the rays that are not traced.
+                        # Treat a BLEND surface on the way as a blocker, since each ray has its own
+                        # transmittance. Without any, all are 1, and remain so for the rays that are not
+                        # traced.
                         blocked += count_coloured(buffers.blend)
                     # Look up the radiance of textured emitters.
                     if shading is not None:

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One step of the conjugate gradient solver of the radiosity equation, in one pass over each vector.
+"""One step of the conjugate gradient solver of the radiosity equation, for three colours at once.
 
 Based on: Saad, Iterative methods for sparse linear systems, 2003, algorithm 9.1.
 """
@@ -17,13 +17,13 @@ _three = scratch((3,), np.float64)
 def conjugate_step(
     product, albedo, weight, direction, exitance, residual, allowed, dark, active, size, worst
 ):
-    """Advance the solution of (I - rho F) x = b by one step, for each colour apart.
+    """Advance the solution of (I - rho F) x = b by one step, separately for each colour.
 
     product : (P, 3) float64, F direction; overwritten
     albedo, weight : (P, 3) float64, rho and A / rho
     direction, exitance, residual : (P, 3) float64, search direction, solution and b - (I - rho F) x; updated
     allowed : (P, 3) float64, allowed residual, as a share of exitance
-    dark : (3,) float64, least exitance that `allowed` refers to
+    dark : (3,) float64, lower bound of the exitance that `allowed` is multiplied by
     active : (3,) uint8, colours to advance; set to 0 where the direction has no curvature
     size : (3,) float64, weighted squared norm of the residual; updated
     worst : (3,) float64 output, largest ratio of residual and allowed residual

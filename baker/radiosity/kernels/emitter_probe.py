@@ -22,16 +22,16 @@ _INV_2_24 = np.float32(5.9604645e-08)
 
 @kernel
 def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen):
-    """Count the rays from blocks of texels to each cluster that could carry light, and the unblocked ones.
+    """Count the rays from blocks of texels to each cluster with non-zero cosines, and the unblocked ones.
 
     origin, normal : (m, 16, 3) float32, metres, world, and unit; points of neighbouring texels
     row (M, 24) float32, first (C + 1,) int32 : see `emitters.Emitters`
     buffers : PacketBuffers
     bounds : (B + 1,) int64, texels of block b are bounds[b] to bounds[b + 1]
     chosen : (C,) bool, clusters to probe
-    n_rays : rays from each block to each cluster, from points spread over the block
+    n_rays : rays from each block to each cluster, from points distributed over the block
     asked : (B, C) int32 output, rays between a front of the surface and a side that emits
-    seen : (B, C) int32 output, those of them that nothing blocks
+    seen : (B, C) int32 output, the unblocked ones of them
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query
@@ -54,7 +54,7 @@ def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, 
                             rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, k, a]
                         on[lane] = _aim(rays, lane, normal, i, k, row, first[c], first[c + 1], code)
                         asked[b, c] -= on[lane]
-                # Trace it, and count the rays that nothing blocks.
+                # Trace it, and count the unblocked rays.
                 trace_shadow_lanes(
                     buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare
                 )

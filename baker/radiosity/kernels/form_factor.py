@@ -1,7 +1,7 @@
 # mypy: disable-error-code="no-untyped-def"
 """Form factors of patches by cosine-weighted rays, and products with their matrix.
 
-    F_ij = share of what leaves patch i that arrives at j = share of i's cosine-weighted rays that hit j
+    F_ij = share of light leaving patch i that arrives at j = share of i's cosine-weighted rays that hit j
 
 Based on: Malley, A shading method for computer generated images, 1988; Goral et al., Modeling the
 interaction of light between diffuse surfaces, 1984; Cohen and Wallace, Radiosity and realistic image

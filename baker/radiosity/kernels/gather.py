@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Final gather: the light that a texel's hemisphere rays find, and ambient occlusion.
+"""Final gather: irradiance and ambient occlusion of texels from their hemisphere rays.
 
     E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit, without emission
     E_sky      = pi / n sum L_sky         over rays that leave the scene
@@ -238,7 +238,7 @@ def gather(
 
 @inner
 def _add_coloured_sky(blend, words, sky, missed, part):
-    """Add the sky's light of rays that coloured surfaces filter; those rays no longer count as `missed`.
+    """Add the sky's light of rays through BLEND surfaces, and clear these rays in `missed`.
 
     blend : of `PacketBuffers`; words : (21 * 16,) uint32, the packet; sky : (3,) float32, cd/m2
     missed : (16,) float32, rays without a hit; part : (7 * 16,) float32, sums, see `gather`

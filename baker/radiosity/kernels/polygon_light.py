@@ -3,9 +3,9 @@
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
 
-over the edges of the part of a triangle that lies above the tangent plane n; angle_i is the angle that edge i
-subtends at the point, Gamma_i the unit normal of the plane through both. With a, b the vectors from the point
-to the edge's ends,
+over the edges of the part of a triangle above the point's tangent plane, whose unit normal is n. angle_i is
+the angle that edge i subtends at the point, Gamma_i the unit normal of the plane through the point and the
+edge. With a, b the vectors from the point to the edge's ends,
 
     angle Gamma = angle / sin(angle) (a x b) / |a||b|
 
@@ -31,13 +31,13 @@ _f = np.float32
 #     _ARM               vectors from the point to up to four corners (12)
 #     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
 #     _SUM               sum over the edges
-#     _SMALL             E / L of a triangle of small extent, -1 for others
+#     _SMALL             E / L of a triangle of small solid angle, -1 for others
 #     _FACING            1 if a side that emits faces the point, else 0
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
-# Triangles whose longest edge is below a hundredth of their distance (squares here) count as points at their
-# centroid: the sum over edges would lose digits, and the error is of the order of the square, 1e-5.
+# Triangles whose longest edge is below a hundredth of their distance (squares here) are treated as points at
+# their centroid, since the sum over edges would lose digits. The relative error of this is about 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
@@ -45,7 +45,7 @@ _SMALL_VIEW = np.float32(1.0e-4)
 def angle_over_sine(x, sine):
     """Return angle / sin(angle) from the cosine x in [-1, 1] and the sine; relative error under 1e-6.
 
-    Both are needed: near a straight angle the float32 cosine does not determine the sine.
+    The sine is an argument because near 180 degrees it cannot be computed from the float32 cosine.
     """
     y = abs(x)
     series = _f(1.5707963050) + y * (
@@ -118,7 +118,7 @@ def _load_triangle(work, row, m, lanes):
     """Write the corners of the part of triangle m above each point's tangent plane.
 
     work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `emitters`
-    Returns the largest number of corners, 3 or 4, and 0 if no lane sees any part of it.
+    Returns the largest number of corners of any lane, 3 or 4; 0 if the triangle emits towards no lane.
     """
     # Load the corners. Values are read from the row first, and offsets are constants, or the compiler would
     # not vectorise the loops over lanes.
@@ -209,7 +209,7 @@ def _clip(work, lane):
 
 @pasted
 def _add_edge(work, first, second):
-    """Add the edge between two corners to the sum of every lane; edges of no length add 0.
+    """Add the edge between two corners to the sum of every lane; edges of zero length add 0.
 
     work : (24 * 16,) float32, see the row names
     """

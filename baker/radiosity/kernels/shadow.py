@@ -11,7 +11,7 @@ from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
-# Column of `ray` behind the direction.
+# Column of `ray` after the direction.
 MAX_DISTANCE = 3
 
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The sides of split texels, and which of them a hit lies on.
+"""The table of split texels, and the lookup of the side of a split texel that a hit lies on.
 
 A hit lies on the side of the texel's nearest point that is visible from a position shortly before the hit, or
 from one just above it. See `sides` for the height of such segments.
@@ -35,7 +35,7 @@ _BACK, _ABOVE = 0.25, 0.02
 # Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, normal of the face that was hit.
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
-# Column of `SeenLight.image` behind RGB.
+# Last column of `SeenLight.image`, after RGB.
 SIDE_ROW = 3
 # Working memory of the kernels.
 new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 * PACKET_WIDTH,), np.float32)
@@ -44,8 +44,8 @@ new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 *
 class SideTable(NamedTuple):
     """The S split texel entries and their points.
 
-    Entries whose surface has a corner that none of its points sees are in it, too: a ray that hits such a
-    corner finds nothing.
+    Entries of a single side are included if a corner of their surface is not visible from any of their
+    points: a hit near such a corner contributes nothing.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ def no_sides() -> SideTable:
 
 
 class SeenLight(NamedTuple):
-    """The light that rays of the final gather find.
+    """Light that texels reflect, as read at the hits of final-gather rays.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class SeenLight(NamedTuple):
 
 
 def nothing_seen() -> SeenLight:
-    """Return the light that rays find where nothing reflects any.
+    """Return the light of a scene in which no texel reflects any.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def nothing_seen() -> SeenLight:
 
 
 class SeenPatch(NamedTuple):
-    """The patches that form-factor rays find.
+    """Patches of texels, as read at the hits of form-factor rays.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class SeenPatch(NamedTuple):
 
 @inner
 def segment(rays, lane, x, y, z, tx, ty, tz):
-    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; return -1 if it has a length, else 0.
+    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; return -1 if its length is not 0, else 0.
 
     rays : (21 * 16,) float32, a packet; coordinates in metres, world
     """
@@ -147,7 +147,7 @@ def note_hit(hits, lane, rays, row, prim, front):
     """Copy the hit of a lane for `find_side`.
 
     hits : (10 * 16,) float32 output, see the row names; rays : (21 * 16,) float32, the packet
-    row : (T, 16) float32, see `TriangleLookup`; prim : triangle hit; front : whether its front was
+    row : (T, 16) float32, see `TriangleLookup`; prim : triangle that was hit; front : whether at its front
     """
     sign = _f(1.0) if front else _f(-1.0)
     for a in range(3):
@@ -159,7 +159,7 @@ def note_hit(hits, lane, rays, row, prim, front):
 
 @inner
 def find_side(point, normal, height, member, side, s, hits, lane, buffers):
-    """Return the row of values of the side that a hit on split texel s lies on, -1 if no point sees it.
+    """Return the row of values of the side that a hit on split texel s lies on, -1 if no point is visible.
 
     point, normal : (S, 16, 3) float32; height : (S, 16) float32; member : (S, 16) int32; side : (S,) float32;
         of a `SideTable`
@@ -182,8 +182,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):
     z = hits[(HIT_ORIGIN + 2) * PACKET_WIDTH + lane] + distance * dz
     found = np.int32(-1)
     for turn in range(2):
-        # Start before the hit, which is on the side of the ray's origin however the hit was rounded; if no
-        # point is visible from there, start above the hit.
+        # Start at a position on the ray before the hit, since rounding may put the hit itself on the wrong
+        # side. If no point is visible from there, start above the hit.
         step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
         vx, vy, vz = -dx, -dy, -dz
         if turn == 1:

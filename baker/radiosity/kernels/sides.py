@@ -227,7 +227,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
                 if other < 0:
                     label[m, k] = own
                     continue
-                # The seed sees a point of an earlier group: merge both.
+                # A point of an earlier group is visible from the seed: merge both groups.
                 for j in range(N_POINTS):
                     label[m, j] = own if label[m, j] == other else label[m, j]
         # Number the remaining groups from 0.
@@ -244,10 +244,11 @@ def group_points(origin, normal, height, valid_points, buffers, label):
 
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
-    """Find texels with a corner of their surface that none of their points sees, or with a blocked outline.
+    """Find texels with a corner of their surface that is visible from none of their points, or with a blocked
+    outline.
 
-    A surface that cuts off a corner has no point behind it, but rays may hit the surface there. The edge
-    between two walls may reach into a texel through one side of it; that blocks the segment along that side.
+    Another surface may cut off a corner that contains no point but may be hit by rays. The edge between two
+    walls may enter a texel through one of its sides; it blocks the segment between the corners of that side.
 
     surface : Surface; chosen : (m,) int64, texel entries
     origin, normal : (m, 16, 3) float32, metres, world, and unit; height : (m, 16) float32, metres
@@ -330,7 +331,8 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 def _trace_corners(
     point, facing, headroom, found, m, origin, normal, height, valid_points, side, buffers, hidden
 ):
-    """Set hidden[m] if no point of item m sees one of `found` corners, or one corner not the next.
+    """Set hidden[m] if one of `found` corners is visible from no point of item m, or not from the next
+    corner.
 
     point, facing : (1, 16, 3) float32, corners, metres, and unit normals
     headroom : (1, 16) float32, metres, working memory
