@@ -125,7 +125,7 @@ def compare(
     settings : DiffSettings, optional
         How much is compared, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def compare(
     ResourceError
         If memory runs out.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
     """
     settings = settings or DiffSettings()
     start = time.monotonic()

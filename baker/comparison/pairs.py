@@ -1,8 +1,9 @@
 """Pairs the objects of two bakes.
 
-Objects with the same node and name are a pair; then those whose name occurs once among the remaining ones
-of both sides; then those with the same node and an equal mesh (renamed ones). The objects that remain may
-have been joined or split: points of one side are matched with all of the other side.
+Three rules are applied in order to the objects that are not paired yet. Each pairs the objects of which a key
+occurs once in both scenes: node and name; name; node, if the meshes are equal (renamed objects). The
+remaining objects may have been joined or split, so points on them are matched with all remaining objects of
+the other scene.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Mesh, Scene
 
-# Corners at a smaller distance, relative to the mesh's largest coordinate, are equal.
+# Largest difference of coordinates of equal corners, relative to the mesh's largest coordinate.
 _NEAR = 1.0e-6
 
 

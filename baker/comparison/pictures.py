@@ -1,4 +1,4 @@
-"""FLIP between two bakes: pages of a against the same texels with values from the maps of b."""
+"""FLIP error of the pages of bake a against the values of bake b at the same surface points."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ _LARGEST = 512
 
 @dataclass(frozen=True)
 class FlipMeans:
-    """Means of FLIP.
+    """Means of the FLIP error, 0 to 1.
 
     Attributes
     ----------
     channel : dict of channel to float or None
+        Over all compared texels; None without any.
     object : dict of (channel, instance of a) to float
+        Over the compared texels of an instance.
     """
 
     channel: dict[str, float | None]
@@ -34,7 +36,7 @@ class FlipMeans:
 
 
 def read(bake: StoredBake, geometry: Geometry, points: SurfacePoints, name: str) -> NDArray[np.float64]:
-    """Read a channel (n, C) at points of the surface, as engines do."""
+    """Look a channel up bilinearly at n points of the surface, (n, C) float64."""
     return look_up_uv(bake.maps[name], geometry.page[points.triangle], points.at(geometry, "uv"))
 
 
@@ -47,7 +49,7 @@ def page_flip(
     seed: int,
     progress: Progress,
 ) -> FlipMeans:
-    """Compare pages as pictures; means are over texels whose surface both bakes have.
+    """Compute the FLIP error of all pages; means are over texels whose surface point is matched in b.
 
     Parameters
     ----------

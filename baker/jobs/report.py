@@ -64,7 +64,7 @@ def run_jobs_file(
     settings : BatchSettings
         Processes, memory, seed, and what is baked.
     progress : Progress
-        Called with all jobs as one stage; a truthy answer stops them all.
+        Called with all jobs as one stage; a truthy return value stops them all.
     executor : callable, optional
         Makes what runs the jobs; default: processes on this machine.
     starting : callable
@@ -82,7 +82,7 @@ def run_jobs_file(
     SettingsError
         If it is not TOML, or a setting in it is wrong.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
     """
     options = BatchOptions(
         threads=settings.threads,

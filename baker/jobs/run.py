@@ -103,7 +103,7 @@ def run_batch(
         Does the work; closed at the end.
     options : BatchOptions
     progress : Progress
-        Told of all jobs as one stage; a truthy answer stops them all.
+        Told of all jobs as one stage; a truthy return value stops them all.
     starting : callable
         Told each output folder before anything is done there.
 
@@ -115,7 +115,7 @@ def run_batch(
     Raises
     ------
     Cancelled
-        If `progress` says so. Finished jobs stay whole, the others are as they were.
+        If `progress` returned a truthy value. Finished jobs stay whole, the others are as they were.
     """
     try:
         return _Run(jobs, executor, options, progress, starting).run()

@@ -1,7 +1,8 @@
-"""Whether an output folder still is the bake of its scene: by content alone, never by times or paths.
+"""Checks whether an output folder is up to date, by hashes of contents, not by times or paths.
 
-A bake's manifest holds the hash of its scene with every file that names, its settings, the versions of
-baker and the libraries, and the hash of each file written. All of them must be what they would be today.
+The manifest of a bake holds the hash of the scene and of the files that it refers to, the settings, the
+versions of baker and the libraries, and the hash of each file written. An output folder is up to date if all
+of them are equal to the current ones.
 """
 
 from __future__ import annotations
@@ -15,24 +16,25 @@ from baker.core.settings import BakeSettings
 from baker.io.bake.manifest import library_versions, resolved_settings
 from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
 
-# Decides only how `samples` is filled in, and that is compared itself.
+# `quality` only sets the default of `samples`, and `ao_distance_metres` follows from `ao_distance` and the
+# scene; these are compared.
 _NOT_COMPARED = {"quality", "ao_distance_metres"}
-# Differences told; a changed library set would else fill the line.
+# Largest number of differences listed in `why`.
 _TOLD = 3
 
 
 @dataclass(frozen=True)
 class Freshness:
-    """What an output folder is worth.
+    """Result of `check_output`.
 
     Attributes
     ----------
     fresh : bool
-        Nothing has to be done.
+        Whether the folder is up to date.
     why : str
-        What differs, in words.
+        The differences, as text for users.
     manifest : bytes
-        The `bake.json` that was looked at, empty if there is none.
+        Content of `bake.json`, empty if there is none.
     """
 
     fresh: bool
@@ -41,15 +43,21 @@ class Freshness:
 
 
 def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
-    """Compare an output folder with what baking would give today.
+    """Compare the manifest of an output folder with the current scene, settings, versions and files.
 
     Parameters
     ----------
     out : Path
-        Need not exist.
+        The output folder; need not exist.
     sha256 : str
-        Hash of the scene and the files it names, see `io.scene_hash`.
+        Hash of the scene and the files that it refers to, see `io.scene_hash`.
     settings : BakeSettings
+        Settings of the bake.
+
+    Returns
+    -------
+    Freshness
+        Not fresh if the manifest is missing or unreadable.
     """
     try:
         data = (out / MANIFEST_NAME).read_bytes()

@@ -1,8 +1,9 @@
-"""Bakes one job after the other in a process of its own, so that libraries and kernels load once.
+"""A process that bakes one job after the other, so that libraries and kernels are loaded once.
 
-Protocol: a line of JSON for each job on stdin, lines of JSON on stdout. A job is
-{"scene", "out", "settings", "force"}; while it runs come {"stage", "fraction"}, at its end {"done": true}
-or {"error": {"kind", "message", "file", "object", "code"}}. When stdin ends, so does the process.
+Protocol: one line of JSON for each job on stdin, lines of JSON on stdout. A job is
+{"scene", "out", "settings", "force"}. The worker writes {"stage", "fraction"} while the job runs, and
+{"done": true} or {"error": {"kind", "message", "file", "object", "code"}} at its end. The process exits when
+stdin ends.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from baker.core.errors import BakerError
 
 # Seconds between two lines about progress.
 _INTERVAL = 0.1
-# Seconds that a running bake gets to stop by itself when the other side is gone.
+# Seconds from the end of stdin to the exit of the process, in which a running bake can stop.
 _GRACE = 0.6
 
 
 def main() -> None:
-    """Answer jobs until stdin ends."""
-    # Ctrl-C reaches the whole process group; the parent decides what happens to this process.
+    """Bake jobs until stdin ends."""
+    # Ctrl-C is sent to the whole process group, but only the parent stops this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Native libraries print to descriptor 1 as they please.
+    # Redirect descriptor 1 to stderr, since native libraries may print to it; keep a copy for the protocol.
     sink = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     jobs: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
     stop = threading.Event()
     threading.Thread(target=_listen, args=(jobs, stop), daemon=True).start()
-    # Before the first job arrives, or while it does.
+    # Import the pipeline before the first job arrives.
     import baker.pipeline.bake  # noqa: F401
 
     while (job := jobs.get()) is not None:
@@ -53,7 +54,7 @@ def _listen(jobs: queue.SimpleQueue[dict[str, Any] | None], stop: threading.Even
 
 
 def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, Any]:
-    """Bake one job and return what to answer."""
+    """Bake one job and return the last message of the protocol."""
     from baker.core.settings import make_settings
     from baker.pipeline.bake import bake
 
@@ -81,7 +82,7 @@ def describe(error: BaseException) -> dict[str, Any]:
     Parameters
     ----------
     error : BaseException
-        Errors that are not the user's count as `internal`.
+        Any exception; one that `explain` does not map to a `BakerError` has the kind `internal`.
 
     Returns
     -------
@@ -105,7 +106,7 @@ def _answer(sink: TextIO, message: dict[str, Any]) -> None:
         sink.write(json.dumps(message) + "\n")
         sink.flush()
     except OSError:
-        # Nobody listens any more; the end of stdin stops the work.
+        # The parent has closed the pipe; the end of stdin stops the work.
         return
 
 

@@ -1,4 +1,4 @@
-"""A check of dilation: texels beyond the borders of charts should hold light like that at the borders."""
+"""Share of dilated texels whose values differ strongly from those at the border of the chart."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SLACK = 0.02
 def misfilled_share(
     maps: NDArray[np.float32], covered: NDArray[np.bool_], dilated: NDArray[np.bool_]
 ) -> float:
-    """Return the share of dilated texels next to covered ones that are far outside the range of these.
+    """Return the share of dilated texels next to covered ones that are far outside their range.
 
     Parameters
     ----------

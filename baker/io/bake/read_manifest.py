@@ -1,7 +1,7 @@
 """Reads and validates `bake.json` of a finished folder.
 
-Its numbers are used as sizes and indices, and its names as paths. So it is compared with the schema, and its
-parts with each other, before it is used.
+Its numbers are used as sizes and indices and its names as paths. Therefore the manifest is validated against
+the schema and checked for contradictions first.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 
 # Largest file that is read, bytes; the manifest of a million instances is far smaller.
 _LONGEST = 1 << 30
-# Largest page, texels a side.
+# Largest width and height of a page, texels.
 _WIDEST = 1 << 16
 # Characters at the beginning and at the end of a long text in messages.
 _SHORT = 60

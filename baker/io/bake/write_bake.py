@@ -23,7 +23,7 @@ from baker.io.png import encode_palette_png, encode_png, grey_levels
 
 __all__ = ["check_out", "write_bake"]
 
-# Colours that differ in luminance and for red-green colour blindness.
+# Colours that differ in luminance and can be distinguished with red-green colour blindness.
 STATUS_COLOURS = {
     TexelStatus.EMPTY: (16, 16, 16),
     TexelStatus.COVERED: (86, 180, 233),
@@ -55,7 +55,7 @@ def write_bake(
     force : bool
         Also write into a folder that is not a bake.
     progress : Progress
-        Receives a report for each file, and may cancel.
+        Called with stage, fraction and file name after each file; a truthy return value cancels.
     created : datetime or None
         Time to write into the manifest; None is now.
 
@@ -71,7 +71,7 @@ def write_bake(
     ResourceError
         If the disk is full or not writable; the folder is unchanged.
     Cancelled
-        If `progress` cancels; the folder is unchanged.
+        If `progress` returned a truthy value; the folder is unchanged.
     """
     check_out(out, force=force, scene_path=result.scene.path)
     try:
@@ -154,7 +154,7 @@ def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
 def _write_page(
     result: BakeResult, lightmap: Lightmap, page: int, folder: Path
 ) -> tuple[dict[str, Any], list[SceneWarning]]:
-    """Write one page of a channel in all formats; return its manifest entry and what got lost."""
+    """Write one page of a channel in all formats; return its manifest entry and the warnings about losses."""
     value, described = lightmap.value[page], lightmap.description
     height, width, _ = value.shape
     header = {
@@ -195,7 +195,7 @@ def _write_page(
 
 
 def encoding_named(name: str) -> Encoding[Any]:
-    """Return an encoding that `encode` takes.
+    """Return an encoding by its name, EXR included.
 
     Parameters
     ----------
@@ -210,9 +210,9 @@ def encoding_named(name: str) -> Encoding[Any]:
     Raises
     ------
     SettingsError
-        If there is none.
+        If no encoding has this name.
     """
-    # The message does not offer EXR: it is always written, so `encode` does not take it.
+    # The error message does not list EXR: it is always written, so it is no value of `encode`.
     return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 
@@ -230,12 +230,12 @@ def why_unfit(name: str, channel: ChannelDescription) -> str | None:
 
 
 def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescription]) -> None:
-    """Check, before the long work, that each encoding can hold one of the channels.
+    """Check before a bake that each encoding can hold at least one of the channels.
 
     Parameters
     ----------
     names : tuple of str
-        Encodings asked for.
+        Names of encodings.
     channels : mapping of channel to its description
         All that is baked.
 
