@@ -1,4 +1,4 @@
-"""`baker check SCENE`: finds what would spoil a bake, before any ray is cast."""
+"""`baker check SCENE`: finds defects of scenes before they are baked."""
 
 from __future__ import annotations
 

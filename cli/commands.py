@@ -6,7 +6,7 @@ from __future__ import annotations
 COMMANDS = {
     "bake": "Bake a scene: unwrap, trace, solve, write lightmaps and scene.glb.",
     "ao": "Bake ambient occlusion only.",
-    "check": "Find what would spoil a bake, before any ray is cast.",
+    "check": "Find defects of scenes before they are baked.",
     "batch": "Bake many scenes, and only what changed.",
     "verify": "Say how wrong a bake is, against path tracing.",
     "diff": "Compare two bakes on the surface, whatever their UVs.",

@@ -1,4 +1,4 @@
-"""Turns an exception into one sentence, an exit code, and JSON if asked for."""
+"""Reports an exception as one sentence, an exit code and, with --json, as JSON."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from baker.cli.flags import in_flags
 from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
 
-# Exit code of a check that the user asked for and that failed.
+# Exit code of a check or comparison that failed.
 FAILED_CHECK = 1
 
 
 def explain(error: BaseException) -> BakerError | None:
-    """Return the error as baker's own kind, or None for a bug.
+    """Return the error as a `BakerError`, or None for a bug.
 
     Parameters
     ----------
@@ -43,12 +43,13 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
     Parameters
     ----------
     error : BaseException
+        Anything that a command raised.
     as_json : bool
-        Write the error object on `out` as well.
+        Also write the error object to `out`.
     traceback : bool
-        Show where it was raised (-vv).
+        Print the traceback (-vv).
     out : TextIO
-        Where JSON goes.
+        Stream for JSON.
     """
     if traceback:
         import traceback as tb
@@ -75,9 +76,9 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
 
 
 def _line(error: BakerError) -> str:
-    """Return file, object and message in one line; a message that begins with its object repeats nothing.
+    """Return file, object and message in one line, without the object if the message begins with it.
 
-    The object of a wrong setting that no file holds is a flag.
+    The object of a wrong setting that no file holds is written as a flag.
     """
     if error.object and error.message.startswith((f"`{error.object}`", f"'{error.object}'")):
         parts = [error.file, error.message]

@@ -1,4 +1,4 @@
-"""Runs the work in a child process, so that stopping never waits for a library.
+"""Runs the command in a child process, so that it can be stopped while a library is busy.
 
 Some C++ libraries hold Python's global lock while they work (xatlas does so for minutes on a large mesh): no
 signal handler or thread written in Python can run during that time. The parent process only waits, so it
@@ -30,7 +30,7 @@ class StopFlag:
     Attributes
     ----------
     requested : bool
-        The return value of a progress callback.
+        Whether a signal has arrived; progress callbacks return it.
     """
 
     def __init__(self) -> None:
@@ -46,7 +46,8 @@ class StopFlag:
         """Handle the stopping signals in this process."""
         for name in _STOPPING:
             number = getattr(signal, name, None)
-            # `nohup` ignores the hang-up on purpose; an ignored SIGINT only means a background job.
+            # Leave SIGHUP ignored, as `nohup` sets it. SIGINT is handled even if ignored: shells do that for
+            # background jobs.
             if number is not None and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
                 signal.signal(number, self.handle)
 
@@ -93,7 +94,7 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
 
 
 def note_output(notes: int | None, out: str) -> None:
-    """Note for the parent process which output folder is about to be written."""
+    """Record the state of an output folder, before it is written, for the parent process."""
     if notes is not None:
         from baker.cli.leftovers import survey
 

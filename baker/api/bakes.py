@@ -42,7 +42,7 @@ def bake(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[BakeKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -115,7 +115,7 @@ def bake(
     ResourceError
         If memory, disk or a library is missing.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def ao(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[AoKeywords]
         Settings by name, in place of those in `settings`; as of `bake`, without `channels`.
 
@@ -182,7 +182,7 @@ def ao(
     ResourceError
         If memory, disk or a library is missing.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def save(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def save(
     ResourceError
         If it cannot be written.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------

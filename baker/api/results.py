@@ -38,7 +38,7 @@ def verify(
     settings : VerifySettings, optional
         How much is path-traced, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[VerifyKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -71,7 +71,7 @@ def verify(
     ResourceError
         If memory or a library is missing.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def diff(
     settings : DiffSettings, optional
         How much is compared, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[DiffKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -133,7 +133,7 @@ def diff(
     SettingsError
         For an unknown setting, a value out of range, or a limit that cannot be read.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -168,7 +168,7 @@ def render(
     out : str or Path, optional
         An EXR or PNG file to write, too.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[RenderKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -220,7 +220,7 @@ def render(
     ResourceError
         If memory, disk or a library is missing.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -310,7 +310,7 @@ def batch(
     settings : BatchSettings, optional
         Processes, memory, and what is baked.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[BatchKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -341,7 +341,7 @@ def batch(
     SettingsError
         For an unknown setting or a value out of range.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------

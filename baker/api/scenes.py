@@ -61,7 +61,7 @@ def check(
     progress: Progress = silent,
     **keywords: Unpack[CheckKeywords],
 ) -> CheckReport:
-    """Find what would spoil a bake, before any ray is cast.
+    """Find defects of a scene that would make its bake fail or its lightmap wrong.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def check(
     bake : BakeSettings, optional
         Settings of the bake that the scene is for: resolution, padding, uv, sky ...
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[CheckKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -99,7 +99,7 @@ def check(
     SettingsError
         For an unknown setting or a value out of range.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -128,7 +128,8 @@ def repair(
     progress: Progress = silent,
     **keywords: Unpack[RepairKeywords],
 ) -> FixResult:
-    """Fix the meshes of a scene file where that keeps their look; with `repair=True` also their shape.
+    """Fix the meshes of a scene file without changing their appearance; with `repair=True`, also repair
+    shapes.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def repair(
     force : bool
         Replace an `out` that exists.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[RepairKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -171,7 +172,7 @@ def repair(
     ResourceError
         If `repair` is set and pymeshlab is not installed.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------
@@ -209,7 +210,7 @@ def unwrap(
     settings : UnwrapSettings, optional
         Size of the pages, and how charts are cut and packed.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[UnwrapKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -240,7 +241,7 @@ def unwrap(
     SettingsError
         For an unknown setting or a value out of range.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
 
     Examples
     --------

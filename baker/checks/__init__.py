@@ -1,1 +1,1 @@
-"""Checks of a scene before it is baked: what rules share, the runner, reports."""
+"""Checks of a scene before it is baked: shared data of the rules, the runner, reports."""

@@ -65,23 +65,23 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
 def check_scenes(
     paths: Sequence[Path], settings: CheckSettings, bake_settings: BakeSettings, progress: Progress = silent
 ) -> tuple[list[CheckReport], list[Unreadable]]:
-    """Check scenes. Of several, one that cannot be read does not stop the others.
+    """Check scenes; if there are several, unreadable ones are returned and the others are checked.
 
     Parameters
     ----------
     paths : sequence of Path
         Scene files.
     settings : CheckSettings
-        What fails a check, and what is ignored.
+        Severity that fails the check, and findings to ignore.
     bake_settings : BakeSettings
-        Settings of the bake that is checked for.
+        Settings of the bake that the scenes are meant for.
     progress : Progress
-        Called with the stage "checks", once through for each scene.
+        Called with the stage "checks" and fractions from 0 to 1 for each scene.
 
     Returns
     -------
     reports : list of CheckReport
-        Of the scenes that could be read.
+        One for each scene that could be read.
     unreadable : list of Unreadable
         The others.
 

@@ -1,6 +1,6 @@
 """Limits on the work of a bake, and estimates of its texels, rays and memory before it runs.
 
-All stages, the checks and the limit on memory of `baker batch` take these numbers from here.
+The stages, the checks and the memory limit of `baker batch` use these numbers.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# The most patches a solve may have, and again as many in narrow gaps; larger pages get larger blocks.
+# Largest number of patches outside narrow gaps, and inside them; larger pages get larger blocks.
 MAX_PATCHES = 32768
 # Rays from each patch for its form factors: the hemisphere samples of a texel, within these limits.
 MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
@@ -22,8 +22,8 @@ MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 # Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024 if the scale
 # is free, 0.55 to 0.69 if a density is set, since each instance lies in one page.
 FILLED, FILLED_AT_DENSITY = 0.8, 0.65
-# Rays per texel that no setting decides: for points inside geometry, towards each light without area, near
-# emitters.
+# Rays per texel that do not depend on settings: for points inside geometry, towards each light without area,
+# near emitters.
 INSIDE_RAYS, DELTA_LIGHT_RAYS, NEAR_RAYS = 4, 16, 4
 
 MIB = 1 << 20
@@ -32,7 +32,8 @@ MIB = 1 << 20
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
 # Decoded images, per byte of pixels: as in the file, and as float32.
 BYTES_PER_IMAGE_BYTE = 5
-# Texels whose 16 points (position and normal, float32) are kept from one ray stage to the next; none of more.
+# Texels whose 16 points (position and normal, float32) are kept from one ray stage to the next. Bakes with
+# more texels keep none.
 MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
 # Other arrays of each texel, in the ray stages and when pages are finished: without light, and with it.
 AO_RAY_BYTES_PER_TEXEL, AO_FINISH_BYTES_PER_TEXEL = 150, 230
@@ -135,10 +136,11 @@ class Workload:
     texels : int
         Texels on surfaces.
     pages, triangles : int
+        Pages of the atlas; triangles of all instances.
     image_bytes : int
-        Pixels of the images that are read.
+        Decoded pixels of the images that are read, bytes.
     light, ambient_occlusion : bool
-        What the channels need.
+        Whether a channel needs light, and whether one needs ambient occlusion.
     """
 
     texels: int
@@ -159,7 +161,7 @@ class Workload:
         return min(round(even + extra), self.texels)
 
     def rays(self, settings: BakeSettings, *, delta_lights: int, emitters: bool) -> dict[Stage, int]:
-        """Estimate the rays of each stage, an upper bound where rows end early.
+        """Estimate the rays of each stage; the early out may save some of them.
 
         Parameters
         ----------

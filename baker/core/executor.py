@@ -1,4 +1,4 @@
-"""What runs the tiles of the ray stages of one bake: this process, or workers of a cluster."""
+"""The interface of executors, which run the tiles of the ray stages in this process or on a cluster."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.core.stage import Stage
 
 
 class TileExecutor(Protocol):
-    """Provides a tile runner for each stage. All executors compute the same bytes from the same tiles."""
+    """Provides a tile runner for each stage. Results are the same bytes with every executor."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Receive the data that all stages of a bake share; called once before the first stage."""

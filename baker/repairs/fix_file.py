@@ -112,7 +112,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     settings : RepairSettings
         Lightmap resolution, units of the file, and whether shapes are repaired.
     progress : Progress
-        Called with the stages "fix" and "repair"; a truthy answer stops the work.
+        Called with the stages "fix" and "repair"; a truthy return value stops the work.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     ResourceError
         If a repair is asked for and pymeshlab is not installed.
     Cancelled
-        If `progress` asks for it.
+        If `progress` returned a truthy value.
     """
     settings = settings or RepairSettings()
     if settings.repair:

@@ -1,7 +1,7 @@
 """Repairs of surfaces by MeshLab's filters; the only file that imports pymeshlab.
 
-pymeshlab is under the GPL and no part of baker: it is imported here only, and only when a repair was asked
-for. All meshes here have one vertex for each position.
+pymeshlab is under the GPL and no dependency of baker; it is imported only when a repair runs. All meshes in
+this file have one vertex for each position.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def require_meshlab() -> None:
 
 
 def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Choose faces so that no edge belongs to more than two: the smallest ones at such an edge are removed.
+    """Choose faces so that no edge has more than two; at an edge with more, the smallest faces are removed.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) ->
 
 
 def orient_by_visibility(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which faces to flip so that their fronts look to the side where more can be seen, (T,) bool."""
+    """Return the faces to flip so that fronts are on the side with the larger visibility, (T,) bool."""
     _, new, origin = _apply(position, triangle, "meshing_re_orient_faces_by_geometry", rays=64)
     flip = np.zeros(len(triangle), bool)
     old = triangle[origin]
