@@ -1,1 +1,1 @@
-"""Plugins: what can be baked, one channel a file."""
+"""Plugins: quantities that can be baked, one channel a file."""

@@ -11,7 +11,7 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 
 
 def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
-    """Return sampled direct light and gathered light as two layers: sharp shadows apart from soft light.
+    """Return sampled direct light and gathered light as two layers, which are denoised separately.
 
     In gaps about a texel wide neither is denoised. Light falls to a hundredth from one texel to the next
     there, and a filter smears it. *Measured* at 256 with 64 rays on such texels with and without the filter,

@@ -53,7 +53,8 @@ class Parts:
     spread : (m,) float64
         Variance of the radiance inside the part over its mean squared; 0 if it is too small to be seen.
     node : (k, 4) int32
-        Parts of what was cut, see `kernels.emitters.emitter_at`: a part's number, -1 black, -2 - k node k.
+        Parts of each subdivision, see `kernels.emitters.emitter_at`: a part's number, -1 black, -2 - k node
+        k.
     root : (n,) int32
         Each triangle, in the same code.
     """

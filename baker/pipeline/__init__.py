@@ -1,1 +1,1 @@
-"""The stages of a bake in order, and what each hands to the next; the only place that wires them."""
+"""The stages of a bake in order, and the data passed between them."""

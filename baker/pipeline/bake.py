@@ -45,7 +45,7 @@ def bake(
     executor: TileExecutor | None = None,
     atlas: Atlas | None = None,
 ) -> BakeResult:
-    """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if asked for.
+    """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if `out` is set.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def bake(
     out : path, optional
         Folder to write; None keeps everything in memory.
     progress : Progress
-        Called with the stage, the share of it that is done, and a detail; a truthy answer cancels the bake.
+        Called with the stage, the share of it that is done, and a detail; a truthy return value cancels.
     force : bool
         Replace an `out` that baker did not write.
     executor : TileExecutor, optional
@@ -141,7 +141,7 @@ def _trace(
     executor: TileExecutor,
     compiling: precompile.Process,
 ) -> TracedTexels:
-    """Run the ray stages, and free what finishing does not read: a gigabyte at 4096 texels a side."""
+    """Run the ray stages, then free arrays that finishing does not read: 1 GB at 4096 texels a side."""
     executor.open(scene, atlas, settings)
     prepared = prepare_scene(scene, atlas, settings, record)
     if any(channel.needs_light for channel in channels.values()):

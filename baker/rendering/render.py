@@ -103,7 +103,7 @@ def render(
     settings : RenderSettings, optional
         Camera, size, samples, and which quantity is rendered.
     progress : Progress
-        Called with stage and fraction; a truthy answer cancels.
+        Called with stage and fraction; a truthy return value cancels.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def render(
     ResourceError
         If memory or the denoiser is missing.
     Cancelled
-        If `progress` answers so.
+        If `progress` returned a truthy value.
     """
     settings = settings or RenderSettings()
     start = time.monotonic()

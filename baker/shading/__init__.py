@@ -1,1 +1,1 @@
-"""Materials resolved for triangles, what lets light through, and the ray tree."""
+"""Materials resolved for triangles, transmittance and alpha, and the ray tree."""

@@ -36,7 +36,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
         if texture is None:
             return -1
-        # Only emission honours a nearest sampler: elsewhere the difference is not visible in a bake.
+        # Nearest samplers are applied to emission only: elsewhere the difference is not visible in a bake.
         sharp = sharp and texture.nearest
         key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:

@@ -1,4 +1,4 @@
-"""Classifies the triangles of a scene as solids, rooms and sheets, and what a hit on each proves."""
+"""Classifies the triangles of a scene as solids, rooms and sheets, and the meaning of a first hit on each."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
-    """Make the faces of solids one-sided, and find what a hit on each triangle proves.
+    """Make the faces of solids one-sided, and return the meaning of a first hit on each triangle.
 
-    No light gets to the backs of a solid without holes, whether or not its material is double-sided.
+    No light arrives at the backs of a solid without holes, whether or not its material is double-sided.
 
     Parameters
     ----------
@@ -71,10 +71,10 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
 
 
 def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
-    """Return what a triangle proves of a point whose ray hits it first.
+    """Return the meaning of a first hit on each triangle for the ray's origin.
 
-    Backs of one-sided sheets are black, and those of covers as good as black. Rooms and triangles that let
-    light through prove nothing.
+    Backs of one-sided sheets are black, and those of covers are treated as black. Hits on rooms and on
+    triangles that let light through have no meaning (0).
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Classifies closed parts as solids, whose inside is never visible, or rooms.
 
-The rules use shape and contents; whether a material is double-sided counts only where these do not decide:
+The rules use shape and contents, and whether a material is double-sided only if these are not sufficient:
 
 - An opaque closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock).
 - It is a room if a light, a camera or an object that emits light is inside, if it emits on both sides and has
@@ -8,7 +8,7 @@ The rules use shape and contents; whether a material is double-sided counts only
 - A part whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls),
   else a room. If it has nothing inside and does not emit, it is a solid wound inwards.
 - An open part that a flat lid would close, wound outwards and with nothing inside (a crate without a bottom),
-  is a cover: points that see nothing but its inside are hidden, since another surface is its lid.
+  is a cover: points all of whose rays hit its inside are hidden, since another surface is its lid.
 
 A solid contains no light and lets none in, so a room that is classified as a solid by mistake is dark anyway.
 """
@@ -69,7 +69,7 @@ class Solids(NamedTuple):
     Attributes
     ----------
     inside : (T,) uint8
-        `BEHIND` if the inside of a solid lies behind the triangle, `BEFORE` if it lies in front of it (wound
+        `BEHIND` if the inside of a solid is at the triangle's back, `BEFORE` if it is at its front (wound
         inwards), else `NOWHERE`.
     sealed : (T,) bool
         Whether the triangle belongs to a solid without any hole.

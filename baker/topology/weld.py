@@ -165,7 +165,7 @@ def number_by_first(label: NDArray[np.integer]) -> NDArray[np.int32]:
     Parameters
     ----------
     label : (N,) int
-        Labels; negative ones stand for none.
+        Labels; negative for none.
 
     Returns
     -------

@@ -100,7 +100,7 @@ def embree_version() -> str:
 
 
 class Tracer(NamedTuple):
-    """Integers that a kernel needs to trace rays; valid while its `RayScene` lives.
+    """Addresses that a kernel needs to trace rays; valid while the `RayScene` exists.
 
     Attributes
     ----------

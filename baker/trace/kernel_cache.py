@@ -57,7 +57,7 @@ def drop_stale(folder: Path, made_of: list[Path]) -> None:
     """
     newest = max((file.stat().st_mtime for part in made_of for file in part.glob("*.py")), default=0.0)
     if newest > time.time():
-        # A clock is wrong: all would look stale for ever.
+        # A source is from the future (wrong clock): every cached kernel would be deleted in each run.
         return
     for index in folder.glob("__pycache__/*.nbi"):
         # Another process may have deleted it, or the folder is read-only.

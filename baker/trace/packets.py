@@ -36,7 +36,7 @@ NO_HIT = np.uint32(0xFFFFFFFF)
 FILTER_VALID, FILTER_DATA, FILTER_CONTEXT, FILTER_RAY, FILTER_HIT, FILTER_WIDTH = range(6)
 # Geometry of BLEND triangles.
 BLEND_GEOMETRY = np.uint32(2)
-# ID row of a ray: how it meets BLEND surfaces of alpha a and colour c.
+# Values of a ray's ID row: treatment of BLEND surfaces of alpha a and colour c.
 #
 #     tree of all triangles    0             stops with probability a
 #                              n = 1 to 16   passes; T = (1 - a) lerp(1, c, a) is multiplied into
@@ -159,7 +159,7 @@ class PacketBuffers(NamedTuple):
     floats, words : (21 * 16,) float32 and uint32
         A packet of the native width; both are the same memory.
     lane_valid, lane_floats, lane_words : ndarray
-        The same for PACKET_WIDTH rays: rows lie 16 numbers apart.
+        The same for PACKET_WIDTH rays: rows at offsets of 16 numbers.
     query : (5,) int64
         `arguments_of` rays of neighbouring texels in this scene.
     blend : BlendBuffers or None
@@ -225,12 +225,12 @@ def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
     BlendBuffers
         Memory for one thread.
     """
-    # RTCRayQueryContext (without instances), and the arrays that the filter functions use, behind it.
+    # RTCRayQueryContext (without instances), followed by the arrays that the filter functions use.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:BLEND_STOP] = NO_HIT
-    # Never coherent: with that flag Embree traverses the rays of each octant apart, but calls the filter for
-    # all rays of the packet at each leaf.
+    # Never coherent: with that flag Embree traverses the rays of each octant separately, but calls the filter
+    # for all rays of the packet at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]

@@ -46,7 +46,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     settings : BakeSettings
         `resolution`, `density`, `max_pages`, `padding`, `uv` and `threads` are read.
     progress : Progress
-        Called with the stage "unwrap"; a truthy answer stops the work and the worker processes.
+        Called with the stage "unwrap"; a truthy return value stops the work and the worker processes.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
         If there is nothing to lay out, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept,
         or if there are more charts than texels.
     Cancelled
-        If `progress` asks for it.
+        If `progress` returned a truthy value.
     """
     if scene.n_triangles == 0:
         raise InputError("the scene has no triangles to bake", file=str(scene.path) if scene.path else None)

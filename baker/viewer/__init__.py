@@ -1,1 +1,1 @@
-"""The local page that shows a bake, its server, and the data it hands out."""
+"""The local page that shows a bake, its server, and the data that it serves."""

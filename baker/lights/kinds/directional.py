@@ -43,7 +43,7 @@ def _fill(
 def _fill_parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
     """Fill rays and weights (see `FillRays`) of parallel light.
 
-    direction : (3,) float64, unit, where the light goes, world
+    direction : (3,) float64, unit, in which the light travels, world
     normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
     """
     for i in range(ray.shape[0]):

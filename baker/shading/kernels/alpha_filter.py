@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The filter function of MASK and BLEND triangles: decides whether a hit counts.
+"""The filter function of MASK and BLEND triangles: accepts or rejects hits.
 
 A MASK hit counts where alpha reaches the cutoff. A BLEND hit depends on the ray (its ID row):
 
@@ -9,8 +9,8 @@ A MASK hit counts where alpha reaches the cutoff. A BLEND hit depends on the ray
 - Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit counts only where alpha is 1.
 - Rays between points of a texel (ID `packets.SOLID`): the hit counts wherever alpha is above 0.
 - Other rays (ID 0): the hit counts with probability alpha. The random number is a hash of the bits of the ray
-  and the triangle: a ray gets the same result in any packet and on any thread, and surfaces along a ray
-  decide independently. Rays of a texel differ in direction, so they decide independently, too.
+  and the triangle: a ray has the same result in any packet and on any thread, and the decisions at different
+  surfaces along a ray, and of different rays, are independent.
 
 Based on: Enderton et al., Stochastic transparency, 2010; Embree 4 API reference, RTCFilterFunctionN.
 """

@@ -1,7 +1,7 @@
 # mypy: disable-error-code="no-untyped-def"
 """The filter function of the tree of BLEND triangles: multiplies colours, and rejects every hit.
 
-The ray's ID row holds its number (`packets.PASSES`); the results are written behind the query's context
+The ray's ID row holds its number (`packets.PASSES`); the results are stored after the query's context
 (`packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
