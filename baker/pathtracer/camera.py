@@ -56,7 +56,7 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     Raises
     ------
     SettingsError
-        If target and position are equal, or too far apart.
+        If target and position are equal, or their distance is too large.
     """
     length = math.dist(target, position)
     if not length > 0:

@@ -1,7 +1,7 @@
 """Points of texels for the ray kernels, computed tile by tile so that memory stays small.
 
-In small scenes the points are stored from one stage to the next: to compute them takes a tenth of the time of
-the rays that start there.
+In small scenes the points are stored from one stage to the next, since computing them takes a tenth of the
+time of tracing the rays.
 """
 
 from __future__ import annotations
