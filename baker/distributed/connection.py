@@ -53,7 +53,7 @@ class Cluster:
         except ImportError:
             message = "a cluster needs dask.distributed; install it with: pip install distributed"
             raise ResourceError(message) from None
-        dask: Any = distributed  # its functions carry no types
+        dask: Any = distributed  # its functions have no type annotations
         # Failures of workers are reported by this file, as sentences.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._local: Any = None
@@ -134,7 +134,7 @@ class Cluster:
         """Disconnect; workers of "local:N" end."""
         for part in (getattr(self, "_client", None), self._local):
             if part is not None:
-                # The cluster itself kills a worker that does not answer.
+                # The cluster kills a worker that does not respond.
                 with contextlib.suppress(TimeoutError, OSError):
                     part.close(timeout=_CONNECT)
 

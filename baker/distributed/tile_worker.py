@@ -46,7 +46,7 @@ class TileWorker:
     Parameters
     ----------
     scene : Scene
-        What is baked.
+        The baked scene.
     atlas : Atlas
         Its lightmap uv.
     settings : BakeSettings

@@ -64,7 +64,7 @@ def encode_exr(
     Raises
     ------
     ValueError
-        If a pixel is not a number, or the shape and `names` do not belong together.
+        If a pixel is not a number, or the number of `names` does not match the shape.
     ResourceError
         If the file cannot be written.
     """
@@ -217,7 +217,7 @@ def _write(
         # OpenEXR keeps the dictionary it is given and empties it, hence the copy.
         with OpenEXR.File(header, dict(planes)) as file:
             file.write(str(path))
-        # A disk that fills up while the file is closed raises nothing: only reading it back tells.
+        # OpenEXR raises no error if the disk is full when it closes the file: read it back.
         with OpenEXR.File(str(path), separate_channels=True) as file:
             back = file.channels()
             complete = all(np.array_equal(back[name].pixels, plane) for name, plane in planes.items())

@@ -25,7 +25,7 @@ class GreyPng(Encoding[EncodingOptions]):
     bits : int
         8 or 16.
     remedy : str
-        What to do about texels that are clipped or show steps.
+        Advice about texels that are clipped or have visible steps.
     """
 
     components: tuple[int, ...] = (1,)

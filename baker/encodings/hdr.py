@@ -66,7 +66,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
         check_pixels(pixels, self.components, path.name)
         height, width = pixels.shape[:2]
         lines = [f"# {key}: {text}" for key, text in sorted(header.items())]
-        # Rec.709 and D65 as CIE xy, and pixels that are what they say.
+        # Primaries of Rec.709 and the white point D65 as CIE xy; an exposure of 1.
         about = ["#?RADIANCE", *lines, "FORMAT=32-bit_rle_rgbe", "EXPOSURE=1.0"]
         about += ["PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.3290"]
         head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"
@@ -146,7 +146,7 @@ def _literal(raw: bytes) -> bytes:
 
 
 def _read_head(data: bytes) -> tuple[dict[str, str], int, int, int]:
-    """Return what the header says, height, width, and where the pixels begin."""
+    """Return the entries of the header, height, width, and the offset of the pixels in bytes."""
     if not data.startswith((b"#?RADIANCE", b"#?RGBE")):
         raise ValueError("no Radiance header")
     end = data.index(b"\n\n")

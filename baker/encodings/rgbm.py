@@ -1,7 +1,7 @@
 """RGBM: high dynamic range in an 8-bit RGBA PNG, for engines and phones without float textures.
 
 value = top * (rgb * a)^GAMMA, with rgb and a from 0 to 1 as stored (no sRGB decoding). a is the brightest
-channel, rounded up, so that rgb never exceeds 1. `top` and the gamma stand in the file's text chunks.
+channel, rounded up, so that rgb never exceeds 1. `top` and the gamma are in the file's text chunks.
 
 Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, whose gamma of 2.2 this has.
 """
@@ -79,7 +79,7 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         root = _root(pixels, options.top)
         multiplier = root.max(axis=-1, keepdims=True) + 1.0 / 255.0
         upper = (root + multiplier * (0.5 / 255.0)) ** GAMMA
-        # Single precision holds what is read.
+        # Add the rounding error of decoding to single precision.
         bound: NDArray[np.float64] = options.top * (upper - root**GAMMA) + 1e-6 * pixels
         return bound
 
@@ -112,12 +112,12 @@ class RgbmEncoding(Encoding[RgbmOptions]):
             ) from None
 
     def decode(self, path: Path) -> DecodedImage:
-        """Read a file that says its own top.
+        """Read a file whose text chunks contain `top` and the gamma.
 
         Raises
         ------
         InputError
-            If the file is absent, no PNG, or does not say what its numbers mean.
+            If the file is absent, no PNG, or has no such text chunks.
         """
         pixels, header = decode_png(path)
         try:

@@ -1,4 +1,4 @@
-"""What exports share: the description of a bake, copies of its files, and the README of a folder."""
+"""Shared code of exports: the description of a bake, copies of its files, and the README of a folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def describe(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return what a loader has to know: pages, and where each object lies in them.
+    """Return the description of a bake for loaders: pages, and the uv transform of each object.
 
     page uv = TEXCOORD_1 * uv_scale + uv_offset, v = 0 is the first image row.
     """
@@ -84,16 +84,16 @@ def template(export: str, name: str) -> str:
 
 
 def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, steps: tuple[str, ...]) -> None:
-    """Write a folder's README: what to do, and the three things that go wrong elsewhere.
+    """Write a folder's README: steps for the user, and the conventions that engines differ in.
 
     Parameters
     ----------
     target : Path
     title : str
     scale, uv, rows : str
-        What the numbers are, which uv set reads them, and in which order the rows lie.
+        Quantity of the numbers, uv set of lookups, and order of the image rows.
     steps : tuple of str
-        What to do with the folder, a line each.
+        Steps for the user, a line each.
     """
     lines = [f"# {title}", "", *steps, ""]
     lines += [f"- Scale: {scale}", f"- UV set: {uv}", f"- Row order: {rows}"]
@@ -101,10 +101,10 @@ def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, st
 
 
 def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
-    """Write scene.glb with a name of its own for every node, for engines that know nodes by name only.
+    """Write scene.glb with a unique name for every node, for engines that identify nodes by name.
 
-    The name of node i is the old one, with what engines take out or read as a hint replaced, and `_n<i>` at
-    its end. Its mesh has the same name, and `extras.baker_node` says i.
+    The name of node i is the old one, without characters and suffixes that engines interpret, followed by
+    `_n<i>`. Its mesh has the same name, and `extras.baker_node` is i.
 
     Returns
     -------

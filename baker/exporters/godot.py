@@ -46,7 +46,7 @@ class GodotExport:
         for name in FILES:
             write_text(target / name, template("godot", name))
         (target / "godot3").mkdir()
-        # Version 4 must not look into the files for version 3.
+        # Godot 4 must not import the files for Godot 3.
         write_text(target / "godot3" / ".gdignore", "")
         for name in FILES_3:
             write_text(target / "godot3" / name, template("godot", f"godot3/{name}"))

@@ -1,4 +1,4 @@
-"""Unity: pages in Unity's scale and scripts that import them and hand them to the renderers.
+"""Unity: pages in Unity's scale, and scripts that import them and assign them to renderers.
 
 Unity multiplies a lightmap by the albedo and by nothing else, so its pages hold E / pi. glTF importers turn v
 over (v' = 1 - v), and images begin below, so a page is right as it is; scale and offset of an object become
@@ -27,7 +27,7 @@ from baker.exporters.common import (
     write_text,
 )
 
-# What the header of a page says of itself and still holds after division.
+# Entries of a page's header that are still valid after division by pi.
 _KEPT = ("colourSpace", "software")
 
 SCRIPTS = ("Editor/BakerLightmapImporter.cs", "BakerLightmaps.cs")

@@ -1,7 +1,9 @@
-"""One GLB that needs no lightmap: what each surface sends out, as an unlit texture on the first uv set.
+"""One GLB without lightmaps: the radiance of each surface as an unlit texture on the first uv set.
 
-For viewers on phones and in AR, which know neither a second uv set nor high range. Each page becomes an sRGB
-PNG of (albedo x E / pi + emission) x exposure, clipped at 1; the exposure lets 99 % of the texels through.
+For viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each page
+becomes an sRGB
+PNG of (albedo x E / pi + emission) x exposure, clipped at 1; with this exposure 99 % of the texels are not
+clipped.
 
 Based on: Khronos Group, KHR_materials_unlit.
 """
@@ -64,7 +66,7 @@ EXPORTS.register("unlit")(UnlitExport())
 
 
 def radiance(bake: StoredBake) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return what surfaces send out, cd/m2, and their alpha, and which texels lie on them.
+    """Return the radiance of surfaces, cd/m2, with alpha, and the mask of covered texels.
 
     Returns
     -------
@@ -150,7 +152,7 @@ def _unlight(material: Json, page: int) -> None:
 
 
 def _kind(material: Material) -> Material:
-    """Return a material without colours: what is left of it beside the page's texture."""
+    """Return a material without colours and textures; the page's texture replaces them."""
     return Material(
         name="unlit",
         base_colour=(1.0, 1.0, 1.0, 1.0),

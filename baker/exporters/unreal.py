@@ -1,6 +1,6 @@
 """Unreal Engine: pages, scene, and an editor script that builds a material function on uv set 1.
 
-Unreal's own lightmaps cannot come from outside, so the light goes through an unlit material:
+Unreal cannot import lightmaps, so the light is the emission of an unlit material:
 emissive colour = base colour * page(TexCoord[1] * scale + offset) / pi.
 """
 

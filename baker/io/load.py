@@ -37,7 +37,7 @@ class SceneFile:
     reflections : bool
         Also read metallic-roughness textures.
     lenient : bool
-        Report what a bake refuses instead of raising, and keep the triangles as the file holds them.
+        Report defects as warnings instead of raising, and keep the triangles as in the file.
     """
 
     path: Path
@@ -83,7 +83,7 @@ def load_scene(
     Returns
     -------
     Scene
-        With at least one triangle, unless lenient. `Scene.warnings` lists what was left out.
+        With at least one triangle, unless lenient. `Scene.warnings` lists the parts that were left out.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """The hash of a scene file and of all files that it refers to, without decoding them.
 
-It equals `Scene.sha256`, from which batches decide whether a bake is up to date.
+It equals `Scene.sha256`, which batches compare to find whether a bake is up to date.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def temporary_path(out: Path, *, inside: bool = False) -> Path:
 
 
 def old_path(temporary: Path) -> Path:
-    """Return the folder for what the files in `temporary` replace."""
+    """Return the folder of the files that those in `temporary` replace."""
     return temporary.with_name(temporary.name + "-old")
 
 

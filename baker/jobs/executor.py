@@ -63,7 +63,7 @@ class LocalJobExecutor:
     Parameters
     ----------
     slots : int
-        Most processes at a time; each starts with its first job.
+        Largest number of processes; each is started for its first job.
     """
 
     def __init__(self, slots: int) -> None:
@@ -73,7 +73,7 @@ class LocalJobExecutor:
         self._busy: dict[_Worker, tuple[int, Job]] = {}
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Hand a job to a worker that waits, or to a new one."""
+        """Send a job to an idle worker, or to a new one."""
         worker = self._idle.pop() if self._idle else _Worker(self._heard)
         self._busy[worker] = (ticket, job)
         worker.begin(job, threads=threads, force=force)
@@ -85,7 +85,7 @@ class LocalJobExecutor:
         except queue.Empty:
             return None
         if worker not in self._busy:
-            # It died between two jobs.
+            # The worker died between two jobs.
             self._idle = [other for other in self._idle if other is not worker]
             return None
         ticket, job = self._busy[worker]
@@ -99,7 +99,7 @@ class LocalJobExecutor:
         return Event(ticket, ended=True, error=message.get("error"))
 
     def close(self) -> None:
-        """Kill what still works and remove what it left half written."""
+        """Kill all workers and remove their unfinished output."""
         for worker in self._idle:
             worker.end(None)
         for worker, (_, job) in self._busy.items():
@@ -109,7 +109,7 @@ class LocalJobExecutor:
 
 
 class _Worker:
-    """One process, and the thread that listens to it."""
+    """One process, and the thread that reads its messages."""
 
     def __init__(self, heard: queue.SimpleQueue[tuple[_Worker, dict[str, Any]]]) -> None:
         self.heard = heard
@@ -133,7 +133,7 @@ class _Worker:
         self.heard.put((self, {"dead": True, "error": _death(self.process.wait())}))
 
     def end(self, job: Job | None) -> None:
-        """Kill the process, and remove what it wrote of `job` that is not whole."""
+        """Kill the process, and remove its unfinished output of `job`."""
         self.process.kill()
         self.process.wait()
         self.listener.join()

@@ -52,7 +52,7 @@ def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
     path : Path
         TOML file.
     overrides : dict
-        Settings from the command line, which win over those of every job.
+        Settings from the command line; they override those of every job.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def _words(path: Path, where: str, key: str, value: Any) -> list[str]:
 
 
 def _find(path: Path, where: str, pattern: str) -> list[Path]:
-    """Return the scene files that a pattern finds, without hidden files and without what bakes wrote."""
+    """Return the scene files that match a pattern, without hidden files and files written by bakes."""
     import glob
 
     from baker.io.load import IMPORTERS

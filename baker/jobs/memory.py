@@ -15,7 +15,7 @@ _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes that "8G", "512M" or "1.5GiB" stand for; units are powers of 1024.
+    """Return the number of bytes of a text such as "8G", "512M" or "1.5GiB"; units are powers of 1024.
 
     Raises
     ------

@@ -62,11 +62,11 @@ def run_jobs_file(
     jobs_file : Path
         TOML file of scenes and settings.
     settings : BatchSettings
-        Processes, memory, seed, and what is baked.
+        Processes, memory, seed, and the jobs to bake.
     progress : Progress
         Called with all jobs as one stage; a truthy return value stops them all.
     executor : callable, optional
-        Makes what runs the jobs; default: processes on this machine.
+        Returns the executor of the jobs; default: processes on this machine.
     starting : callable
         Called with each output folder before anything is done there.
 

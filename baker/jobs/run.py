@@ -1,4 +1,6 @@
-"""Runs many bakes: finds out which are needed, and has them baked within bounds of processes and memory."""
+"""Runs many bakes: finds those that are not up to date, and runs them within limits on processes and
+memory.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,13 @@ from baker.jobs.executor import Event, JobExecutor
 from baker.jobs.jobs_file import Job
 from baker.jobs.up_to_date import Freshness, check_output
 
-# Seconds between two looks at locks held by other runs, and at the wish to stop.
+# Seconds between two polls of locks held by other runs, and of the progress callback.
 _LOOK = 0.1
 
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """How a batch runs.
+    """Options of a batch.
 
     Attributes
     ----------
@@ -35,11 +37,11 @@ class BatchOptions:
     memory : int or None
         Bytes that all bakes together may take; None is no limit.
     force : bool
-        Bake what is unchanged, too, and into folders that baker did not write.
+        Also bake jobs that are up to date, and into folders that baker did not write.
     fail_fast : bool
-        Start nothing more after a failure.
+        Start no further jobs after a failure.
     dry_run : bool
-        Only say what would be done.
+        Only report the jobs that would be baked.
     """
 
     threads: int | None = None
@@ -51,17 +53,17 @@ class BatchOptions:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job.
+    """Result of a job.
 
     Attributes
     ----------
     job : Job
     state : str
-        "baked", "unchanged" or "failed"; after a dry run, what would become of it.
+        "baked", "unchanged" or "failed"; of a dry run, the expected state.
     why : str
     seconds : float
     code : int
-        The exit code that a failure stands for, else 0.
+        The exit code of a failure, else 0.
     """
 
     job: Job
@@ -94,7 +96,7 @@ def run_batch(
     progress: Progress,
     starting: Callable[[Path], None] = lambda out: None,
 ) -> list[Outcome]:
-    """Bake the jobs that need it, in their order, several at a time.
+    """Bake the jobs that are not up to date, in their order, several at a time.
 
     Parameters
     ----------
@@ -103,9 +105,9 @@ def run_batch(
         Does the work; closed at the end.
     options : BatchOptions
     progress : Progress
-        Told of all jobs as one stage; a truthy return value stops them all.
+        Called with all jobs as one stage; a truthy return value stops them all.
     starting : callable
-        Told each output folder before anything is done there.
+        Called with each output folder before anything is written there.
 
     Returns
     -------
@@ -115,7 +117,8 @@ def run_batch(
     Raises
     ------
     Cancelled
-        If `progress` returned a truthy value. Finished jobs stay whole, the others are as they were.
+        If `progress` returned a truthy value. Finished jobs are kept; the output folders of the others are
+        unchanged.
     """
     try:
         return _Run(jobs, executor, options, progress, starting).run()
@@ -135,7 +138,7 @@ class _Run:
     running: dict[int, _Ticket] = field(default_factory=dict)
 
     def run(self) -> list[Outcome]:
-        """Look at every job, then bake."""
+        """Examine every job, then bake."""
         self.survey()
         if not self.options.dry_run:
             try:
@@ -147,7 +150,7 @@ class _Run:
                         self.hear(event)
                     self.report_all(blocked=blocked)
             finally:
-                # Nobody may bake there before what runs has ended and its leavings are gone.
+                # Keep the locks until running jobs have ended and their unfinished output is removed.
                 self.executor.close()
                 for ticket in self.running.values():
                     _release(ticket)
@@ -171,7 +174,7 @@ class _Run:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def examine(self, number: int, job: Job) -> Outcome | _Ticket:
-        """Decide about one job."""
+        """Return the outcome of one job that needs no bake, else a ticket for the bake."""
         start = time.perf_counter()
         if job.out is None:
             return Outcome(job, "failed", job.problem, code=3)
@@ -187,7 +190,7 @@ class _Run:
             return _failure(job, error, time.perf_counter() - start)
 
     def peak(self, job: Job) -> int:
-        """Estimate the memory of a job, bytes; 0 where nobody counts."""
+        """Estimate the memory of a job, bytes; 0 without a memory limit."""
         limit = self.options.memory
         if limit is None:
             return 0
@@ -265,7 +268,7 @@ class _Run:
             self.waiting.clear()
 
     def finish(self, ticket: _Ticket, outcome: Outcome) -> None:
-        """Note what became of a job and give its folder back."""
+        """Store the outcome of a job and release the lock of its folder."""
         self.outcomes[ticket.number] = outcome
         _release(ticket)
 
@@ -292,7 +295,7 @@ def _failure(job: Job, error: BaseException, seconds: float) -> Outcome:
 
 
 def batch_json(outcomes: Sequence[Outcome], *, dry_run: bool) -> dict[str, Any]:
-    """Return what `batch --json` prints."""
+    """Return the JSON object of `batch --json`."""
     rows = [
         {
             "scene": str(outcome.job.scene),

@@ -128,7 +128,7 @@ def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
 
 
 def _channel(lightmap: Lightmap) -> dict[str, Any]:
-    """Return what the numbers of a channel mean."""
+    """Return unit, quantity, components and definition of a channel."""
     keys = ("unit", "quantity", "components", "signed", "definition")
     return {key: getattr(lightmap.description, key) for key in keys}
 

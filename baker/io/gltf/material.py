@@ -60,7 +60,7 @@ class MaterialReader:
         self.reported: set[int] = set()
 
     def need(self, number: int) -> Material:
-        """Return a material; the number behind the last one is glTF's default material.
+        """Return a material; the number after the last one is glTF's default material.
 
         Raises
         ------

@@ -100,7 +100,7 @@ def lit_material(material, image, uv, entry, exposure):
 
 
 def feed(links, node, name, target, fallback):
-    """Give `target` what goes into an input of `node`: its link, or its value."""
+    """Connect `target` to the link of an input of `node`, or set it to the input's value."""
     socket = None if node is None else node.inputs.get(name)
     if socket is not None and socket.is_linked:
         links.new(socket.links[0].from_socket, target)

@@ -17,7 +17,7 @@ editing = unreal.MaterialEditingLibrary
 
 
 def import_file(path, destination):
-    """Import one file and return the paths of what came out of it."""
+    """Import one file and return the paths of the created assets."""
     task = unreal.AssetImportTask()
     task.filename, task.destination_path = str(path), destination
     task.automated, task.replace_existing, task.save = True, True, True
@@ -153,7 +153,7 @@ def main():
 
 
 def copy_base_colour(old, instance):
-    """Take base colour over from the material that the glTF importer made, where it says one."""
+    """Copy the base colour of the material that the glTF importer made, if it has one."""
     if old is None:
         return
     for name in ("BaseColorTexture", "Base Color Texture"):
