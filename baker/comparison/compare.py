@@ -1,7 +1,7 @@
 """Compares the maps of two finished bakes at the same points of the surface.
 
-Points are texels of a's; the maps of both are read there bilinearly, each at its own lightmap uv, as an
-engine reads them. b is the reference: a bias of +10 % says that a is brighter.
+Points are chosen in texels of bake a. The maps of both bakes are looked up there bilinearly, each at its own
+lightmap uv. Bake b is the reference: a bias of +10 % means that a is brighter.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def compare(
     Returns
     -------
     DiffReport
-        Figures of each channel that both bakes have, and the points furthest apart.
+        Error measures of each channel that both bakes have, and the points with the largest differences.
 
     Raises
     ------

@@ -58,7 +58,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class Sides:
-    """Both bakes' surfaces and what is paired.
+    """Surfaces of both bakes, and the pairs of their objects.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ at most points and too strong at some. The noise of colour shifts is small, beca
 correlated.
 
 Where the reference is below three of its standard errors, differences are relative to a thousandth of the
-scene's bright light, and the standard error includes one missed path that carries that light.
+scene's bright light, and the standard error includes one missed path with that light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.

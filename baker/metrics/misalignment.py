@@ -22,7 +22,7 @@ _Z = 4.0
 # Fewest texels of a decision.
 _MIN_TEXELS = 32
 # Relative error of a correct map. Squared errors are in variances of this and the noise of the reference, and
-# clipped, so that few texels with a large error or much noise do not decide.
+# clipped, so that few texels with a large error or much noise do not dominate.
 _TOLERANCE, _CLIP = 0.03, 9.0
 # Exponents that are tried, 1 in the middle.
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))

@@ -1,7 +1,7 @@
 """Texels of a map that differ from all their neighbours, and texels where light changes most.
 
-They are few, and random sampling would miss them. Only path tracing can decide whether they are wrong: a
-gap through which light falls differs from its neighbours as much as a fault does.
+They are few, and random sampling would miss them. Path tracing is needed to find whether they are wrong: a
+correct texel next to a gap through which light enters differs from its neighbours as much as a wrong one.
 """
 
 from __future__ import annotations

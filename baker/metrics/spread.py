@@ -66,9 +66,9 @@ def own_error(
     value, reference : (n,) float64
         Values and reference values.
     noise : (n,) float64
-        Standard errors of the reference, as its passes show them.
+        Standard errors of the reference, estimated from its passes.
     apart : (n,) float64
-        Half the difference of two halves of the reference: an error like that of their mean.
+        Half the difference of two halves of the reference, a sample of the error of their mean.
     floor : float
         Smallest light that errors are relative to.
     z : float

@@ -2,8 +2,9 @@
 
 An engine looks the map up bilinearly at any point of the surface. The four texels around it contribute,
 whether they are covered, filled or dilated. The reference of such a lookup is the mean light at points inside
-these four texels, with the weights of the lookup. Only points of the same surface that the looked-up point
-sees are used; otherwise a lookup next to a wall would be compared with light behind the wall.
+these four texels, with the weights of the lookup. Only points of the same surface that are visible from the
+looked-up point are used; otherwise a lookup next to a wall would be compared with light on the other side of
+the wall.
 """
 
 from __future__ import annotations
@@ -177,7 +178,7 @@ def _footprints(
 ) -> SurfacePoints:
     """Return for each point n_points points in the four texels of its lookup, drawn by the lookup's weights.
 
-    Where a point sees none of them, it is used itself.
+    If none of them is visible from a point, the point itself is used.
     """
     size, n = owner.shape[1], len(point.at)
     tap, share = _taps(point, size)
@@ -188,7 +189,7 @@ def _footprints(
     row, column = np.nonzero(usable)
     # Candidates (m, _POINTS_PER_TEXEL) of point `row`.
     position, normal, face = (array[number] for array in (spread.position, spread.normal, spread.face_normal))
-    # Keep candidates on the same surface that the point sees.
+    # Keep candidates on the same surface that are visible from the point.
     off = position - point.position[row][:, None]
     near = np.linalg.norm(off, axis=2) < _MAX_TEXELS * np.sqrt(point.square[row])[:, None]
     good = near & ((face * point.face_normal[row][:, None]).sum(axis=2) > _MIN_COSINE)

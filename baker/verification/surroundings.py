@@ -4,10 +4,10 @@
 its rays end within two texels: texels cannot resolve the light there, so gaps are only part of the metrics
 over all texels.
 
-A room is the set of points that are visible from one point in the air. Points in the air are the middles of
-rays between surfaces. The one that sees most points defines the first room, the one that sees most of the
-rest the second, and so on. This separates closed rooms, and rooms with open doors except for the part that is
-visible through the door.
+A room is the set of points that are visible from one point in the air. Points in the air are the midpoints of
+rays between surfaces. The one from which most points are visible defines the first room, the one from which
+most of the remaining points are visible the second, and so on. This separates closed rooms, and rooms with
+open doors except for the part that is visible through the door.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Surroundings:
     gap : (n,) bool
         In a narrow gap, or inside geometry.
     room : (n,) int32
-        Number of the room; -1 in gaps, and where no point in the air sees the texel.
+        Number of the room; -1 in gaps, and where the texel is visible from no point in the air.
     air : (m, 3) float64, metres, world, relative to the geometry's origin
         Points in the air from which rooms were found.
     """
@@ -71,7 +71,7 @@ def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surro
     """Find points inside geometry, points in narrow gaps, and rooms."""
     random = np.random.Generator(np.random.PCG64([seed, 9]))
     black, near, air = _first_look(reference, points, random)
-    # Test all points of the texels of which one ray meets a back or the inside of a solid.
+    # Test all points of the texels of which one ray hits a back or the inside of a solid.
     tested = np.flatnonzero(black.any(axis=1))
     valid_share = np.ones(len(points.position))
     if len(tested):
@@ -92,7 +92,7 @@ def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surro
 def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
     """Return the points (m, 3) in the air that are not inside geometry.
 
-    A ray that starts at an invalid point of a partly valid texel and meets the front of another solid has its
+    A ray that starts at an invalid point of a partly valid texel and hits the front of another solid has its
     middle inside a solid.
     """
     random = np.random.Generator(np.random.PCG64([seed, 14]))
@@ -144,7 +144,7 @@ def _first_look(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Cast a ray from each point (n, k).
 
-    Returns whether it meets a back or the inside of a solid (n, k), whether the hit is near (n, k), and the
+    Returns whether it hits a back or the inside of a solid (n, k), whether the hit is near (n, k), and the
     middle of the longest ray of each texel that does not (n, 3).
     """
     n, k = points.position.shape[:2]
@@ -170,7 +170,9 @@ def _add_rooms(
     left: NDArray[np.int64],
     room: NDArray[np.int32],
 ) -> None:
-    """Assign rooms to the texels `left` (p,) from what points in the air (m, 3) see; changes `room` (n,)."""
+    """Assign rooms to the texels `left` (p,) by their visibility from points in the air (m, 3); changes
+    `room` (n,).
+    """
     seen = visible(reference, air, points.position[left, 0], points.face_normal[left, 0])
     alone = np.ones(len(left), bool)
     while len(air):

@@ -1,4 +1,4 @@
-"""Texels that differ from all their neighbours, and how many of them are wrong."""
+"""Texels that differ from all their neighbours, and the number of wrong ones among them."""
 
 from __future__ import annotations
 
