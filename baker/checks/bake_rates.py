@@ -94,7 +94,7 @@ def rates_beside(scene: Path) -> Rates | None:
     with contextlib.suppress(OSError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
             path = folder / MANIFEST_NAME
-            # Skip what cannot be read: the user did not name these folders.
+            # Skip unreadable manifests: the user did not name these folders.
             with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
                 if path.stat().st_size > _MOST_BYTES:
                     continue

@@ -1,8 +1,8 @@
 """The registry of checks: one function per code, with its severity, advice and documentation.
 
 A rule is a function that takes a `CheckContext` and yields `RawFinding`, decorated with `check` in a file of
-`baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line states what it finds,
-the rest why that matters and how it is found.
+`baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line names the defect, the
+rest describes its effect and the test.
 """
 
 from __future__ import annotations

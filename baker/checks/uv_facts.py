@@ -46,7 +46,7 @@ class UvFacts:
 
     @cached_property
     def valid(self) -> bool:
-        """Return whether there are rows, and all are finite and inside the page: what other rules require."""
+        """Return whether there are rows, all finite and inside the page, as other rules require."""
         return bool(len(self.rows)) and bool(self.finite.all()) and not self.outside.any()
 
     @cached_property

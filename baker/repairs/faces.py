@@ -91,7 +91,7 @@ def _exact_duplicates(primitive: EditablePrimitive, triangle: NDArray[np.int64])
     """Return the (T,) bool mask of (T, 3) faces that are rendered exactly like an earlier one.
 
     A face and its flipped twin are equal only if the material is double-sided and their normals are opposite:
-    the flipped one is then the first one seen from behind.
+    the flipped one is then the back side of the first one.
     """
     leave_out = {"NORMAL"} if primitive.reads_lightmap_uv else {"NORMAL", "TEXCOORD_1"}
     column = [data for name, data in primitive.column.items() if name not in leave_out]

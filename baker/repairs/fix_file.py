@@ -117,14 +117,14 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     Returns
     -------
     FixResult
-        The GLB with what was fixed and what was left alone.
+        The GLB, the changes made, and the defects that were not fixed.
 
     Raises
     ------
     InputError
         If the file cannot be read.
     ResourceError
-        If a repair is asked for and pymeshlab is not installed.
+        If `settings.repair` is set and pymeshlab is not installed.
     Cancelled
         If `progress` returned a truthy value.
     """
@@ -154,7 +154,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
 
 
 def _joined(first: FixResult, second: FixResult) -> FixResult:
-    """Return the result of two steps; what both leave alone is listed once."""
+    """Return the result of two steps; defects that both leave are listed once."""
     left = dict.fromkeys((*first.left_alone, *second.left_alone))
     return FixResult(second.data, (*first.fixed, *second.fixed), tuple(left))
 
@@ -266,7 +266,7 @@ def _in_range(arrays: SourcePrimitive) -> NDArray[np.bool_]:
 
 
 def _editable(source: SourceDocument, index: int, mesh: SourceMesh) -> list[EditablePrimitive]:
-    """Return the primitives of mesh `index` of the document, with what limits their edits."""
+    """Return the primitives of mesh `index` of the document, with the limits of their edits."""
     document = source.json
     primitives = document["meshes"][index]["primitives"]
     found = []

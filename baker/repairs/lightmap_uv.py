@@ -24,7 +24,7 @@ _SMALLEST = 64
 
 @dataclass(frozen=True)
 class UvRequest:
-    """For what lightmap page uv are tested and made.
+    """The lightmap page for which uv are tested and made.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ def new_lightmap_uv(
     mesh = _mesh(plan)
     if mesh is None:
         return plan, None
-    # A bake leaves duplicates out, so they do not count as overlap.
+    # A bake leaves duplicates out, so they are no overlap.
     single = ~duplicates(mesh.position, mesh.triangle.astype(np.int64), mesh.material, np.zeros(1, bool))
     fault = find_fault(replace(mesh, triangle=mesh.triangle[single]), request.resolution)
     if fault is None:

@@ -32,7 +32,7 @@ class Change:
     change : str
         Stable name.
     counted : str
-        What `before` and `after` count.
+        Unit of `before` and `after`, such as "faces".
     before, after : int
     distance : float or None
         Of a repair: Hausdorff distance of the old and the new surface, metres by the first node's scale.
@@ -58,7 +58,7 @@ class MeshPlan:
         One for each primitive.
     changes : tuple of Change
     left : tuple of str
-        Sentences: what is not fixed, and why.
+        Sentences about defects that are not fixed, with reasons.
     """
 
     edits: tuple[PrimitiveEdit, ...]

@@ -26,7 +26,7 @@ class MeshRepair:
         The new primitives by their number in the mesh; empty if it stays as it is.
     changes : tuple of Change
     left : tuple of str
-        Sentences: what is not repaired, and why.
+        Sentences about defects that are not repaired, with reasons.
     """
 
     made: dict[int, EditedPrimitive | ReplacedPrimitive]

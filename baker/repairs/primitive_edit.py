@@ -16,7 +16,7 @@ from baker.topology.unique_rows import first_equal, unique_rows
 
 @dataclass(frozen=True)
 class EditablePrimitive:
-    """A primitive as its file holds it, with what limits its edits.
+    """A primitive as stored in its file, and the limits of its edits.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ class ShapeRepair:
     before, after : WeldedMesh
     changes : tuple of Change
     left : tuple of str
-        Sentences: what is not repaired, and why.
+        Sentences about defects that are not repaired, with reasons.
     """
 
     edits: tuple[PrimitiveEdit, ...]
@@ -65,7 +65,7 @@ def repair_shape(primitives: Sequence[EditablePrimitive]) -> ShapeRepair:
     Raises
     ------
     ResourceError
-        If pymeshlab is missing or gives up.
+        If pymeshlab is missing or one of its filters fails.
     """
     n = len(primitives)
     before = weld_primitives(primitives)
@@ -121,7 +121,7 @@ def _make_manifold(mesh: WeldedMesh, changes: list[Change], left: list[str]) -> 
 def _choose_flips(
     primitives: Sequence[EditablePrimitive], mesh: WeldedMesh, changes: list[Change]
 ) -> NDArray[np.bool_]:
-    """Return the (T,) mask of faces to flip, by their normals, their neighbours, or what can be seen."""
+    """Return the (T,) mask of faces to flip, by their normals, their neighbours, or visibility."""
     normal = np.zeros(mesh.row.shape, np.float32)
     for k, primitive in enumerate(primitives):
         if primitive.arrays.normal is not None:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected, number_by_first
 
-# Mean of sign(normal . front) over a piece's area, in absolute value, above which the normals decide.
+# Mean of sign(normal . front) over a piece's area, in absolute value, above which faces are flipped by their
+# normals.
 _CLEAR = 0.5
 
 
@@ -44,7 +45,7 @@ def find_wrong_winding(
     *,
     open_too: bool = False,
 ) -> Winding:
-    """Find the faces of closed pieces that look the wrong way.
+    """Find the faces of closed pieces with wrong winding.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Writes a fixed scene completely or not at all, and never over a file without being asked."""
+"""Writes a fixed scene completely or not at all; replaces an existing file only with `force`."""
 
 from __future__ import annotations
 

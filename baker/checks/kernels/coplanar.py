@@ -12,7 +12,7 @@ from baker.trace.jit import inner, kernel
 def coplanar_partners(corner, low, high, first, owner, slack, partner):
     """Write for each triangle one of another owner that it overlaps in its plane.
 
-    Two triangles overlap if no direction perpendicular to a side keeps them apart (separating axes).
+    Two triangles overlap if their projections overlap on the normals of all sides (separating axis theorem).
 
     Parameters
     ----------

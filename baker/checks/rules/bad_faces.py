@@ -70,7 +70,7 @@ def _each(context: CheckContext) -> Iterator[tuple[int, MeshFacts]]:
 def index_range(context: CheckContext) -> Iterator[RawFinding]:
     """Faces with the index of a vertex that does not exist.
 
-    The index buffer and the vertices do not belong together. A bake refuses such a file.
+    The index buffer was made for other vertices. A bake stops with an error.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(~facts.within)

@@ -44,8 +44,8 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
     between two boxes that touch. They are never visible and receive no light. A bake marks their texels
     invalid and fills them from visible neighbours of the same chart. Double-sided materials make no
     difference; rooms (with a light, a camera or most of the scene inside) are no solids. Faces that a solid
-    encloses only in part are not counted. Double-sided faces that bound a solid and look into it are counted:
-    flip them, since their lightmap shows the dark inside.
+    encloses only in part are not counted. Double-sided faces that bound a solid and whose fronts point into
+    it are counted: flip them, since their lightmap contains the dark inside.
     """
     world = context.world
     if not len(world.triangle):
@@ -55,7 +55,7 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
         return
     inverted = (solids.inside == BEFORE) & world.double_sided
     holder = _holders(world, solids)
-    # `inside-out` and `flipped-neighbours` report one-sided faces that look into their own solid.
+    # `inside-out` and `flipped-neighbours` report one-sided faces whose fronts point into their own solid.
     holder[solids.inside == BEFORE] = -1
     for number in np.unique(world.instance[(holder >= 0) | inverted]):
         own = world.instance == number

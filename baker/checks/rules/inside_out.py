@@ -32,11 +32,11 @@ _WITNESSES = 8
     in_bake=True,
 )
 def inside_out(context: CheckContext) -> Iterator[RawFinding]:
-    """A closed part whose faces all look inwards, with nothing in it.
+    """A closed part whose fronts all point inwards, with nothing inside.
 
-    From outside it is black and absorbs all light. Rooms look inwards on purpose, so parts with a light, a
-    camera or other geometry inside are not reported, nor are parts that emit, the inner surfaces of shells,
-    and double-sided surfaces. Less than 5 % of an object's surface is a warning only.
+    From outside it is black and absorbs all light. The fronts of rooms point inwards by design, so parts with
+    a light, a camera or other geometry inside are not reported, nor are parts that emit, the inner surfaces
+    of shells, and double-sided surfaces. Less than 5 % of an object's surface is a warning only.
     """
     for m, facts in enumerate(context.meshes):
         wrong = inside_out_parts(context, m)
@@ -89,7 +89,7 @@ def _may_be(facts: MeshFacts) -> bool:
         return False
     total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
     # A positive volume of the whole mesh does not rule out a part with a negative one. Rule out meshes whose
-    # area vectors add up to zero and of which no face looks to the centroid.
+    # area vectors add up to zero and of which no front faces the centroid.
     outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 

@@ -83,7 +83,7 @@ def bad_normals(context: CheckContext) -> Iterator[RawFinding]:
 def normal_length(context: CheckContext) -> Iterator[RawFinding]:
     """Vertex normals that are not one unit long, by more than 2 %.
 
-    A shader that trusts them shades the surface too bright or too dark.
+    A shader that does not normalise them shades the surface too bright or too dark.
     """
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):

@@ -20,7 +20,7 @@ from baker.core.parallel import thread_count
 _ENDS = 1e-4
 # Least depth of an intersection, as a share of the mesh's diagonal; less is a touch.
 _DEPTH = 1e-5
-# Largest number of hits along an edge; a ray continues behind each neighbour that it hits.
+# Largest number of hits along an edge; a ray continues after each neighbour that it hits.
 _ROUNDS = 4
 # Distance of planes that count as the same, as a share of the scene's diagonal, and its limits in metres.
 COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3

@@ -80,7 +80,7 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
     fix="use 2^level texels and more between charts, or sample the lightmap without mipmaps",
 )
 def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that mix at the asked mip level (`mip`, default 2).
+    """Charts that mix at the mip level `mip` (default 2).
 
     A texel of level n covers 2^n x 2^n texels of the page. This affects only lightmaps sampled with mipmaps.
     """
