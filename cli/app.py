@@ -89,7 +89,7 @@ def _verbosity(argv: list[str]) -> int:
 
 
 def _reserve_stdout() -> TextIO:
-    # Native libraries may print to descriptor 1; with --json it carries one object only.
+    # Native libraries may print to descriptor 1; with --json it must contain one object only.
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return out

@@ -23,7 +23,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace OUT even if baker 
 def bake_command(
     ctx: typer.Context, scene: Scene, out: Out, force: Force = False, cluster: Cluster = None
 ) -> None:
-    """Bake, show progress, and report what was written."""
+    """Bake, show progress, and report the files written."""
     from baker.cli.report import bake_json, write_summary
 
     run: Run = ctx.obj
@@ -37,7 +37,8 @@ def bake_command(
         from baker.io.bake.lock import held
         from baker.pipeline.bake import bake
 
-        # What is loaded by now stays: looking for cycles in it takes 4 % of a first bake, which compiles.
+        # Exclude the objects that exist now from garbage collection: it took 4 % of a first bake, which
+        # compiles.
         gc.freeze()
         spread: dict[str, Any] = (
             {} if cluster is None else {"executor": _tile_executor(cluster, settings.threads)}

@@ -1,4 +1,4 @@
-"""`baker batch JOBS.toml`: many scenes, and only what changed."""
+"""`baker batch JOBS.toml`: bakes the scenes of a jobs file that are not up to date."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def batch(
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
     cluster: Cluster = None,
 ) -> None:
-    """Bake what changed, show one progress for all, and report."""
+    """Bake the jobs that are not up to date, show their common progress, and report."""
     from baker.jobs.report import run_jobs_file
     from baker.jobs.run import write_junit
 

@@ -1,4 +1,4 @@
-"""The decorator of commands: adds the flags of settings, and does what all commands do before they work."""
+"""The decorator of commands: adds the flags of settings, and runs the steps that all commands share."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from baker.cli.flags import in_keys
 from baker.core.errors import SettingsError
 from baker.core.settings_model import Settings
 
-# Its keys may also stand at the top of the file.
+# Its keys may also be at the top level of the file.
 TOP_TABLE = "bake"
 # Tables of a configuration file, one for each model of settings that has one.
 TABLES = ("bake", "check", "verify", "render", "diff", "repair")
@@ -24,7 +24,7 @@ def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        TOML file with a table for each kind of settings. Those of a bake may stand at the top instead.
+        TOML file with a table for each kind of settings. Those of a bake may be at the top level instead.
     name : str
         Of the table.
 

@@ -34,7 +34,9 @@ def diff(
 
 
 def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
-    """Write what differs, a table of figures, the objects and places furthest apart, and what failed."""
+    """Write differences of the manifests, a table of errors, the objects and points with the largest ones,
+    and the failed limits.
+    """
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     for entry in found.differences:

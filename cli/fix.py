@@ -33,7 +33,7 @@ class FixRequest:
 def fix_request(
     scenes: list[Path], settings: RepairSettings, *, fix: bool, out: Path | None, force: bool
 ) -> FixRequest | None:
-    """Return what is to be fixed, or None for a check alone.
+    """Return the request of `--fix` or `--repair`, or None for a check only.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def fix_scene(request: FixRequest, progress: Progress) -> FixResult:
 
 
 def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> None:
-    """Write what was fixed and what was left alone, a line each."""
+    """Write the changes made and the defects that were not fixed, a line each."""
     for fix in result.fixed:
         change = fix.change
         stream.write(
@@ -85,6 +85,6 @@ def fixed_json(result: FixResult, request: FixRequest) -> dict[str, Any]:
 
 
 def _more(change: Change) -> str:
-    """Return what a repair did to the surface and to attributes, in words."""
+    """Return the change of the surface and the lost attributes of a repair, as text."""
     moved = "" if change.distance is None else f"; the surface moved by up to {change.distance:.3g} m"
     return moved + (f"; {', '.join(change.lost)} could not be kept" if change.lost else "")

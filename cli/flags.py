@@ -88,7 +88,7 @@ def values_in_flags(value: Any) -> Any:
     Parameters
     ----------
     value : object
-        What `--json` prints.
+        The object that `--json` prints.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""`baker inspect PATH`: what is in a scene, a bake or an image."""
+"""`baker inspect PATH`: prints the contents of a scene, a bake or an image."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def inspect(
         typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json, image or status_0.png."),
     ],
 ) -> None:
-    """Report what is in `path`."""
+    """Print the contents of `path`."""
     from baker.io.inspect import inspect_path
 
     run: Run = ctx.obj
@@ -72,7 +72,7 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
 
 
 def _write_table(rows: list[dict[str, Any]], stream: TextIO, *, pad: str, short: bool) -> None:
-    """Write rows under their keys; `short` cuts what is too long to be read in a table, like hashes."""
+    """Write rows under their keys; `short` truncates long values such as hashes."""
     keys = list(dict.fromkeys(key for row in rows for key in row))
     cells = [[_cell(key, _words(row.get(key, "")), short=short) for key in keys] for row in rows]
     widths = [max(len(line[index]) for line in [keys, *cells]) for index in range(len(keys))]

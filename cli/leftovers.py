@@ -1,4 +1,4 @@
-"""Records what exists before a command writes, and removes what it leaves behind if it is killed."""
+"""Records the state of an output before a command writes it, and restores it if the command is killed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from baker.io.temporary import temporaries
 
 
 def survey(out: str) -> bytes:
-    """Return what exists before a command writes, from which `restore` finds what is new.
+    """Return the state of an output before a command writes it, for `restore`.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def survey(out: str) -> bytes:
 
 
 def restore(note: bytes) -> None:
-    """Put the output back as it was, and remove what the command made.
+    """Restore the output, and remove the files and folders that the command made.
 
     Parameters
     ----------

@@ -24,9 +24,9 @@ class Reporter:
     quiet : bool
         Show nothing.
     stopped : callable
-        Returns whether the work was asked to stop; the callback returns the same.
+        Returns whether a signal has arrived; the callback returns the same.
     stream : TextIO
-        Where to show; default: stderr.
+        Stream of the progress; default: stderr.
     """
 
     def __init__(

@@ -21,7 +21,7 @@ def render(
     scene: Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="IMAGE", help="EXR or PNG file to write.")],
 ) -> None:
-    """Render, and report what was written."""
+    """Render, and report the files written."""
     run: Run = ctx.obj
     settings = run.of(RenderSettings)
     with run.progress() as progress:
@@ -56,7 +56,7 @@ def write_text(picture: Picture, out: Path, settings: RenderSettings, stream: Te
 
 
 def picture_json(picture: Picture, out: Path, settings: RenderSettings) -> dict[str, Any]:
-    """Return what `render --json` prints."""
+    """Return the JSON object of `render --json`."""
     from baker.rendering.write import exr_layers, tone_of
 
     tone = tone_of(out, picture)

@@ -12,7 +12,7 @@ KEYS = ("pages", "statistics", "timings", "rays", "warnings")
 
 
 def bake_json(result: BakeResult) -> dict[str, Any]:
-    """Return what `bake --json` prints."""
+    """Return the JSON object of `bake --json`."""
     manifest: dict[str, Any] = result.manifest
     return {"out": None if result.out is None else str(result.out), **{key: manifest[key] for key in KEYS}}
 

@@ -24,7 +24,7 @@ class Session:
     notes : int or None
         Descriptor of the file that lists output folders for the parent process, see `supervise`.
     as_json : bool
-        `--json` stood before the subcommand.
+        Whether `--json` was given before the subcommand.
     """
 
     out: TextIO = field(default_factory=lambda: sys.stdout)

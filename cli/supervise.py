@@ -25,7 +25,7 @@ _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class StopFlag:
-    """Records that a signal asked the work to stop.
+    """Records that a stopping signal has arrived.
 
     Attributes
     ----------

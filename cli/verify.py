@@ -42,7 +42,7 @@ def verify(
 
 
 def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
-    """Write a table of figures, what failed, and the worst texels."""
+    """Write a table of errors, the failed criteria, and the worst texels."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     columns = (
