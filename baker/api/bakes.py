@@ -34,7 +34,7 @@ def bake(
     scene : Scene, str or Path
         A scene file, or what `load` returns.
     settings : BakeSettings, optional
-        What is baked, and how.
+        Settings of the bake.
     out : str or Path, optional
         Folder to write; None keeps everything in memory.
     atlas : Atlas, optional

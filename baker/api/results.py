@@ -124,7 +124,7 @@ def diff(
     Returns
     -------
     DiffReport
-        Figures of each channel that both have, and the points furthest apart.
+        Error measures of each channel that both have, and the points with the largest differences.
 
     Raises
     ------
@@ -301,14 +301,14 @@ def batch(
     progress: Progress = silent,
     **keywords: Unpack[BatchKeywords],
 ) -> BatchReport:
-    r"""Bake many scenes, and only what changed.
+    r"""Bake the scenes of a jobs file that are not up to date.
 
     Parameters
     ----------
     jobs_file : str or Path
         TOML file of scenes and settings, see BATCH.md.
     settings : BatchSettings, optional
-        Processes, memory, and what is baked.
+        Processes, memory, and the jobs to bake.
     progress : Progress
         Called with stage and fraction; a truthy return value cancels.
     **keywords : Unpack[BatchKeywords]

@@ -66,7 +66,8 @@ def check(
     Parameters
     ----------
     scene : Scene, str or Path
-        A file is read leniently: what would stop a bake becomes a finding. A Scene has passed the importer.
+        A file is read leniently: errors that would stop a bake are reported as findings. A Scene has passed
+        the importer.
     settings : CheckSettings, optional
         How findings are counted.
     bake : BakeSettings, optional
@@ -161,7 +162,7 @@ def repair(
     Returns
     -------
     FixResult
-        The GLB in `data`, what was fixed, and what was left alone.
+        The GLB in `data`, the changes made, and the defects that were not fixed.
 
     Raises
     ------

@@ -74,7 +74,7 @@ class Encoding(ABC, Generic[Options]):
         Whether it holds negative numbers.
     options_type : type of `EncodingOptions`
     when_clipped, when_banded : str
-        What to do if a page exceeds the limits, or shows steps; the end of the warning's sentence.
+        Advice if a page exceeds the limits, or has visible steps; ends the sentence of the warning.
     """
 
     suffix: str
@@ -89,7 +89,7 @@ class Encoding(ABC, Generic[Options]):
         return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 
     def fitted(self, options: Options, brightest: float) -> Options:
-        """Return the options for one map, with whatever depends on its largest value filled in."""
+        """Return the options for one map, with those set that depend on its largest value."""
         return options
 
     def options_of_image(self, image: DecodedImage) -> Options:
@@ -102,7 +102,7 @@ class Encoding(ABC, Generic[Options]):
 
     @abstractmethod
     def stored(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
-        """Return (..., C) float32: what a reader of the file gets for pixels (..., C)."""
+        """Return (..., C) float32: the values decoded from the file for pixels (..., C)."""
 
     @abstractmethod
     def tolerance(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float64]:
@@ -191,7 +191,7 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     Parameters
     ----------
     pixels : ndarray of float32
-        What is to be written.
+        Values to write.
     components : tuple of int
         Numbers of components that the format holds.
     name : str

@@ -60,7 +60,7 @@ class ResourceError(BakerError):
 
 
 class Cancelled(BakerError):  # noqa: N818 - the public name of the interface
-    """The caller asked to stop (exit code 130)."""
+    """The progress callback or a signal stopped the work (exit code 130)."""
 
     kind = "cancelled"
     exit_code = 130

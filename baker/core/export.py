@@ -1,4 +1,4 @@
-"""What an export is: one file of `baker.exporters` that makes a finished bake ready for one engine.
+"""Interface of exports: a file of `baker.exporters` converts a finished bake for one engine.
 
 Callers find an export by its name in `EXPORTS` and never import it, so a new engine is one new file.
 """
@@ -13,7 +13,7 @@ from baker.core.registry import Registry
 
 
 class Export(Protocol):
-    """Writes what one engine needs.
+    """Writes a folder of files for one engine.
 
     `needs` lists the channels that must have been baked.
     """
@@ -36,7 +36,7 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     Parameters
     ----------
     names : tuple of str
-        Exports asked for.
+        Names of exports.
     channels : tuple of str
         Channels to be baked.
 

@@ -136,10 +136,10 @@ class LightKind:
     gltf_type : str or None
         `type` in KHR_lights_punctual; None if glTF files cannot hold it.
     plausible_max : float
-        Intensity above which a wrong unit is likelier than such a light.
+        Intensity above which the unit is probably wrong.
     read : callable
         Takes the light's JSON and the linear part, (3, 3) float64, of its node's world transform; returns
-        fields of `PunctualLight` by name, those of glTF apart that all kinds have (name, colour, intensity).
+        fields of `PunctualLight` by name, except those that all kinds have in glTF (name, colour, intensity).
         Raises InputError.
     write : callable
         Returns the members of the light's JSON that `read` reads.

@@ -1,4 +1,4 @@
-"""Finished maps, what each texel of them is, and the result of a bake."""
+"""Finished maps, the state of their texels, and the result of a bake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from baker.core.settings import BakeSettings
 
 
 class TexelStatus(IntEnum):
-    """What a texel of a page is; the values stored in `status_0.png`."""
+    """State of a texel of a page; the values stored in `status_0.png`."""
 
     EMPTY = 0
     COVERED = 1
@@ -35,7 +35,7 @@ class ChannelDescription:
     unit : str
         "lx", "1", ...
     quantity : str
-        What the numbers are, in words.
+        Name of the quantity.
     definition : str
         The same as a formula.
     components : tuple of str
@@ -98,7 +98,7 @@ class Lightmap:
 
 @dataclass(frozen=True, repr=False)
 class BakeResult(Result):
-    """All that a bake made.
+    """The results of a bake.
 
     Attributes
     ----------
@@ -110,11 +110,11 @@ class BakeResult(Result):
     timings : dict of stage to seconds
     rays : dict of stage to count
     solve : dict, {patches, nonzeros, iterations, residual, energy: {emitted, absorbed, escaped}}
-    denoise : dict, what the denoiser was and did (empty if none ran)
+    denoise : dict, names and versions from `denoiser_name` (empty if none ran)
     out : Path or None
         The folder written, if any.
     manifest : dict
-        What `bake.json` in that folder says.
+        Content of `bake.json` in that folder.
     """
 
     scene: Scene

@@ -26,7 +26,7 @@ def unknown_name(
     Parameters
     ----------
     what : str
-        Kind of thing that the name should have named, in the singular: "channel".
+        Kind of the named objects, in the singular: "channel".
     name : str
         The name as it was given. The search for the nearest name ignores case and takes dashes for
         underscores.

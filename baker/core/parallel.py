@@ -26,7 +26,7 @@ def thread_count(threads: int | None) -> int:
     Parameters
     ----------
     threads : int or None
-        Number asked for; None or 0 for all cores.
+        Requested number; None or 0 for all cores.
 
     Returns
     -------

@@ -34,9 +34,9 @@ class CoarseObjects:
     count : int
         Number of such instances.
     text : str
-        What is wrong with the worst one, with numbers.
+        Defect of the worst one, with numbers.
     fix : str
-        What to do.
+        Advice to the user.
     """
 
     worst: int

@@ -36,7 +36,7 @@ def silent(stage: str, fraction: float, detail: str = "", /) -> object:
 
 
 def report(progress: Progress, stage: Stage, fraction: float, detail: str = "") -> None:
-    """Report to `progress`, and stop the work if it asks for that.
+    """Call `progress`, and raise `Cancelled` if it returns a truthy value.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ THUMBNAIL = 256
 
 
 class Result:
-    """Base of what the functions of the Python API return.
+    """Base class of the return values of the Python API.
 
     A subclass gives its rows in `summary` and, where there is one, its picture in `picture`. `repr` is one
     line; a notebook shows a table, and the picture scaled down.

@@ -75,12 +75,12 @@ class CommonSettings(Settings):
 
     @property
     def hemisphere_samples(self) -> int:
-        """Return the hemisphere rays per texel that `samples` or `quality` asks for."""
+        """Return the hemisphere rays per texel, from `samples` or else from `quality`."""
         return self.samples if self.samples is not None else QUALITY_SAMPLES[self.quality]
 
     @property
     def sky_radiance(self) -> tuple[float, float, float]:
-        """Return the constant sky's radiance in cd/m2 (black if none was asked for)."""
+        """Return the constant sky's radiance in cd/m2 (black if `sky` is not set)."""
         if self.sky is None:
             return (0.0, 0.0, 0.0)
         red, green, blue = parse_sky(self.sky)
@@ -94,7 +94,7 @@ class CommonSettings(Settings):
 if TYPE_CHECKING:
 
     class BakeSettings(CommonSettings):
-        """All settings of a bake, checked; a type checker sees those of no plugin."""
+        """All settings of a bake, validated; those of plugins are unknown to type checkers."""
 
 else:
 
@@ -174,6 +174,6 @@ def make_settings(values: Mapping[str, Any]) -> BakeSettings:
     Returns
     -------
     BakeSettings
-        With defaults for what `values` leaves out.
+        With defaults for settings that `values` does not contain.
     """
     return BakeSettings.make(values)

@@ -37,7 +37,7 @@ def setting(
     unit : str
         Unit of its value, empty for numbers without one.
     metavar : str
-        Stands for the value in the help; made from the type if empty.
+        Placeholder of the value in the help; made from the type if empty.
     repeated : bool
         The flag may be given several times; the values are joined.
     **bounds : object
@@ -103,14 +103,14 @@ Numbers = Annotated[str, BeforeValidator(_as_list_text)]
 
 
 class Settings(BaseModel):
-    """Holds the settings of one kind of work, checked; a wrong one raises `SettingsError`.
+    """Holds the settings of one kind of work; an invalid value raises `SettingsError`.
 
     Attributes
     ----------
     table : str
         Table of a configuration file that holds these settings, empty if there is none.
     what : str
-        What an unknown name is called in the error.
+        Word for an unknown name in the error message.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -22,7 +22,7 @@ class SourcePrimitive:
     triangle : (T, 3) int64
         Indices into the vertices, not yet checked to be in range.
     normal : (V, 3) float32 or None, object space
-        None asks for flat normals.
+        None for flat normals.
     texcoord : dict of int to (V, 2) float32
         TEXCOORD sets by number.
     colour : (V, 4) float32 or None, linear Rec.709

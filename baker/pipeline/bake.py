@@ -52,7 +52,7 @@ def bake(
     scene : Scene or path
         A loaded scene, or a scene file.
     settings : BakeSettings
-        What is baked, and how.
+        Settings of the bake.
     out : path, optional
         Folder to write; None keeps everything in memory.
     progress : Progress

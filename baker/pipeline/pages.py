@@ -57,7 +57,7 @@ def finish_pages(
     Parameters
     ----------
     scene : Scene
-        What was baked.
+        The baked scene.
     atlas : Atlas
         Its lightmap uv.
     traced : TracedTexels

@@ -22,7 +22,7 @@ from baker.core.progress import Progress, report
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.stage import Stage
 
-# Seconds between two looks at the process.
+# Seconds between two polls of the process.
 _POLL = 0.1
 # Pixels along the side of the page, and number of texels lit.
 _PAGE = 48
@@ -54,7 +54,7 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
     process : Process
         From `start`.
     scene : Scene
-        What is baked.
+        The scene to bake.
 
     Returns
     -------

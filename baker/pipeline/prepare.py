@@ -50,13 +50,13 @@ class PreparedScene:
     emitters : Emitters
         Emissive triangles in clusters.
     hit_kind : (T,) uint8
-        Of each triangle, what a ray that meets it first proves, see `kernels.probe`.
+        Meaning of a first hit on each triangle, see `kernels.probe`.
     outside : (n_uncut,) uint16
         Bit k is set where point k is outside geometry, of the entries before texels were split into sides.
     sides : Sides
         Result of the split.
     job : TraceJob
-        What all ray stages share, for the n entries.
+        Shared data of all ray stages, for the n entries.
     """
 
     scene: Scene
@@ -91,7 +91,7 @@ def prepare_scene(
     Parameters
     ----------
     scene : Scene
-        What is baked.
+        The scene to bake.
     atlas : Atlas
         Its lightmap uv.
     settings : BakeSettings

@@ -15,7 +15,7 @@ from baker.core.stage import Stage
 
 @dataclass
 class Record:
-    """Collects what the result and the manifest contain about the run of a bake.
+    """Collects data about the run of a bake for the result and the manifest.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ def trace_transport(
     prepared : PreparedScene
         The scene and the settings of the bake.
     channels : mapping of str to Channel
-        What is baked.
+        Channels to bake, by name.
     record : Record
         Takes timings, ray counts, figures of the solve, and warnings.
     executor : TileExecutor, optional
@@ -48,7 +48,7 @@ def trace_transport(
     Returns
     -------
     Transport
-        Of the front texels; None in what no channel needs.
+        Values of the front texels; None for those that no channel needs.
     """
     executor = executor or LocalTileExecutor()
     transport = Transport()

@@ -71,7 +71,7 @@ class BakedLight:
 
 @kernel
 def add_emission(chosen, surface, triangle, bary, shading, light):  # type: ignore[no-untyped-def]
-    """Add what emitters send from hits `chosen` (m,) to `light` (n, 3).
+    """Add the emitted radiance at hits `chosen` (m,) to `light` (n, 3).
 
     surface : `Surfaces.row`; triangle : (n,) triangle of each hit; bary : (n, 2)
     """
@@ -85,7 +85,7 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
 
 
 def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
-    """Return a warning if a scene file is not what was baked.
+    """Return a warning if a scene file differs from the baked one.
 
     Raises
     ------

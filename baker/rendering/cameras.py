@@ -19,7 +19,7 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     cameras : sequence of Camera
         As `baker inspect` lists them.
     text : str
-        A name or an index; a camera whose name is the text wins.
+        A name or an index; a camera with this name is preferred to one with this index.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     Raises
     ------
     SettingsError
-        If there is none of that name or number, or several have the name; it lists what there is.
+        If no camera has that name or index, or several have the name; it lists the cameras.
     """
     found = [camera for camera in cameras if camera.name == text]
     if len(found) == 1:

@@ -184,7 +184,7 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
     Raises
     ------
     InputError
-        If there is none; it names one that sees everything.
+        If there is none; it suggests one from which the whole scene is visible.
     """
     if scene.cameras:
         return scene.cameras[0]
@@ -195,7 +195,7 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
         max(float(np.linalg.norm(high - low)), 1e-6),
     )
     eye = middle + size * np.array([0.35, 0.3, 1.15])
-    # Enough digits to tell eye and target apart far from 0.
+    # Enough digits to distinguish eye and target far from 0.
     digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
     numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(

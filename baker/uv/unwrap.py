@@ -42,7 +42,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     Parameters
     ----------
     scene : Scene
-        Its own TEXCOORD_1 are used as `settings.uv` says.
+        Whether its TEXCOORD_1 are kept depends on `settings.uv`.
     settings : BakeSettings
         `resolution`, `density`, `max_pages`, `padding`, `uv` and `threads` are read.
     progress : Progress
@@ -120,7 +120,7 @@ def _lay_out(
     """Cut the instances whose uv is not `usable` (I,), and pack all of them."""
     # An instance without triangles has nothing to pack.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
-    # A density that was asked for applies to all instances.
+    # A density applies to all instances.
     equal = settings.density is not None
     shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
     placements, cuts = _placements(scene, filled, shares, usable)

@@ -51,13 +51,13 @@ def send_job(stream: IO[bytes], job: ChartJob) -> None:
 
 
 def receive_charts(stream: IO[bytes]) -> FlatCharts | None:
-    """Receive a worker's answer; None if it has ended."""
+    """Receive the charts of a job from a worker; None if it has ended."""
     answer = read_message(stream)
     return None if answer is None else FlatCharts(answer["uv"], answer["chart"])
 
 
 def main() -> None:
-    """Answer jobs until stdin ends."""
+    """Process jobs until stdin ends."""
     # Ctrl-C signals the whole process group; the parent ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     source, sink = sys.stdin.buffer, sys.stdout.buffer

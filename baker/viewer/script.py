@@ -43,7 +43,7 @@ class ThreeScript:
 
     @property
     def files(self) -> dict[str, Path]:
-        """Return the files the page may ask for, by name: a module imports its neighbours."""
+        """Return the files the page may request, by name: a module imports files beside it."""
         if not self.module:
             return {self.path.name: self.path}
         return {path.name: path for path in sorted(self.path.parent.glob("*.js"))}

@@ -44,12 +44,12 @@ _BYTES = "application/octet-stream"
 # No script, style or request from another origin.
 _POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'"
 
-# The answer of an address: media type, and a function that returns the bytes.
+# The response of an address: media type, and a function that returns the bytes.
 Answer = tuple[str, Callable[[], bytes]]
 
 
 class ViewServer(ThreadingHTTPServer):
-    """An HTTP server that answers from a table of addresses."""
+    """An HTTP server with a table of addresses and responses."""
 
     daemon_threads = True
 
@@ -72,7 +72,7 @@ class ViewServer(ThreadingHTTPServer):
 
 
 def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewServer:
-    """Return a server for a bake, bound to its port; `serve_forever` makes it answer.
+    """Return a server for a bake, bound to its port.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     Returns
     -------
     ViewServer
-        `serve_forever` makes it answer.
+        Call `serve_forever` to start it.
 
     Raises
     ------
