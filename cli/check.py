@@ -42,10 +42,10 @@ def check(
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
     fix: Annotated[
         bool,
-        typer.Option("--fix", help="Fix what can be fixed without changing the look, and check the result."),
+        typer.Option("--fix", help="Fix defects without changing the appearance, and check the result."),
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FIXED.glb", help="Where --fix and --repair write.")
+        Path | None, typer.Option("--out", "-o", metavar="FIXED.glb", help="Output of --fix and --repair.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o replace a file that exists.")] = False,
 ) -> None:

@@ -50,7 +50,7 @@ TABLE = """
 TAIL = """
 ## The configuration file
 
-Keys of a bake stand at the top or in a table `[bake]`, those of other commands in a table named as the
+Keys of a bake are at the top level or in a table `[bake]`, those of other commands in a table named as the
 section above; a dash in a key counts as an underscore:
 
 ```toml

@@ -47,7 +47,7 @@ def bake(
         Settings by name, in place of those in `settings`:
 
         channels : str | Sequence[str], default ('irradiance', 'ao')
-            What to bake.
+            Channels to bake.
         resolution : int, texels, 16 to 16384, default 1024
             Page width and height, exact.
         density : float | None, texels/m, above 0, default None
@@ -85,7 +85,7 @@ def bake(
         include : str | Sequence[str], default ()
             Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
         exclude : str | Sequence[str], default ()
-            Leave out objects and lights with these names or paths of nodes, and what is below.
+            Leave out objects and lights with these names or paths of nodes, and their descendants.
         up : Literal["y", "z"], default 'y'
             Up axis of files whose format defines none.
         scale : float, m, above 0, default 1.0

@@ -13,7 +13,7 @@ from typing import Literal, TypedDict
 class BakeKeywords(TypedDict, total=False):
     """Keywords of `BakeSettings`."""
 
-    # What to bake.
+    # Channels to bake.
     channels: str | Sequence[str]
 
     # Page width and height, exact.
@@ -70,7 +70,7 @@ class BakeKeywords(TypedDict, total=False):
     # Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
     include: str | Sequence[str]
 
-    # Leave out objects and lights with these names or paths of nodes, and what is below.
+    # Leave out objects and lights with these names or paths of nodes, and their descendants.
     exclude: str | Sequence[str]
 
     # Up axis of files whose format defines none.
@@ -135,7 +135,7 @@ class BatchKeywords(TypedDict, total=False):
     # Memory of all bakes together, like 8G; jobs wait for it.
     memory: str | float | None
 
-    # Only report what would be baked, and why.
+    # Only report the jobs that would be baked, with reasons.
     dry_run: bool
 
     # Start nothing more after a failure.
@@ -166,7 +166,7 @@ class CheckKeywords(TypedDict, total=False):
     # Estimate time with the speed of this earlier bake (else of one beside the scene).
     rates: str | Path | None
 
-    # Report what a bake will take; measures a second's worth of rays.
+    # Estimate time and memory of a bake; measures ray rates for about a second.
     cost: bool
 
 
@@ -176,7 +176,7 @@ class DiffKeywords(TypedDict, total=False):
     # Texels of A to compare.
     texels: int
 
-    # Compare pages as pictures, too, with the measure FLIP.
+    # Also compute the FLIP error of the pages.
     flip: bool
 
     # Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
@@ -293,7 +293,7 @@ class VerifyKeywords(TypedDict, total=False):
     # Texels compared at their centres; points at edges and outliers are added.
     texels: int
 
-    # Paths for each texel, whatever its error.
+    # Fixed number of paths for each texel.
     spp: int | None
 
     # Relative standard error at which a texel is good enough.

@@ -45,7 +45,7 @@ def verify(
         texels : int, from 1, default 2000
             Texels compared at their centres; points at edges and outliers are added.
         spp : int | None, from 1, default None
-            Paths for each texel, whatever its error.
+            Fixed number of paths for each texel.
         target_se : float, above 0, default 0.005
             Relative standard error at which a texel is good enough.
         time_limit : float | None, s, above 0, default None
@@ -113,7 +113,7 @@ def diff(
         texels : int, from 1, default 20000
             Texels of A to compare.
         flip : bool, default True
-            Compare pages as pictures, too, with the measure FLIP.
+            Also compute the FLIP error of the pages.
         fail_if : str | None, default None
             Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
         seed : int, 0 to 2147483647, default 0
@@ -319,7 +319,7 @@ def batch(
         memory : str | float | None, bytes, default None
             Memory of all bakes together, like 8G; jobs wait for it.
         dry_run : bool, default False
-            Only report what would be baked, and why.
+            Only report the jobs that would be baked, with reasons.
         fail_fast : bool, default False
             Start nothing more after a failure.
         force : bool, default False

@@ -86,7 +86,7 @@ def check(
         rates : str | Path | None, default None
             Estimate time with the speed of this earlier bake (else of one beside the scene).
         cost : bool, default False
-            Report what a bake will take; measures a second's worth of rays.
+            Estimate time and memory of a bake; measures ray rates for about a second.
 
     Returns
     -------

@@ -33,7 +33,7 @@ class CheckSettings(Settings):
         "Estimate time with the speed of this earlier bake (else of one beside the scene).",
         metavar="OUT",
     )
-    cost: bool = setting(False, "Report what a bake will take; measures a second's worth of rays.")
+    cost: bool = setting(False, "Estimate time and memory of a bake; measures ray rates for about a second.")
 
 
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:

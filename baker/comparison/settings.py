@@ -14,7 +14,7 @@ class DiffSettings(Settings):
     what: ClassVar[str] = "diff setting"
 
     texels: int = setting(20000, "Texels of A to compare.", ge=1)
-    flip: bool = setting(True, "Compare pages as pictures, too, with the measure FLIP.")
+    flip: bool = setting(True, "Also compute the FLIP error of the pages.")
     fail_if: str | None = setting(None, 'Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".', metavar="EXPR")
     seed: int = seed_setting()
     threads: int | None = threads_setting()

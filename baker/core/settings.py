@@ -23,7 +23,7 @@ class CommonSettings(Settings):
 
     table: ClassVar[str] = "bake"
 
-    channels: Names = setting(("irradiance", "ao"), "What to bake.")
+    channels: Names = setting(("irradiance", "ao"), "Channels to bake.")
     resolution: int = setting(1024, "Page width and height, exact.", unit="texels", ge=16, le=16384)
     density: float | None = setting(
         None, "Texels per metre; pages overflow into more.", unit="texels/m", gt=0
@@ -56,7 +56,7 @@ class CommonSettings(Settings):
     )
     exclude: Names = setting(
         (),
-        "Leave out objects and lights with these names or paths of nodes, and what is below.",
+        "Leave out objects and lights with these names or paths of nodes, and their descendants.",
         repeated=True,
     )
     up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")

@@ -16,7 +16,7 @@ class BatchSettings(Settings):
     memory: Text | None = setting(
         None, "Memory of all bakes together, like 8G; jobs wait for it.", unit="bytes", metavar="SIZE"
     )
-    dry_run: bool = setting(False, "Only report what would be baked, and why.")
+    dry_run: bool = setting(False, "Only report the jobs that would be baked, with reasons.")
     fail_fast: bool = setting(False, "Start nothing more after a failure.")
     force: bool = setting(False, "Bake all, and replace outputs even if baker did not write them.")
     seed: int | None = setting(None, "Seed of all bakes; default: that of each job.", ge=0, le=2**31 - 1)

@@ -19,7 +19,7 @@ class VerifySettings(Settings):
     texels: int = setting(
         2000, "Texels compared at their centres; points at edges and outliers are added.", ge=1
     )
-    spp: int | None = setting(None, "Paths for each texel, whatever its error.", ge=1)
+    spp: int | None = setting(None, "Fixed number of paths for each texel.", ge=1)
     target_se: float = setting(0.005, "Relative standard error at which a texel is good enough.", gt=0)
     time_limit: float | None = setting(
         None,
