@@ -43,7 +43,7 @@ class Transport:
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of a map that is denoised by itself; a map is the sum of its layers.
+    """A part of a map that is denoised separately; a map is the sum of its layers.
 
     Attributes
     ----------

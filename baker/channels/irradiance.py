@@ -13,10 +13,10 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
     """Return sampled direct light and gathered light as two layers, which are denoised separately.
 
-    In gaps about a texel wide neither is denoised. Light falls to a hundredth from one texel to the next
-    there, and a filter smears it. *Measured* at 256 with 64 rays on such texels with and without the filter,
-    mean and median error: +78 and 33 %, +1 and 3 % (hall, 10 to 32 lx); +35 and 17 %, +3 and 12 % (interior,
-    3 to 10 lx).
+    In gaps about a texel wide neither is denoised. The irradiance of adjacent texels there may differ by a
+    factor of 100, and a filter blurs it. *Measured* at 256 with 64 rays on such texels with and without the
+    filter, mean and median error: +78 and 33 %, +1 and 3 % (hall, 10 to 32 lx); +35 and 17 %, +3 and 12 %
+    (interior, 3 to 10 lx).
     """
     direct, gathered = transport.direct, transport.gathered
     if direct is None or gathered is None:

@@ -16,8 +16,8 @@ RMS error relative to the mean 0.0095 and 0.0067 in the hall (not denoised 0.008
 0.0061 and 0.0056 in the interior, 0.0022 and 0.0029 in Cornell. An error that is too large blurs contact
 shadows.
 
-Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the page filling follows from what
-the filter does at gaps.
+Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the filling of empty texels is a
+consequence of the filter's behaviour at gaps.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ def denoise_page(
     chart : (H, W) int32
     standard_error : (H, W) float32, optional
         Standard error of each texel's mean luminance (of the value itself if C = 1), in its unit. It limits
-        how far a texel may move; without it the noise is estimated from the page.
+        the change of a texel; without it the noise is estimated from the page.
     bound : bool
-        Whether that is an upper bound: it is lowered to `FITTED` of the noise that the page shows.
+        Whether that is an upper bound: it is lowered to `FITTED` times the noise estimated from the page.
     signed : bool
         Whether values may be negative; C is 1 then.
     denoiser : LightmapDenoiser, optional

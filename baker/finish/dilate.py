@@ -1,4 +1,4 @@
-"""Grows charts into the empty texels around them, so that bilinear lookups and mip levels find their values.
+"""Fills empty texels around charts, so that bilinear lookups and mip levels do not read empty texels.
 
 Values are extrapolated with a plane fitted at the chart's border (weighted least squares in 5 x 5 texels),
 within limits, so that a lookup between the last covered texel and the first empty one continues the gradient.

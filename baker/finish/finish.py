@@ -73,7 +73,7 @@ class PagePlan:
 
 
 class PageLayer(NamedTuple):
-    """A part of a page that is denoised by itself.
+    """A part of a page that is denoised separately.
 
     value : (H, W, C) float32
     error : (H, W) float32, standard error of the mean of the components of each group; or (H, W, G) float32,

@@ -49,7 +49,7 @@ def fill_invalid(
     known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
-    # A chart without any valid texel may lie in something that looks solid and is not.
+    # Charts without any valid texel keep their values: the solid around them may be misclassified.
     n_charts = int(chart.max()) + 1
     some = np.bincount(chart[known], minlength=n_charts) > 0
     hopeless = covered & ~known & ~some[chart]

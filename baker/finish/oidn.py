@@ -67,7 +67,7 @@ def filter_picture(
     threads : int
         0 = all of the machine.
     progress : Progress
-        Gets the fraction done; may cancel.
+        Called with the fraction done; a truthy return value cancels.
 
     Returns
     -------

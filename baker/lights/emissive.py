@@ -39,14 +39,14 @@ _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 MAX_CLUSTERS = 256
 # Parts that cutting may add to the textured triangles.
 MOST_PARTS = 32768
-# The parts of one triangle count as at most this number of triangles when clusters are formed.
+# The parts of one triangle are counted as at most this number of triangles when clusters are formed.
 _CROWD = 64.0
-# A part counts as constant below the first variance over squared mean (standard deviation of a thousandth).
-# Above the second it has its mean radiance, too: no parts were left to cut it, and samples would be mostly
-# black.
+# Limits of variance / mean^2. Parts below the first (relative standard deviation 0.001) have uniform
+# radiance. Parts above the second use their mean radiance, too: there were no further parts to divide them,
+# and most samples would be black.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Parts at most a texel wide and this share of the scene's diagonal have their mean radiance. From farther
-# away the difference cannot be seen, and the noise of sampling the texture is avoided.
+# Parts at most a texel wide and this share of the scene's diagonal have their mean radiance. The difference
+# is not visible from larger distances, and it avoids the noise of sampling the texture.
 _SMALL = 1.0 / 128.0
 
 

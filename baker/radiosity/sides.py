@@ -387,11 +387,12 @@ def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDAr
 def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
-    """Choose the side that gets the own entry of a split texel: the one with most points.
+    """Choose the side that is stored in a split texel's own entry: the one with most points.
 
     Points of a side whose rays hit backs of one-sided surfaces have a smaller weight: it is the outside of a
     room whose walls have no outside, or the underside of a floor that has none. A side whose region contains
-    no whole texel loses: for example the strip of a wall below the floor that is narrower than a texel.
+    no whole texel is not chosen: for example the strip of a wall below the floor that is narrower than a
+    texel.
 
     Returns
     -------

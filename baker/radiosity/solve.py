@@ -43,11 +43,11 @@ _PART = 250_000
 # Exitance below this share of the brightest patch, by colour, need not converge.
 _DARK = 1e-15
 # Restart conjugate gradients after this reduction of the residual: search directions lose orthogonality, and
-# the updated residual departs from the true one.
+# the error of the updated residual grows.
 _REDUCTION = 1e-12
 # A closed room of albedo 1 has no solution.
 MAX_ALBEDO = 0.999
-# Black patches get this albedo in the symmetric form, which divides by it.
+# Least albedo in the symmetric form, which divides by it.
 MIN_ALBEDO = 1e-4
 
 

@@ -1,4 +1,4 @@
-"""Warns of light that is hardly absorbed: nearly white surfaces that see little but each other.
+"""Warns of light that is hardly absorbed: nearly white surfaces whose rays mostly hit each other.
 
 The share of light left after n reflections is s_n = (rho F) s_{n-1}, s_0 = 1. In a closed room of albedo rho
 it is rho^n, and all bounces together are 1 / (1 - rho) times the direct light.

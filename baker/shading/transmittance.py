@@ -1,4 +1,4 @@
-"""Builds the table of BLEND triangles: how much light they let through, and how they colour it."""
+"""Builds the table of BLEND triangles: the data from which their transmittance is computed."""
 
 from __future__ import annotations
 

@@ -85,11 +85,12 @@ def sum_groups(noisy, filtered, label, light, sums):
 
 @kernel
 def missing_shares(first, owner, across, sums, share):
-    """Write the relative change (G, C) float64 that restores the missing light of each group's window.
+    """Write the relative change that restores the missing light of the window around each group.
 
     It is removed light / kept light, times n / (n + HALF) for a window of n texels, since sums over few
     texels are noisy.
 
+    share : (G, C) float64 output, limited to LEAST and MOST
     first : (blocks + 1,) int64, first group of each block; owner : (n,) int32, chart of each group
     across : int, blocks in a row
     sums : (G, 2 C + 1) float64, from `sum_groups`

@@ -13,7 +13,7 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Half window, texels.
 RADIUS = 2
-# A ridge in the normal equations: where the texels lie on one line, the slope across it comes out 0.
+# Added to the diagonal of the normal equations: if the texels lie on one line, the slope across it is 0.
 RIDGE = 1e-3
 # Largest distance of a result from the range of the window's values: as a share of that range, and in units
 # of the steps between the last three texels, that is, of the last step and CURVED times the one before.
@@ -42,7 +42,7 @@ N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
 # value in the window, weighted sum of squares about the mean, and the part of it that the plane explains.
 CENTRE, ACROSS, DOWN, LOWEST, HIGHEST, SPREAD, EXPLAINED = range(7)
 N_PLANE = 7
-# How much further values may rise and fall; see `_trend`.
+# Largest further increase and decrease of values, see `_trend`.
 RISE, FALL = range(2)
 
 MAX_CHANNELS = 16
@@ -275,7 +275,7 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
 
 @kernel
 def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels, grown, first_row, end_row):
-    """Continue each chart by its own slope into the empty texels near it, in place.
+    """Extrapolate each chart with planes fitted at its border into the empty texels near it, in place.
 
     Parameters
     ----------
@@ -287,8 +287,8 @@ def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels
     highest : (n_charts, C) float32
         Largest value of each chart.
     pixels : int
-        How many rings of 8-neighbours a chart grows.
-    grown : (H, W) bool, set at the texels that got a value
+        Number of rings of 8-neighbours to fill.
+    grown : (H, W) bool, set at the texels that were filled
     """
     width, channels = value.shape[1], value.shape[2]
     sums, trend = _sums(), _trends()
@@ -320,7 +320,7 @@ def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels
 
 @kernel
 def noisy_planes(value, chart, covered, offset, texel, radius, out):
-    """Fit a plane per channel around chosen texels of a noisy page, slopes shrunk by how sure they are.
+    """Fit a plane per channel around chosen texels of a noisy page, with slopes reduced by their uncertainty.
 
     Parameters
     ----------

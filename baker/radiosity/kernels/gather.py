@@ -94,8 +94,8 @@ def gather(
     hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
-    # All sums are multiplied by pi / n in the end: reflected light is divided by pi here, and what
-    # `emitter_hit` returns is multiplied by n / pi.
+    # All sums are multiplied by pi / n in the end: reflected light is divided by pi here, and the result of
+    # `emitter_hit` is multiplied by n / pi.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
@@ -294,7 +294,7 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
             for lane in range(PACKET_WIDTH):
                 count[lane] += np.int32(1) if rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0) else np.int32(0)
             done += 1
-            # Early out where hardly any ray is blocked.
+            # Early out if at most one ray of each texel is blocked.
             if done == early_out:
                 clear = 0
                 for lane in range(lanes):

@@ -1,7 +1,7 @@
 # mypy: disable-error-code="no-untyped-def"
 """Merges the hits of a ray on an edge that triangles share: the ray crosses their surface once.
 
-Embree's ROBUST test never lets a ray slip between two triangles, but reports both of them where a ray meets
+With Embree's ROBUST test no ray passes between two triangles, but both are reported where a ray meets
 their edge to within rounding, and all triangles around a vertex. Hits on edges are rare, so those of each ray
 are stored, and later ones are compared with them. Two surfaces at the same position are two crossings: only
 triangles of one connected surface (`alpha.SURFACE`) are merged.
