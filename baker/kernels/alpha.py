@@ -43,7 +43,7 @@ class AlphaTable(NamedTuple):
 
 
 def no_alpha() -> AlphaTable:
-    """Return the table of a scene in which everything blocks.
+    """Return the table of a scene whose triangles are all opaque.
 
     Returns
     -------

@@ -2,8 +2,8 @@
 
 Points are the first two Sobol dimensions (a (0,2)-sequence) under nested uniform (Owen) scrambling. The first
 bits (`shared`) are scrambled alike for all texels, the others differently for each. So rays of neighbouring
-texels with the same sample number have similar directions, and packets stay coherent; each texel alone still
-has a fully scrambled net.
+texels with the same sample number have similar directions, and packets stay coherent; the points of one texel
+are still a fully scrambled net.
 
 Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
 sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,
@@ -37,7 +37,7 @@ def hash_u32(x):  # type: ignore[no-untyped-def]
 
 @inner
 def hash_combine(a, b):  # type: ignore[no-untyped-def]
-    """Return a uint32 that depends on both uint32 arguments."""
+    """Return the uint32 hash of two uint32 numbers; their order matters."""
     return hash_u32(_u(hash_u32(_u(a)) ^ _u(_u(b) * _u(0x9E3779B9) + _u(0x7F4A7C15))))
 
 
@@ -119,9 +119,10 @@ def shared_bits_mask(n_samples: int) -> np.uint32:
 
 @inner
 def cosine_direction(u, v):  # type: ignore[no-untyped-def]
-    """Map (u, v) of the unit square to a direction of the hemisphere about +z; pdf = cos / pi.
+    """Map (u, v) float32 in [0, 1) to a unit direction x, y, z of the hemisphere about +z; pdf = cos / pi.
 
-    Concentric map to the disc, projected up. Sine and cosine of angles up to pi/4 are polynomials (error
+    Concentric map to the disc, then projection to the hemisphere. Sine and cosine of angles up to pi/4 are
+    polynomials (error
     under 3e-7).
     """
     a = np.float32(2.0) * u - np.float32(1.0)
@@ -129,7 +130,7 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     wide = abs(a) > abs(b)
     r = a if wide else b
     other = b if wide else a
-    # Without a branch, so that loops over lanes are vectorised; r = 0 only where `other` is 0, too.
+    # Avoid branches, so that loops over lanes are vectorised; r = 0 only where `other` is 0, too.
     t = np.float32(0.78539816) * other / (r if r != np.float32(0.0) else np.float32(1.0))
     t2 = t * t
     c = np.float32(1.0) + t2 * (

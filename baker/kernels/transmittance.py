@@ -255,9 +255,10 @@ def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, s
 
 @inner
 def set_blend_rule(blend, words, number):
-    """Set how sixteen rays meet BLEND surfaces: 0, `packets.UNAWARE` or `packets.SOLID`.
+    """Set the treatment of BLEND surfaces by sixteen rays: their ID row.
 
-    words : (21 * 16,) uint32, the packet
+    blend : BlendBuffers or None; nothing is done for None
+    words : (21 * 16,) uint32, the packet; number : uint32, 0, `packets.UNAWARE` or `packets.SOLID`
     """
     if blend is None:
         return

@@ -1,7 +1,7 @@
-"""Emissive triangles as the path tracer finds them.
+"""The emissive triangles of a scene, for the path tracer.
 
-This is a second finder beside `lights.emissive.build_emitters`, so that an emitter lost by the bake is still
-in the reference. Which triangles emit, their area, radiance, sides and power are worked out here from the
+This search is independent of `lights.emissive.build_emitters`, so that an emitter missed by the bake is still
+in the reference. Which triangles emit, their area, radiance, sides and power are computed here from the
 resolved materials. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`. The parts
 determine where samples are taken; the radiance of a point is looked up in the material.
 

@@ -1,8 +1,9 @@
-"""Ways to sample the rendering equation, by name, and the options of a path that each sets.
+"""Estimators of the rendering equation, by name, and the options of paths that each sets.
 
-`uniform`, `cosine`, `stratified` and `bsdf` find lights by chance; `light` aims at them from every vertex;
-`mis` does both and weights them; `bdpt` connects paths from the eye with paths from lights. Lights without
-area are only aimed at or started from, with every estimator.
+With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit lights at random; `light` samples lights from
+every vertex; `mis` combines both by multiple importance sampling; `bdpt` connects paths from the eye with
+paths from lights. Lights without area cannot be hit, so every estimator samples them, or starts paths at
+them.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.
@@ -24,8 +25,8 @@ class Estimator(NamedTuple):
     hemisphere : int
         0: directions follow the BSDF; 1: uniform over the hemisphere; 2: cosine over it.
     aim : int
-        Aim at lights with area and the sky: 0 never; 1 always, and ignore light found by chance; 2 weighted
-        (MIS).
+        Sampling of lights with area and the sky: 0 never; 1 at every vertex, and emission that paths hit is
+        ignored; 2 combined with hits by MIS.
     strata : int
         1: the first two random pairs of a pass's samples are a scrambled (0,2)-sequence.
     power : int

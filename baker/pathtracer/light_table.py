@@ -1,10 +1,10 @@
-"""Everything that emits, as one table that paths aim at: emitters, lights without area, the sky.
+"""The table of all lights that paths sample: emitters, lights without area, the sky.
 
-A light is chosen with a fixed chance, half of it by power and half equally among kinds, so that neither a sun
-nor a candle is starved. Each estimate is divided by the chance of its light: whatever the chances, its
-expectation is the same.
+A light is chosen with a fixed probability, half of which is proportional to power and half divided equally
+among kinds, so that weak kinds of light have enough samples beside a sun. Each estimate is divided by the
+probability of its light, so its expectation does not depend on the probabilities.
 
-Lights without area come as `EmissionProfile`s, which the files of `baker.lights.kinds` supply. Kernels
+The files of `baker.lights.kinds` supply lights without area as `EmissionProfile`s. Kernels
 distinguish four forms of profile: even, cone, parallel, and tabulated. A light whose fall-off is none of the
 first three is a table, which the kernels interpolate; new kinds of light need no change here.
 
@@ -165,7 +165,8 @@ def build_light_table(
 def _without_area(
     lights: tuple[PunctualLight, ...], disc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """Return rows (P, 20) without chances, power (P,), and tables (N,) of the lights without area that shine.
+    """Return rows (P, 20) without chances, power (P,), and tables (N,) of the lights without area that are
+    not black.
 
     disc : float, m2, area of a disc as wide as the scene
     """
@@ -303,7 +304,8 @@ def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
 def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     """Return the vector from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
 
-    The density is per steradian and contains the emitter's chance; 0 if its dark side faces the point.
+    The density is per steradian and contains the emitter's chance; 0 if the side that faces the point does
+    not emit.
 
     emitter : (E, 24) float64, see `emitters`; u, w : uniform numbers
     """
