@@ -22,7 +22,7 @@ from baker.trace.packets import new_packet_buffers
 # Largest distance of the matched surface, as a share of the diagonal of the object's bounding box.
 _MAX_DISTANCE = 1.0e-3
 # Triangles are moved along their normal by this share of the largest distance: of two faces back to back, a
-# ray meets the one that faces it first.
+# ray hits the front-facing one first.
 _LIFT = 0.01
 # Least cosine between the normals of matched faces.
 _ALIKE = 0.5

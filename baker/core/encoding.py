@@ -168,7 +168,7 @@ def measure_loss(
     Notes
     -----
     A texel is banded if a channel is stored more than `VISIBLE_STEP` of its brightest channel away from its
-    value, though not clipped. Texels that are as good as black beside the rest of the page do not count.
+    value, though not clipped. Texels that are much darker than the page are not counted.
     """
     low, high = encoding.limits(options)
     n_surface = int(surface.sum())

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 
 class BakerError(Exception):
-    """Base class of every error that baker raises on purpose.
+    """Base class of the errors of baker's interface.
 
     Parameters
     ----------

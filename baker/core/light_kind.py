@@ -60,7 +60,7 @@ class FillRays(Protocol):
 
 
 class LightJson(Protocol):
-    """A light of KHR_lights_punctual as `read` gets it: see `io.gltf.json.JsonObject`."""
+    """A light of KHR_lights_punctual, the argument of `read`: see `io.gltf.json.JsonObject`."""
 
     def __contains__(self, key: str) -> bool:
         """Return whether the member is there."""
@@ -153,7 +153,7 @@ class LightKind:
         Returns an upper bound of the flux, lm, of a light of intensity 1, from the light and the area, m2, of
         a disc as wide as the scene, which parallel light passes through. Paths choose lights in proportion.
     delta : bool
-        Its light reaches a point from a single direction, so that no ray meets it by chance. The path tracer
+        Its light reaches a point from a single direction, so that no random ray hits it. The path tracer
         refuses other lights.
     """
 

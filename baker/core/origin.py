@@ -1,12 +1,12 @@
-"""Choice of the origin of a bake's coordinates: float32 is finest near 0, so the origin lies amid the detail.
+"""Choice of the origin of a bake's coordinates: float32 is finest near 0, so the origin is near the objects.
 
 World positions are float64 in the scene; all that is traced or rasterised is float32 and relative to this
 origin. It is 0 for scenes that lie around 0 already.
 
 The spacing of float32 numbers is about 2^-23 of their size. An object of size s at distance d from the origin
-loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` of them do no harm. The origin minimises the
-weighted sum of lost bits over all objects. A backdrop, a terrain or a sky around everything loses no bits
-wherever the origin is, and a stray object far away cannot outweigh the rest.
+loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` of them are not counted. The origin minimises
+the weighted sum of lost bits over all objects. A backdrop, a terrain or a sky around everything loses no bits
+wherever the origin is, and a single distant object has less weight than the other objects together.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _lost_bits(
 def _median_and_spread(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the median (3,) of a mesh's vertices and their median distance (3,) from it along each axis.
 
-    Medians ignore a few triangles far from the rest. Where they are 0 because most vertices coincide, the
+    Medians are not affected by a few distant triangles. Where they are 0 because most vertices coincide, the
     spread is half the bounding box.
     """
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)

@@ -9,7 +9,7 @@ from baker.core.stage import Stage
 
 
 class Progress(Protocol):
-    """Receives how far a stage has come; a truthy return value cancels the work."""
+    """Receives the progress of a stage; a truthy return value cancels the work."""
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> object:
         """Report `fraction` (0 to 1) of `stage` done; `detail` is a rate or a count to show."""

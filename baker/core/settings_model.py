@@ -33,7 +33,7 @@ def setting(
     default : object
         Value of the setting where nothing is given.
     description : str
-        What the setting does, a sentence.
+        Effect of the setting, a sentence.
     unit : str
         Unit of its value, empty for numbers without one.
     metavar : str

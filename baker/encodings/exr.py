@@ -40,7 +40,7 @@ def encode_exr(
     header: Mapping[str, str] | None = None,
     names: tuple[str, ...] | None = None,
 ) -> int:
-    """Write one image and read it back to be sure that all of it reached the disk.
+    """Write one image and read it back to check that all of it is on the disk.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def encode_exr(
     half : bool
         16 bit numbers; otherwise 32 bit.
     compression : str
-        "zip" or "piz"; neither loses anything.
+        "zip" or "piz"; both are lossless.
     header : mapping of str to str
         Further attributes, like quantity and unit.
     names : tuple of str, optional
@@ -93,7 +93,7 @@ def encode_layers(
     path : Path
         File to write; replaced if it exists.
     layers : mapping of channel name to (H, W) float32
-        "R", "G", "B" are the picture; "albedo.R", "depth.Z" and so on lie beside it.
+        "R", "G", "B" are the main layer; others have names such as "albedo.R" and "depth.Z".
     header : mapping of str to str
         Further attributes.
 
@@ -214,7 +214,7 @@ def _write(
     if "R" in planes:
         header["chromaticities"] = REC709
     try:
-        # OpenEXR keeps the dictionary it is given and empties it, hence the copy.
+        # Pass a copy, since OpenEXR keeps and empties the dictionary.
         with OpenEXR.File(header, dict(planes)) as file:
             file.write(str(path))
         # OpenEXR raises no error if the disk is full when it closes the file: read it back.

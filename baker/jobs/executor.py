@@ -27,7 +27,7 @@ class Event:
         The job's number.
     stage : str
     fraction : float
-        How far the stage is.
+        Share of the stage that is done, 0 to 1.
     ended : bool
     error : dict or None
         {kind, message, file, object, code} if it failed.
@@ -54,7 +54,7 @@ class JobExecutor(Protocol):
         """Wait at most `timeout` seconds for an event of any job."""
 
     def close(self) -> None:
-        """Stop at once whatever runs; its output folders are as they were."""
+        """Stop all jobs immediately; their output folders are unchanged."""
 
 
 class LocalJobExecutor:

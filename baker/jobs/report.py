@@ -55,7 +55,7 @@ def run_jobs_file(
     executor: Callable[[], JobExecutor] | None = None,
     starting: Callable[[Path], None] = lambda out: None,
 ) -> BatchReport:
-    """Bake the jobs of a file that need it.
+    """Bake the jobs of a file that are not up to date.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def run_jobs_file(
     progress : Progress
         Called with all jobs as one stage; a truthy return value stops them all.
     executor : callable, optional
-        Returns the executor of the jobs; default: processes on this machine.
+        Returns the executor of the jobs; default: processes on this machine. Not called in a dry run.
     starting : callable
         Called with each output folder before anything is done there.
 

@@ -54,7 +54,7 @@ def cut_off(
     compared: ComparedPoints,
     pixel: NDArray[np.int64],
 ) -> float:
-    """Return how far the reference exceeds the map's largest value at texels that hold it, relative to it.
+    """Return the relative excess of the reference over the map's largest value, at texels with that value.
 
     Parameters
     ----------

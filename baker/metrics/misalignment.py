@@ -1,7 +1,8 @@
 """Detects maps that are shifted against their surface, blurred, or changed by a gamma curve.
 
-A map is shifted if it fits the reference better one texel further, however small its error is in smooth
-areas. A map whose values follow a power of the reference other than 1 went through a gamma curve.
+A map is shifted if its difference from the reference is smaller after a shift by one texel; its error in
+smooth areas may be small. A gamma curve was applied to a map if its values are a power of the reference with
+an exponent other than 1.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Shifts (rows, columns) that are tried.
+# Tested shifts (rows, columns).
 _STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
 # Distance in texels over which curvature is measured.
 _CURVATURE_STEP = 2
@@ -24,7 +25,7 @@ _MIN_TEXELS = 32
 # Relative error of a correct map. Squared errors are in variances of this and the noise of the reference, and
 # clipped, so that few texels with a large error or much noise do not dominate.
 _TOLERANCE, _CLIP = 0.03, 9.0
-# Exponents that are tried, 1 in the middle.
+# Tested exponents, 1 in the middle.
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
 # Largest residual of a texel, natural logarithm.
 _MAX_RESIDUAL = 0.1

@@ -5,12 +5,12 @@ and a the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own error
 
     mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
 
-so that b^2 is the variance of the values about the truth if both errors are normal. Points with much noise
-weigh less than those with little, and points that are far off (shadow edges, entrances of gaps) count as two
-standard deviations off. b is 0 where the noise of the reference explains all differences.
+so that b^2 is the variance of the values about the truth if both errors are normal. Points with more noise
+have smaller weights, and points with large errors (shadow edges, entrances of gaps) are limited to two
+standard deviations. b is 0 where the noise of the reference explains all differences.
 
-A shift a that all points have in common is bias and not part of b. In a group that light reaches by rare
-paths, the points that no such path reached are all off by the light of these paths, in one direction.
+A common shift a of all points is bias and not part of b. In a group that is lit by rare paths, the points
+without such a path all have the same negative error, the light of these paths.
 
 s is the standard error that passes show. The factor f, at least 1, corrects it: f solves the same equation
 with b = 0 for half the difference of two independent halves of the reference.

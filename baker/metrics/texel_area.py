@@ -32,8 +32,8 @@ class SurfacePoints:
     Attributes
     ----------
     position : (n, k, 3) float64, metres, world, relative to the geometry's origin
-        On the curved surface that the shading normals describe, as the points of the bake are. From points
-        on the facet itself neighbouring facets would hide a part of the view.
+        On the curved surface that the shading normals describe, like the points of the bake. Rays from points
+        on the facet itself would be blocked by neighbouring facets.
     normal, face_normal : (n, k, 3) float64, unit, world
         Shading normal and normal of the triangle, both on its front.
     area : (n,) float64

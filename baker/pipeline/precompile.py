@@ -233,7 +233,8 @@ if __name__ == "__main__":
     from baker.trace.numba_start import skip_blas
 
     skip_blas()
-    # Compiling allocates millions of small objects and hardly a cycle: collecting would take 5 % of the time.
+    # Compiling allocates millions of small objects but few cycles: garbage collection would take 5 % of the
+    # time.
     gc.disable()
     cast_rays(*sys.argv[1:])
     finish_pages()

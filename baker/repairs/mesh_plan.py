@@ -79,7 +79,8 @@ def plan_mesh(
     primitives : sequence of EditablePrimitive
         All its primitives of triangles.
     make_normals : bool
-        Make normals where there are none. Not before a repair, which would take them for the file's own.
+        Make normals where there are none. False before a repair, which treats all normals as those of the
+        file.
     inside_out : sequence of (T,) bool, one for each primitive, or None
         Faces of closed parts that are to be flipped as a whole.
 
@@ -142,7 +143,7 @@ def _choose_flips(
     start = np.cumsum([0] + [len(p.arrays.position) for p in primitives])
     joined = np.concatenate([t + s for t, s in zip(triangles, start, strict=False)])
     owner = np.repeat(np.arange(len(primitives)), [len(t) for t in triangles])
-    # Ignore faces that nothing draws; locked primitives still have them.
+    # Ignore faces that no renderer draws; locked primitives still have them.
     drawn = usable_vertices(position)[joined].all(axis=1)
     drawn[drawn] = ~zero_area(position, joined[drawn])
     if not drawn.any():

@@ -1,4 +1,6 @@
-"""Repairs the meshes of a document one by one, and measures how far each surface moved."""
+"""Repairs the meshes of a document one by one, and measures the distance between each surface before and
+after.
+"""
 
 from __future__ import annotations
 

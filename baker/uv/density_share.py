@@ -1,8 +1,8 @@
-"""Lower density for objects that show none of the light that falls on them.
+"""Lower density for objects whose radiance does not depend on irradiance.
 
-A sky dome or an emitter with a black base colour shows its emission alone, and a hull of alpha 0 is
-invisible. The dome around a level may have thousands of times its area, and would take the whole page at
-equal density.
+The radiance of a sky dome or an emitter with a black base colour is its emission, and a hull of alpha 0 is
+invisible. A dome around a level may have a thousand times the area of the level and would fill the whole page
+at equal density.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Material, Scene
 
-# Largest share of the page area that such objects get together.
+# Largest share of the page area of all such objects together.
 _MOST = 0.05
 
 

@@ -21,7 +21,7 @@ class KeptUv:
     Attributes
     ----------
     usable : (I,) bool
-        The instance's own TEXCOORD_1 is valid taken alone.
+        Whether the instance's own TEXCOORD_1 is valid, without regard to other instances.
     together : bool
         The uv of all instances share one page without overlap: they stay exactly as they are.
     warnings : tuple of SceneWarning

@@ -173,7 +173,7 @@ def _fill_at(
 
 
 def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return the density (I,) at which each instance fits a page alone, and the instances below `target`."""
+    """Return the density (I,) at which each instance fits an empty page, and the instances below `target`."""
     outlines = packer.outlines
     n = len(outlines.first_item) - 1
     density = np.full(n, target)

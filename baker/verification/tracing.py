@@ -1,9 +1,10 @@
-"""Path tracing of the chosen points, until their standard errors reach a target or a time limit ends.
+"""Path tracing of the chosen points, until their standard errors reach a target or the time limit.
 
-A dark point that only rare paths reach has no spread at first: all its samples are black. By its spread alone
-it would get no further samples and a reference of 0. So the standard error of n samples includes the mean
-light of the room divided by n, as if one further sample had that value. Errors are relative to the light of
-the point, or to a tenth of the median of its room: a dim room is traced as long as a bright one.
+At a dark point that only rare paths connect to a light, the first samples are all black, so their variance is
+0. With the standard error of these samples only, the point would get no further samples and a reference of 0.
+Therefore the standard error of n samples includes the mean light of the room divided by n, as if one further
+sample had that value. Errors are relative to the light of the point, or to a tenth of the median of its room:
+a dim room is traced as long as a bright one.
 """
 
 from __future__ import annotations

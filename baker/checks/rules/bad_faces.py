@@ -1,4 +1,4 @@
-"""Rules about single faces and vertices that a bake cannot use, or hardly."""
+"""Rules about single faces and vertices that a bake cannot use, and slivers."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
 def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces less than a fiftieth as high as long.
 
-    A sliver has hardly a texel of its own: at a length of 50 texels it is less than one texel high. The
+    A sliver has few texels: at a length of 50 texels it is less than one texel high. The
     thinner it is, the more its normal consists of rounding. By the same limit, `repair` remeshes meshes of
     500 faces or more of which a tenth are slivers.
     """

@@ -71,7 +71,7 @@ class ChannelData:
 
     @property
     def tilted(self) -> NDArray[np.bool_]:
-        """Return where (n,) shading and face normal differ so much that they see different light.
+        """Return where (n,) shading and face normal differ so much that their irradiance differs.
 
         The reference has no light from below a facet; the bake has, as a curved surface would. Of a
         cosine-weighted hemisphere around a normal that is tilted by t this share is (1 - cos t) / 2.

@@ -1,8 +1,8 @@
-"""Imports a baked scene into Blender (4.2 or newer) and lights it with its irradiance pages alone.
+"""Imports a baked scene into Blender (4.2 or newer) and lights it with its irradiance pages only.
 
     blender --python import_lightmaps.py
 
-Every material gets a copy for each page it is seen in. The copy emits what the surface sends out: base colour
+Every material is copied for each page of its objects. The copy emits the radiance of the surface: base colour
 times irradiance over pi, plus the material's own emission.
 """
 
