@@ -155,8 +155,8 @@ def _filter_window(
     progress: Progress,
 ) -> NDArray[np.float32]:
     """Return the filtered picture (h, w, 3) of a window of noisy values (h, w, 3), gaps filled."""
-    # Charts are scaled to one level: a room of a millionth of the page's light is black to the filter and
-    # came out worse than unfiltered.
+    # Charts are scaled to one level: the filter treats a room of a millionth of the page's light as black,
+    # and its error was larger than unfiltered.
     level = _levels(np.abs(noisy) if signed else noisy, charts, inside)
     picture = surround_charts(noisy / level, inside, charts, threads=denoiser.threads)
     rows, columns = (_margins(side) for side in inside.shape)

@@ -183,7 +183,7 @@ class LightmapDenoiser:
 def _new_device(library: Any, threads: int) -> Any:
     device = library.Device(library.OIDN_DEVICE_TYPE_CPU)
     device.set_int("numThreads", threads)
-    # Pinning would move the caller's other threads about, and speeds up nothing here.
+    # Do not pin threads: it would move other threads of the caller, and is not faster here.
     device.set_bool("setAffinity", False)
     device.commit()
     _check(library, device)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-# Rows of a band: long enough to drown the call, short enough to share out evenly.
+# Rows of a band: enough that the call's overhead is negligible, few enough for an even distribution.
 ROWS = 64
 
 

@@ -1,4 +1,4 @@
-"""Textured emission: exact means over triangles, and triangles cut into parts of little variance.
+"""Textured emission: exact means over triangles, and subdivision of triangles into parts of low variance.
 
 A triangle is cut at the midpoints of its edges into four parts, repeatedly, where power times variance of the
 texture is largest. Black parts are dropped; uniform points of the others are samples of low variance.

@@ -1,4 +1,4 @@
-"""Chooses which emitters the texels of a tile sample, and with how many samples.
+"""Chooses the emitters that the texels of a tile sample, and the numbers of samples.
 
 `emitters.cluster_chances` estimates the unoccluded irradiance of each cluster of emitters. It ignores
 occlusion: nearly all samples would go to an emitter behind a wall that is ten thousand times as bright.

@@ -1,8 +1,8 @@
 """Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
 
 Texels in narrow gaps and texels outside share no patch. Where a gap is about a texel wide, each texel is a
-patch if there are not too many: light enters such a gap by a few times its width only, but would cross a
-larger patch at once.
+patch if there are not too many: light enters such a gap by a few times its width only, but a larger patch
+would have the same radiosity throughout.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
 far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity

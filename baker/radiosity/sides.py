@@ -3,11 +3,12 @@
 A floor that continues under a wall, a ceiling above walls, a beam through a wall: a texel there has points on
 both sides of the other surface. A single value would be the mean of the light on both sides and would be
 visible on both. Its points are grouped by mutual visibility (`radiosity.kernels.sides`), and each group
-becomes an entry. The texel's own entry keeps the side with the largest valid area and is stored in the page;
-the other sides follow fronts and backs, take part in light transport, and are stored in no page.
+becomes an entry. The texel's own entry is the side with most points, and is stored in the page; the entries
+of the other sides come after fronts and backs, take part in light transport, and are stored in no page.
 
-Neighbouring texels are linked if some of their points see each other. The connected parts of a chart are its
-regions: finishing mixes no values across their borders. Texels of a block that are not linked within it
+Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
+are its regions: finishing mixes no values across their borders. Texels of a block that are not linked within
+it
 belong to different patches.
 """
 

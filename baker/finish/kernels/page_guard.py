@@ -101,7 +101,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                         residual[j] += w * (sample - float(denoised[rr, cc, j]))
                         extent[0, j] = smaller(extent[0, j], sample)
                         extent[1, j] = larger(extent[1, j], sample)
-            # Pooled over the window: a texel that missed all rare bright samples underrates its own error.
+            # Pooled over the window: the estimated error of a texel without rare bright samples is too small.
             texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
             mean_error = texel_error * math.sqrt(sww) / sw

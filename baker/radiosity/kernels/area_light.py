@@ -44,7 +44,7 @@ _INV_PI = np.float32(1.0 / math.pi)
 _SHORT = np.float32(0.9999)
 # The closed form is used for at most one emitter for each of these samples of a texel.
 _SAMPLES_PER_EMITTER = 8
-# Early out: sixteen texels count as unoccluded if none of their first rays is blocked, and there are at least
+# Early out: sixteen texels are unoccluded if none of their first rays is blocked, and there are at least
 # this many of them a texel.
 _MIN_TESTS = 8
 # Rows of `sampled`, the emitters that lanes chose: corner 0, edges 1 and 2, normal (3 each), density per m2,
@@ -256,7 +256,8 @@ def light_samples(
                 start, end = -(-k * n_samples // N_POINTS), -(-(k + 1) * n_samples // N_POINTS)
                 if start == end:
                     continue
-                # Rotate which sample serves as the early-out test, so that these tests are stratified.
+                # Use a different sample of each point as the early-out test, so that these tests are
+                # stratified.
                 early_out = start + k % (end - start)
                 load_points(rays, facing, origin, normal, group, lanes, k)
                 for s in range(start, end):
@@ -313,7 +314,7 @@ def light_samples(
                             light *= transmittance(buffers.blend, c, lane)
                             part[k, c * PACKET_WIDTH + lane] += light * weight[lane]
                             part[k, (3 + c) * PACKET_WIDTH + lane] += light * weight[PACKET_WIDTH + lane]
-        # Use the closed form where nothing is in the way. It has no variance: `second` stays.
+        # Use the closed form where no ray is blocked. It has no variance, so `second` is unchanged.
         if untextured and blocked == 0 and tested >= _MIN_TESTS * lanes and n_samples >= N_POINTS:
             for lane in range(lanes):
                 analytic[group + lane] = 1

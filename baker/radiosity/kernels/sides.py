@@ -6,8 +6,8 @@ are on the same side if the segment between them, raised above the surface, is n
 
     height = min(HIGH s, half the headroom of either point)        s: side of the texel, metres
 
-So a step lower than that does not separate points, and a gap lower than that does not connect them. The same
-test chooses the side of a ray's hit (`side_table`).
+So a step lower than this height does not separate points, and a gap lower than it does not connect them. The
+same test chooses the side of a ray's hit (`side_table`).
 """
 
 from __future__ import annotations
@@ -387,7 +387,8 @@ def _trace_corners(
     first = 0
     while first + 1 < N_POINTS and bits != 0 and (bits >> first) & 1 == 0:
         first += 1
-    # Trace from the first valid point to all corners, then from all points to the corners it does not see.
+    # Trace from the first valid point to all corners, then from all points to the corners not visible from
+    # it.
     for j in range(found):
         on[j] = _to_point(rays, j, point, facing, headroom, j, origin, normal, height, m, first)
     trace_lanes(
