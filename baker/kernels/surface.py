@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The points of texels that rays start from, and the surface they lie on.
+"""The points of texels, which are ray origins, and the surface they lie on.
 
 Each texel has 16 points, uniform in the area of its square that triangles cover, stratified by a scrambled
 (0,2)-net. Points on low-poly curved surfaces are moved to the smooth surface that the shading normals imply
-(Hanika 2021), or a facet would shadow its neighbours at the terminator.
+(Hanika 2021). Otherwise facets would block each other's rays at the shadow terminator.
 
 Based on: Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021; Waechter and Binder, A
 fast and robust method for avoiding self-intersection, Ray Tracing Gems, 2019.

@@ -3,7 +3,7 @@
 
 Each sample traces a subpath from a light and stores its vertices, then traces a subpath from the eye. Every
 eye vertex is connected to a light and to all stored vertices. With a camera, stored vertices are connected to
-its pinhole as well; that light is a *splat* on the pixel it is seen through. MIS weights:
+its pinhole as well; that light is a *splat* on the pixel in which the vertex is visible. MIS weights:
 `bidirectional_weights`.
 
 A light subpath has at most `MAX_LIGHT_VERTICES` vertices; eye subpaths end by Russian roulette. The weights
@@ -129,8 +129,8 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
         density = reverse = 1.0
         shaded = bx * path[SHADED, lane] + by * path[SHADED + 1, lane] + bz * path[SHADED + 2, lane]
         if shaded <= GRAZE:
-            # `arrive` replaced the shading normal for this direction; the mirror is another one from the
-            # light.
+            # `arrive` replaced the shading normal for this direction; a path from the light would use another
+            # normal.
             if not eye:
                 return False
             reverse = 0.0

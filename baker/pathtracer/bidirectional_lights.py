@@ -1,5 +1,6 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Lights at both ends of a path: where light subpaths start, aiming from the eye, hits on emitters and sky.
+"""Lights at both ends of a path: start of light subpaths, light samples of eye vertices, hits on emitters and
+the sky.
 
 A light is chosen as in `light_table`. A light subpath starts at a uniform point of an emitter with a
 cosine-weighted direction; at a light with a position, uniformly over its cone; for parallel light and the
@@ -135,7 +136,8 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         dx, dy, dz = to_world(nx, ny, nz, dx, dy, dz)
         path[DENSITY, lane] = max(cosine, 1.0e-12) * INV_PI / sides
         path[LEAVE, lane] = cosine
-        # Density of finding this point by chance; the cosine at the light converts it to one per area.
+        # Density with which a path hits this point at random; the cosine at the light converts it to one per
+        # area.
         path[CHAIN, lane] = 1.0 / density
         scale = math.pi * sides / density
         red, green, blue = (

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""How surfaces scatter light: Lambert, and glTF's metallic-roughness model with its mirror limit.
+"""The BSDFs: Lambert, and glTF's metallic-roughness model with its limit of a mirror.
 
     f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
     D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)      a = roughness^2

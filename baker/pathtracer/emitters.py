@@ -21,8 +21,8 @@ from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, Parts, brightness, cut
 
 # Columns of an emitter, which is a triangle or a part of one: three corners, face normal, area, 1 if
-# two-sided, chance to be chosen, radiance without texture, 1 if it has a texture, and which part of its
-# triangle it is: barycentrics b1, b2 of corner 0 and size, negative if turned (0, 0, 1: all of it).
+# two-sided, chance to be chosen, radiance without texture, 1 if it has a texture, and its position in its
+# triangle: barycentrics b1, b2 of corner 0 and size, negative if turned (0, 0, 1: all of it).
 EMITTER_CORNER, EMITTER_NORMAL, EMITTER_AREA, EMITTER_TWO_SIDED, EMITTER_CHANCE = 0, 9, 12, 13, 14
 EMITTER_RADIANCE, EMITTER_TEXTURED, EMITTER_PART = 15, 18, 19
 EMITTER_COLUMNS = 24

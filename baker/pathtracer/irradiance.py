@@ -1,4 +1,4 @@
-"""Irradiance and ambient occlusion at points of surfaces, pass by pass, with standard errors.
+"""Irradiance and ambient occlusion at points of surfaces, in passes, with standard errors.
 
     E = pi mean(L of a white Lambertian point)    AO = share of cosine-weighted rays without a hit
 

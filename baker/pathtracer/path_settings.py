@@ -1,6 +1,7 @@
-"""The settings of a pass as kernels take them.
+"""The settings of a pass, as an argument of kernels.
 
-Apart from `estimators`, whose names the command line reads without loading kernels.
+They are not in `estimators`, so that the command line can read the names of estimators without loading
+kernels.
 """
 
 from __future__ import annotations

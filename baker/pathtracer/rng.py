@@ -1,7 +1,7 @@
 """Random numbers of a path, which depend on (seed, pass, point, sample) and on the vertex only.
 
 `draw`: SplitMix64 from a state made of these. `random_lanes`: a hash of them and of the number of the vertex,
-for eight paths at once; it multiplies 32-bit numbers only, which processors do eight at a time.
+for eight paths at once; it multiplies 32-bit numbers only, which SIMD instructions do eight at a time.
 
 Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014; Jarzynski and Olano,
 Hash functions for GPU rendering, 2020 (pcg4d).

@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
 """One vertex of eight paths at once on Lambertian surfaces, in loops that the compiler vectorizes.
 
-The same computations as in `vertex`, for eight lanes in float32: vertices from hits, aiming at lights,
-sampling the next direction. There are no branches; terms that do not apply are selected away.
+The same computations as in `vertex`, for eight lanes in float32: vertices from hits, light samples, sampling
+of the next direction. There are no branches; terms that do not apply are replaced by 0 with selections.
 
     aiming: beta albedo / pi cos L w / density       w = density / (density + cos / pi)   (balance heuristic)
     next direction: density cos / pi, beta becomes beta albedo

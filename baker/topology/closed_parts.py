@@ -1,4 +1,4 @@
-"""Finds the triangles that form closed surfaces, and on which side of each the enclosed space lies.
+"""Finds the triangles that form closed surfaces, and the side of each on which the enclosed space is.
 
 A part is a set of triangles of one object that are connected by edges. Open parts whose boundary edges
 coincide are joined: a box of six objects is closed, too. Winding may be inconsistent: for the test, triangles

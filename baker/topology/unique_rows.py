@@ -1,4 +1,4 @@
-"""Finds rows that are equal, bit for bit.
+"""Finds rows that are equal bit by bit.
 
 Rows are compared by a 64 bit hash first and in full afterwards, so that millions of them take less than a
 second and different ones are never merged.

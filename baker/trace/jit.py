@@ -1,10 +1,10 @@
 """Decorators and primitives of kernels, chosen for short compile times.
 
-The first bake after an install waits for the compiler. Measured with Numba 0.68:
+The first bake after an install has to compile them. Measured with Numba 0.68:
 
 - A wrapper that makes a function callable from Python or C takes 40 ms. A `kernel` has one, an `inner`
   function none.
-- Both are compiled without reference counts: their arrays come from Python, and they keep none.
+- Both are compiled without reference counts: their arrays are owned by Python, and they store none.
 - `np.zeros` compiles three functions (0.2 s), `scratch` none.
 - `min` and `max` compile a function for each combination of types (40 ms) and call it; `smaller` and `larger`
   are one instruction.

@@ -1,4 +1,4 @@
-"""Invalidates cached kernels, and allows kernels where nothing can be cached.
+"""Deletes outdated cached kernels, and allows kernels without a cache folder.
 
 Numba compiles a cached kernel again only if the kernel's own file has changed. Functions compiled into it may
 be in other files: after an update of those it would run outdated code, on arrays of another layout. So
