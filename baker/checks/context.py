@@ -84,7 +84,7 @@ class CheckContext:
             facts = self.meshes[instance.mesh]
             if not len(facts.good):
                 continue
-            # Transform the corners of the mesh's own box, which bounds the transformed mesh.
+            # Transform the corners of the mesh's bounding box; their box bounds the transformed mesh.
             own = facts.bounds
             box = np.array(list(product(*own.T)))
             world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]

@@ -60,6 +60,7 @@ def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
             alive[:, None], origin + direction * np.where(alive, distance, 0.0)[:, None], position
         )
     mean = left.reshape(POINTS, PATHS).mean(axis=1)
-    # Average over points where light is trapped only: an open part of the scene must not hide a white room.
+    # Average over points where light is trapped only: otherwise an open part of the scene would outweigh a
+    # white room.
     trapped = mean > (1.0 - 1.0 / MOST_GAIN) ** REFLECTIONS
     return 1.0 / (1.0 - float(mean[trapped].mean()) ** (1.0 / REFLECTIONS)) if trapped.any() else 1.0

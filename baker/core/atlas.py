@@ -1,4 +1,4 @@
-"""Where each instance's surface lies in the lightmap pages.
+"""The atlas: page and lightmap uv of each instance.
 
 A chart is a connected piece of uv; a page is one image; padding is the empty border of a chart.
 """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
-# A code that misses its value by more than this share is visible as a step: the eye separates 1 to 2 %.
+# Relative error of a stored value above which steps are visible: the eye distinguishes 1 to 2 %.
 VISIBLE_STEP = 0.01
 # Texels darker than this share of the page's mean are black on a screen exposed for the page.
 BLACK = 0.01

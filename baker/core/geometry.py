@@ -1,6 +1,6 @@
 """The whole scene as one world-space triangle list with its lightmap uv.
 
-Every instance is expanded: each triangle here can be hit by rays and owns its own texels.
+Every instance is expanded: each triangle here can be hit by rays and has its own texels.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The settings of a bake, each once, with its meaning, unit, range and default.
+"""The settings of a bake, with meaning, unit, range and default.
 
 The command line, the configuration file, the keywords of `baker.bake` and the settings page of the docs are
 made from this class.

@@ -20,7 +20,8 @@ from baker.core.stage import Stage
 from baker.distributed.connection import Cluster, WorkerWatch, work_on_tiles
 from baker.distributed.tile_worker import Span
 
-# Tasks per thread and stage: few, since each has a cost, but enough for all threads to end together.
+# Tasks per thread and stage: few, since each has an overhead, but enough that all threads end at about the
+# same time.
 _TASKS_PER_THREAD = 8
 # Largest number of tiles in a task: a lost worker loses one task per thread.
 _MAX_TILES = 64

@@ -1,6 +1,6 @@
-"""Shares from 0 to 1 as a grey PNG of 8 or 16 bits: linear, 0 is black, row 0 on top.
+"""Values from 0 to 1 as a grey PNG of 8 or 16 bits: linear, 0 is black, row 0 on top.
 
-`png8` and `png16` are made of this; it registers nothing itself.
+`png8` and `png16` register instances of this encoding.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Radiance HDR: three 8-bit mantissas that share an exponent, run-length coded, row 0 on top.
 
-value = mantissa * 2^(exponent - 136), the rule of today's readers; Ward's own adds half a step. Mantissas are
-rounded to the nearest, so that rule has no bias.
+value = mantissa * 2^(exponent - 136), as current readers decode; Ward's original code adds half a step.
+Mantissas are rounded to the nearest, so that rule has no bias.
 
 Based on: G. Ward, Real Pixels, Graphics Gems II, 1991; the Radiance picture file format.
 """

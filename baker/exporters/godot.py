@@ -10,7 +10,7 @@ from baker.exporters.common import place_named_bake, template, write_readme, wri
 FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
 FILES_3 = ("lightmap.shader", "lightmaps.gd")
 # For both versions: stored as they are, linear, without mip levels that would mix charts, and not compressed
-# as soon as somebody uses them in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
+# when they are first used in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
 _IMPORT = """\
 [remap]
 

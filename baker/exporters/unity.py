@@ -1,7 +1,7 @@
 """Unity: pages in Unity's scale, and scripts that import them and assign them to renderers.
 
-Unity multiplies a lightmap by the albedo and by nothing else, so its pages hold E / pi. glTF importers turn v
-over (v' = 1 - v), and images begin below, so a page is right as it is; scale and offset of an object become
+Unity multiplies a lightmap by the albedo only, so pages hold E / pi. glTF importers flip v (v' = 1 - v), and
+image rows start at the bottom, so pages need no flip; scale and offset of an object become
 
     lightmapScaleOffset = (su, sv, ou, 1 - sv - ov)     with page uv = uv * (su, sv) + (ou, ov) in glTF.
 

@@ -1,9 +1,8 @@
 """One GLB without lightmaps: the radiance of each surface as an unlit texture on the first uv set.
 
 For viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each page
-becomes an sRGB
-PNG of (albedo x E / pi + emission) x exposure, clipped at 1; with this exposure 99 % of the texels are not
-clipped.
+becomes an sRGB PNG of (albedo x E / pi + emission) x exposure, clipped at 1; the exposure is chosen so that
+99 % of the texels are not clipped.
 
 Based on: Khronos Group, KHR_materials_unlit.
 """

@@ -147,7 +147,7 @@ class _Worker:
 
 
 def _death(status: int) -> dict[str, Any]:
-    # SIGKILL by hand or by the kernel; other signals come from native code that crashed.
+    # SIGKILL is sent by a user or by the operating system; other signals are crashes of native code.
     if status == -9:
         why = "its process was killed from outside, most likely for want of memory"
     else:

@@ -67,7 +67,7 @@ def best_shift(
     error, excess = misfit
     best = int(np.argmin(excess))
     gain = error[0] - error[best]
-    # Require a significant gain: where a map is constant all shifts fit alike and noise selects one.
+    # Require a significant gain: where a map is constant, all shifts have the same misfit except for noise.
     significant = gain.mean() > _Z * gain.std() / np.sqrt(len(gain))
     return _STEPS[best] if excess[best] < better * excess[0] and significant else (0, 0)
 

@@ -1,7 +1,7 @@
 """The object that each texel lies on, and random points on the surface inside texels.
 
-This is independent of the rasteriser of the bake and uses the uv of `scene.glb` only, so that a fault there
-is not repeated here.
+This is independent of the rasteriser of the bake and uses the uv of `scene.glb` only, so that it does not
+repeat errors of the rasteriser.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Plans the fixes of one mesh: which faces stay, which are flipped, which normals are new.
+"""Plans the fixes of one mesh: faces to keep, faces to flip, new normals.
 
 The plan changes nothing. The caller may test the lightmap uv of the faces that stay and replace it before
 `apply_edit` makes the new vertices.

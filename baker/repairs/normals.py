@@ -1,4 +1,4 @@
-"""Makes vertex normals where the file has none, or none with a direction.
+"""Makes vertex normals where the file has none, or normals of zero length.
 
 A primitive without normals is flat-shaded (glTF 2.0, 3.7.2.1), so flat normals change nothing visible.
 """

@@ -1,8 +1,8 @@
 """Finds faces of closed pieces that are wound against the others.
 
 A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
-The front is the side that the vertex normals point to if they clearly agree, else the side that the larger
-part of the faces has already.
+The front is the side that the vertex normals point to if they agree over most of the piece's area, else the
+side on which the larger area of faces has its front already.
 """
 
 from __future__ import annotations

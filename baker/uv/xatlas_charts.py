@@ -186,7 +186,7 @@ def _drop_flat(
     signed = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     total = np.bincount(chart, weights=signed, minlength=n_charts)
     real = np.bincount(chart, weights=area, minlength=n_charts)
-    # Area of faces with a sign against that of their chart: they overlap a neighbour.
+    # Area of faces whose sign is opposite to that of their chart: they overlap a neighbour.
     back = np.where(signed * np.sign(total)[chart] < 0, np.abs(signed), 0.0)
     fold = np.bincount(chart, weights=back, minlength=n_charts)
     # Area of faces that have almost none in the plane: all their points would share one sample.

@@ -21,7 +21,7 @@ from baker.metrics.texel_area import SurfacePoints, one_surface_point, square_me
 from baker.pathtracer.scene import Reference
 from baker.verification.surroundings import in_contact, inside_points, lifted, seen_along
 
-# Shares of the points at the borders of charts and near other surfaces; the rest is anywhere.
+# Shares of the points at the borders of charts and near other surfaces; the others are random.
 _BORDER, _CONTACT = 0.4, 0.5
 # Texels tested for each wanted point near another surface.
 _POOL = 16

@@ -15,7 +15,7 @@ from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.topology.weld import connected, number_by_first
 
-# A piece counts as closed except for holes if these have less than this share of its area.
+# A piece is treated as closed if its holes have less than this share of its area.
 MOST_OPEN = 0.05
 
 

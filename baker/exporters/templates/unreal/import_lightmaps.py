@@ -1,6 +1,6 @@
 """Imports a baked scene into Unreal Engine (5.3 or newer): pages, meshes, and materials that show the light.
 
-Run it in the editor: Tools > Execute Python Script. Nothing outside CONTENT is touched.
+Run it in the editor: Tools > Execute Python Script. Assets outside CONTENT are not changed.
 """
 
 import json
@@ -59,7 +59,7 @@ def make_function(page):
         default_value=unreal.LinearColor(1.0, 1.0, 0.0, 0.0),
     )
     size = node(unreal.MaterialExpressionComponentMask, -1000, 150, r=True, g=True, b=False, a=False)
-    # The alpha of a vector parameter is an output of its own, so offset is blue and alpha put together.
+    # The alpha of a vector parameter is an output of its own, so the offset is composed of blue and alpha.
     start = node(unreal.MaterialExpressionAppendVector, -1000, 250)
     scaled = node(unreal.MaterialExpressionMultiply, -800, 0)
     placed = node(unreal.MaterialExpressionAdd, -700, 100)
