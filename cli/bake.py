@@ -30,7 +30,7 @@ def bake_command(
     settings = run.of(BakeSettings)
     run.session.will_write(str(out))
     with run.progress() as progress:
-        # Imported here: the kernels take a moment, and the progress is shown meanwhile.
+        # Import here, after the progress is shown: importing the kernels takes a moment.
         from baker.trace.numba_start import skip_blas
 
         skip_blas()
