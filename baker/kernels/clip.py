@@ -102,8 +102,7 @@ def polygon_point(corner, n, u, v):
 
 @inner
 def square_touches(corner, x0, y0):
-    """Return the overlap of a triangle and the unit square at (x0, y0): 0 none, 1 partial, 2 square inside
-    it.
+    """Return the overlap of a triangle and the unit square at (x0, y0): 0 none, 1 part, 2 all of the square.
 
     corner : (3, 2) float64, texels
     """

@@ -28,7 +28,7 @@ ELSEWHERE = 16
 def inside_hits(
     origin, normal, lookup, hit_kind, buffers, begin, sobol_points, shared, rays_per_point, proof, hits
 ):
-    """Count for each point the rays that show it inside geometry and those that show it outside.
+    """Count for each point the rays whose first hit means that it is inside geometry, and that it is outside.
 
     Sixteen items are done together, and no further rays are cast from their points once all are decided.
 

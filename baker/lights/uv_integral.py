@@ -54,7 +54,7 @@ class RowSums(NamedTuple):
 def fill_row_sums(pixels, offset, weight, block):
     """Fill `block` (see `RowSums`) with the sums of w texels a row from `pixels[offset]` on.
 
-    The order of additions is that of `_sum_before`, so black texels change no bit of a sum.
+    The order of additions is that of `_sum_before`, so adding black texels leaves a sum bitwise equal.
 
     pixels : (H * W, 4) float32; offset : first texel; weight : (4,) float64
     """

@@ -155,8 +155,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
 
 @inner
 def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
-    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; return if light
-    passes.
+    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; return success.
 
     path, kept : (N_ROWS_BOTH, n) float64; row, kept_row : (5, n) float64
     value : (3,) float64, output, the light of an unblocked connection; spare : (3,) float64, working memory
@@ -193,7 +192,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
 
 @inner
 def show(path, row, lane, camera, n_subpaths, value, ray):
-    """Connect the end of a light subpath to the camera; return the pixel it is seen through, or -1.
+    """Connect the end of a light subpath to the camera; return the pixel in which it is visible, or -1.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
     value : (3,) float64, output, light for the sum over the subpaths of all pixels

@@ -1,6 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Lights at both ends of a path: start of light subpaths, light samples of eye vertices, hits on emitters and
-the sky.
+"""Lights at both ends of a path: starts of light subpaths, light samples, hits on emitters and the sky.
 
 A light is chosen as in `light_table`. A light subpath starts at a uniform point of an emitter with a
 cosine-weighted direction; at a light with a position, uniformly over its cone; for parallel light and the
@@ -232,8 +231,7 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
 
 @inner
 def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
-    """Aim at one light from the end of an eye subpath; see `vertex.aim`. The weight is that of all
-    techniques.
+    """Sample one light from the end of an eye subpath, weighted for all techniques; see `vertex.aim`.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; sphere : (4,) float64, `Reference.sphere`
     value : (3,), ray : (6,) float64, outputs, see `vertex.aim`

@@ -57,7 +57,7 @@ def ggx_visibility(nl, nv, a):
 
 @inner
 def specular_chance(row, lane, nv):
-    """Return the chance to sample the specular lobe of parameters row[:, lane], seen at cosine nv."""
+    """Return the probability of sampling the specular lobe of parameters row[:, lane] at view cosine nv."""
     if row[WIDTH, lane] < 0.0:
         return 0.0
     metallic = row[METALLIC, lane]
@@ -71,7 +71,7 @@ def specular_chance(row, lane, nv):
 
 @inner
 def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
-    """Write f(v, l) n.l (RGB) to `out` (3,) and return the density with which `bsdf_sample` finds l.
+    """Write f(v, l) n.l (RGB) to `out` (3,) and return the density per steradian of l in `bsdf_sample`.
 
     row : (5, n) parameters, those of `lane` in one column
     v, l : unit, pointing away from the surface, in its frame
@@ -109,7 +109,7 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):
 
 @inner
 def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):
-    """Return the density per steradian with which `bsdf_sample` finds l from v, mirrors left out."""
+    """Return the density per steradian with which `bsdf_sample` samples l from v, without mirrors."""
     return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
 
 

@@ -165,8 +165,7 @@ def build_light_table(
 def _without_area(
     lights: tuple[PunctualLight, ...], disc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """Return rows (P, 20) without chances, power (P,), and tables (N,) of the lights without area that are
-    not black.
+    """Return rows (P, 20) without probabilities, power (P,), tables (N,) of lights without area, not black.
 
     disc : float, m2, area of a disc as wide as the scene
     """
@@ -256,7 +255,7 @@ def light_rows(
 
 
 def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.float64]:
-    """Return chances: half by power over all, half equally among groups (inside a group by power)."""
+    """Return probabilities: half by power over all, half equally among groups (inside a group by power)."""
     total = power.sum()
     if not total > 0:
         return np.zeros(len(power))
@@ -304,8 +303,8 @@ def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
 def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     """Return the vector from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
 
-    The density is per steradian and contains the emitter's chance; 0 if the side that faces the point does
-    not emit.
+    The density is per steradian and contains the emitter's probability; 0 if the side that faces the point
+    does not emit.
 
     emitter : (E, 24) float64, see `emitters`; u, w : uniform numbers
     """
@@ -328,7 +327,7 @@ def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the density per steradian with which a point at the end of d on emitter e is aimed at.
+    """Return the density per steradian with which the point of emitter e at the end of d is sampled.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -352,8 +351,8 @@ def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
 def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
     """Return the direction from (x, y, z) to a light without area, its distance, irradiance per intensity.
 
-    The direction is unit; the distance, metres, is a little short; the irradiance is that of a surface facing
-    the light.
+    The direction is unit; the distance, metres, is slightly shorter than that to the light; the irradiance is
+    that of a surface facing the light.
 
     lights : `LightTable`
     """

@@ -259,7 +259,7 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):
 
 @inner
 def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
-    """Aim at one light from one lane's vertex; return its number, or -1 if it cannot light the vertex.
+    """Sample a ray to one light from one lane's vertex; return the light's index, or -1 without light.
 
     path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; lights : `LightTable`
     value : (3,), ray : (6,) float64, outputs, see `vertex.aim`

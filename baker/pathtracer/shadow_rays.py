@@ -49,7 +49,7 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
 @inner
 def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
-    """Put the lanes' rays to lights into packets, those to one light together; trace full packets.
+    """Append the lanes' rays to lights to packets, grouped by light; trace full packets.
 
     s : blocks, float32; bins : packets, float32; on : (8,) int32, working memory; out : (m, 3) float64
     light : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet

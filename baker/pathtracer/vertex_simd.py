@@ -134,7 +134,7 @@ def weighted(s, base, column, lane, b, u, v):
 
 @inner
 def arrive_lanes(s, base, min_offset_scale):
-    """Make vertices of the lanes' hits, whose triangles have been copied; black backs end the path.
+    """Set up vertices at the lanes' hits, whose triangles have been copied; paths end at black backs.
 
     s : blocks, float32
     min_offset_scale : float32, metres, see `Surfaces`
@@ -199,7 +199,7 @@ def look_up_falloff(s, base, lights, light):
 
 @inner
 def aim_lanes(s, base, mode, power):
-    """Aim at the lanes' lights, whose rows have been copied; write direction, distance and unblocked light.
+    """Sample rays to the lanes' lights, whose rows have been copied: direction, distance, unoccluded light.
 
     s : blocks, float32; mode, power : `Estimator.aim` and `.power`. The light is 0 below the horizon.
     """

@@ -56,7 +56,7 @@ _HIDDEN_SHARE = 1.0 / 8.0
 
 @dataclass(frozen=True)
 class EmitterSampling:
-    """Emitters, and the sample numbers of both strategies that find them, combined by the balance heuristic.
+    """Emitters, and the sample numbers of light and hemisphere sampling, combined by the balance heuristic.
 
     Attributes
     ----------

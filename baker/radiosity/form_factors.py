@@ -217,10 +217,10 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
 
 
 def _starts_of(patches: PatchSet, n_rays: int) -> NDArray[np.int64]:
-    """Return how many of its patch's rays start from each entry of `patches.member`, (n,).
+    """Return the number of rays that start from each entry of `patches.member`, (n,).
 
-    Rays are distributed by area: the entries that cover the first share c of a patch's area get the rays k
-    whose (k + 0.5) / n_rays is at most c.
+    Rays are distributed by area: the entries that cover the first share c of a patch's area are the origins
+    of the rays k whose (k + 0.5) / n_rays is at most c.
     """
     owner = np.repeat(np.arange(patches.n), np.diff(patches.first))
     running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)

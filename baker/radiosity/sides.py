@@ -309,7 +309,7 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool, whether points of a pair of entries see each other, and the number of rays cast."""
+    """Return (m,) bool, mutual visibility of points of a pair of entries, and the number of rays cast."""
     connected = np.zeros(len(pair), np.uint8)
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:

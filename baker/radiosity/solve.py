@@ -173,7 +173,7 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
 
 
 def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return F exitance, (P, 3) float64: the irradiance that patches of that exitance give each other."""
+    """Return F exitance, (P, 3) float64: the irradiance of patches from patches of that exitance."""
     with _Product(matrix, 1) as product:
         return product(exitance)
 

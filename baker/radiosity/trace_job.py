@@ -115,7 +115,7 @@ class TraceJob:
         *,
         rays_per_item: float = 0.0,
     ) -> None:
-        """Call `work(begin, end)` for each tile in this process, whatever the runner; see `run_tiles`."""
+        """Call `work(begin, end)` for each tile in this process, without the runner; see `run_tiles`."""
         run_tiles(
             n, tile, work, threads=self.threads,
             stage=stage, progress=self.progress, rays_per_item=rays_per_item,

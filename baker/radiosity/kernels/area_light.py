@@ -189,9 +189,10 @@ def light_samples(
     """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
     Early out: sixteen neighbouring texels first trace one ray from each of their points. If none of these up
-    to 256 rays is blocked, their other rays are not traced, but count as unblocked. Where a share p of the
-    light is hidden, the expected error is p (1 - p)^256 of it, at most 0.15 %. If there are few emitters and
-    none is textured, the closed form replaces the samples of such texels, and hemisphere rays add nothing.
+    to 256 rays is blocked, their other rays are not traced and are treated as unblocked. Where a share p of
+    the light is hidden, the expected error is p (1 - p)^256 of it, at most 0.15 %. If there are few emitters
+    and none is textured, the closed form replaces the samples of such texels, and hemisphere rays add
+    nothing.
 
     origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
     emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`

@@ -233,10 +233,10 @@ def merge_reciprocal_estimates(
 def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
     """Replace F_ij by d_i F_ij d_j with factors d that make row sums `goal`; A_i F_ij stays symmetric.
 
-    The condition is d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without slack a large patch whose few
-    rays all missed a small one would take energy from the small one's accurate estimate. In log d this is the
-    minimum of a convex function, and each step is the exact minimum along one coordinate, so no damping is
-    needed (15 passes; damped passes over all coordinates took over 30).
+    The condition is d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without slack, a large patch whose few
+    rays all missed a small patch would lower the small patch's accurate row sum. In log d this is the minimum
+    of a convex function, and each step is the exact minimum along one coordinate, so no damping is needed (15
+    passes; damped passes over all coordinates took over 30).
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR; value is changed in place
     goal : (P,) float64, row sums; slack : (P,) float64, uncertainty of each goal

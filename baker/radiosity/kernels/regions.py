@@ -31,7 +31,7 @@ def join_linked(link, root):
 
 @kernel
 def flood_regions(chart, region, queue):
-    """Grow regions over the texels of a page that have none, ring by ring, each within its chart.
+    """Assign regions to texels of a page without one, ring by ring from neighbours of the same chart.
 
     chart : (H, W) int32, -1 for empty texels; region : (H, W) int32, -1 for texels without one; filled
     queue : (H * W,) int64, working memory

@@ -244,8 +244,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
 
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
-    """Find texels with a corner of their surface that is visible from none of their points, or with a blocked
-    outline.
+    """Find texels with a corner of surface visible from none of their points, or with a blocked outline.
 
     Another surface may cut off a corner that contains no point but may be hit by rays. The edge between two
     walls may enter a texel through one of its sides; it blocks the segment between the corners of that side.
@@ -331,8 +330,7 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 def _trace_corners(
     point, facing, headroom, found, m, origin, normal, height, valid_points, side, buffers, hidden
 ):
-    """Set hidden[m] if one of `found` corners is visible from no point of item m, or not from the next
-    corner.
+    """Set hidden[m] if one of `found` corners is invisible from all points of item m or the next corner.
 
     point, facing : (1, 16, 3) float32, corners, metres, and unit normals
     headroom : (1, 16) float32, metres, working memory

@@ -17,7 +17,7 @@ from baker.trace.jit import inner
 from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
 # A hit lies on an edge if a barycentric coordinate is at most this. Embree accepts coordinates down to minus
-# 1.2e-7, and two triangles of one edge are both met only within that.
+# 1.2e-7, and two triangles of one edge are both hit only within that.
 EDGE = 1.0e-6
 # Rounding changes the distance of a crossing by at most this share.
 SAME = np.float32(4.0e-6)
@@ -31,7 +31,7 @@ def on_edge(b1, b2):
 
 @inner
 def crossed_before(context, words, number, surface, distance):
-    """Return whether ray `number` met an edge of the surface at the same distance; store this hit if not.
+    """Return whether ray `number` has hit an edge of the surface at the same distance; store this hit if not.
 
     context, words : (CONTEXT_WORDS,) float32 and uint32, one memory, see `packets`
     surface : float32, `alpha.SURFACE`; distance : float32, in units of the direction's length
