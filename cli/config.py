@@ -113,7 +113,7 @@ def resolve(
 
 
 def _table(model: type[Settings], config: Path) -> dict[str, Any]:
-    """Return the checked values of a model's table by field: a mistake in the file is blamed on the file."""
+    """Return the checked values of a model's table by field: errors name the file."""
     table = read_config(config, model.table)
     try:
         checked = model.make(table)

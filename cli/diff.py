@@ -34,9 +34,7 @@ def diff(
 
 
 def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
-    """Write differences of the manifests, a table of errors, the objects and points with the largest ones,
-    and the failed limits.
-    """
+    """Write manifest differences, tables of errors, the worst objects and points, and failed limits."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     for entry in found.differences:

@@ -38,7 +38,7 @@ def fix_request(
     Raises
     ------
     SettingsError
-        If the flags do not go together or `out` cannot be written.
+        If the flags are contradictory or `out` cannot be written.
     """
     if not (fix or settings.repair):
         if out is not None:

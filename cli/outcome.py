@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def report_outcome(found: VerifyReport | DiffReport, run: Run, as_text: Callable[..., None]) -> None:
-    """Write an outcome as text and, if wanted, as JSON; end the program as failed if it did not pass.
+    """Write an outcome as text and, with --json, as JSON; exit with `FAILED_CHECK` if it did not pass.
 
     as_text : called with the outcome, a stream and `verbose`
     """

@@ -129,8 +129,7 @@ def repair(
     progress: Progress = silent,
     **keywords: Unpack[RepairKeywords],
 ) -> FixResult:
-    """Fix the meshes of a scene file without changing their appearance; with `repair=True`, also repair
-    shapes.
+    """Fix the meshes of a scene file without a visible change; with `repair=True`, also repair shapes.
 
     Parameters
     ----------

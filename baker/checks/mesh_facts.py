@@ -16,7 +16,7 @@ from baker.topology.weld import number_by_first
 
 
 class MeshFacts:
-    """A mesh of the file, and which of its triangles a bake can use.
+    """A mesh of the file, and the mask of triangles that a bake can use.
 
     Faces are numbered over all primitives, without those that only stitch a triangle strip.
 

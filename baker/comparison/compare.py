@@ -207,7 +207,7 @@ def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
 def _choose(
     bake: StoredBake, sides: Sides, owner: NDArray[np.int32], name: str, settings: DiffSettings
 ) -> tuple[NDArray[np.int64], SurfacePoints, SurfacePoints, NDArray[np.int64]]:
-    """Return texels, their points on both sides, and how many of each object are not on the other side."""
+    """Return texels, their points in both bakes, and the number of texels of each object without one in b."""
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)
     pixel = choose_texels(owner, owner >= 0, brightness, settings.texels, settings.seed)

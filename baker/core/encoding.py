@@ -93,7 +93,7 @@ class Encoding(ABC, Generic[Options]):
         return options
 
     def options_of_image(self, image: DecodedImage) -> Options:
-        """Return options that write an image in the number format it was read in."""
+        """Return options that write an image in the number format of its file."""
         return self.options_type()
 
     @abstractmethod

@@ -76,7 +76,7 @@ class LightJson(Protocol):
 
 
 class EmissionProfile(NamedTuple):
-    """The emission of a light without area, as the path tracer evaluates and samples it.
+    """The emission of a light without area, as data that the path tracer evaluates and samples.
 
     With a position, the radiant intensity in unit direction w, and the irradiance of a surface that faces the
     light at distance r, are

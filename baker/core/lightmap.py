@@ -61,7 +61,7 @@ class ChannelDescription:
 
     @property
     def groups(self) -> tuple[slice, ...]:
-        """Return the components that make up one colour each; all others, and signed ones, are alone."""
+        """Return the groups of components: three that are a colour, or one; signed ones are single."""
         groups, start = [], 0
         while start < len(self.components):
             three = self.components[start : start + 3]

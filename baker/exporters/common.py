@@ -129,7 +129,7 @@ def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
 
 
 def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Put pages, description and the scene with names of its own into `target`; return the description."""
+    """Write pages, description and the scene with unique names into `target`; return the description."""
     description = place_named_scene(bake, target)
     for page in description["pages"]:
         link_file(bake / page["file"], target / page["file"])

@@ -326,9 +326,9 @@ def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _L
 def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
     """Return the charts to filter, (n_charts,) bool, or None if the noise of each is small against its light.
 
-    Noise is compared within bands of charts of similar brightness: against the mean of the page, a dim room
-    beside sunlit ground would seem free of noise. Charts without noise are left out, since the filter derives
-    its exposure from all texels that it is given.
+    Noise is compared within bands of charts of similar brightness: relative to the mean of the page, the
+    noise of a dim room beside sunlit ground would be negligible. Charts without noise are left out, since the
+    filter derives its exposure from all texels that it is given.
 
     error : (H, W) float32, standard error of each texel's brightness
     """

@@ -208,7 +208,7 @@ def _execute(
 
 
 class _Monitor:
-    """Passes OIDN's progress on; `pyoidn` has no wrapper for it, so its library is called directly."""
+    """Reports OIDN's progress. `pyoidn` has no wrapper for it, so its library is called directly."""
 
     def __init__(self, library: Any, filter_: Any, progress: Progress) -> None:
         self._progress = progress

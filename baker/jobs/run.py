@@ -1,6 +1,4 @@
-"""Runs many bakes: finds those that are not up to date, and runs them within limits on processes and
-memory.
-"""
+"""Runs the bakes that are not up to date, within limits on processes and memory."""
 
 from __future__ import annotations
 

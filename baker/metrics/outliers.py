@@ -75,8 +75,8 @@ def outlier_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count:
 def steep_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
     """Return the texels whose two neighbours in a row or column differ most.
 
-    At these texels a shift or a blur of the map is visible. The difference is relative to the brighter
-    neighbour and counts up to one half, so that shadow edges rank like the edges of gaps.
+    The effect of a shift or a blur of the map is largest at these texels. The difference is relative to the
+    brighter neighbour and limited to one half, so that shadow edges have the same rank as edges of gaps.
 
     Parameters
     ----------

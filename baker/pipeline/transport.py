@@ -182,7 +182,7 @@ def _reflected(
     record: Record,
     executor: TileExecutor,
 ) -> NDArray[np.float32]:
-    """Return (n, 3) float32, lx: light that each entry reflects, after all bounces but that of the gather.
+    """Return (n, 3) float32, lx: light that each entry reflects, without the bounce of the final gather.
 
     complete : (n, 3) float32, lx, direct light; level : (n,) uint8, of each entry in gaps, see `gap_level`
     """

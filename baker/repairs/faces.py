@@ -1,5 +1,4 @@
-"""Finds the faces that can be removed without a visible change: degenerate ones that are never drawn, and
-exact duplicates.
+"""Finds the faces that can be removed without a visible change: degenerate ones and exact duplicates.
 
 A duplicate is removed only if no renderer can distinguish it from the first: the same corners with the same
 attributes, in a material that does not blend. Faces that differ in any attribute stay, since which of them is

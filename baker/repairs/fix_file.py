@@ -168,7 +168,7 @@ def _fix(
     make_normals: bool = True,
     inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
 ) -> FixResult:
-    """Make changes that cannot be seen. `data` is the scene's GLB, returned if there are none; or None."""
+    """Make invisible changes. `data` is the scene's GLB, returned if there are none; or None."""
     source, source_scene = _parsed(scene)
     area = _area_shares(source_scene)
     edited: dict[tuple[int, int], EditedPrimitive] = {}

@@ -1,6 +1,4 @@
-"""Repairs the meshes of a document one by one, and measures the distance between each surface before and
-after.
-"""
+"""Repairs the meshes of a document one by one, and measures the distance of each surface from the old one."""
 
 from __future__ import annotations
 

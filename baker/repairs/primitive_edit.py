@@ -74,7 +74,7 @@ def edit_with_flips(
     touched: bool,
     normals: NormalChoice | None = None,
 ) -> PrimitiveEdit:
-    """Return the edit of a primitive; normals of flipped faces that oppose their new front change sign.
+    """Return the edit of a primitive; normals of flipped faces are negated if they oppose the new front.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ def _rows_of_one_primitive(
 def _patch_normals(
     edit: PrimitiveEdit, patched: NDArray[np.bool_], front: NDArray[np.float64]
 ) -> PrimitiveEdit:
-    """Give corners of patches the face normal where the rim's normals differ from it, as on flat shading.
+    """Set normals of patches to the face normal at corners where the rim's normals differ from it.
 
     `patched` is the (T,) mask of patch faces and `front` their (T, 3) area vectors.
     """

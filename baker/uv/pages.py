@@ -85,8 +85,8 @@ def fill_pages(
 ) -> tuple[list[Page], list[SceneWarning]]:
     """Pack all instances into pages of exactly `settings.resolution`.
 
-    Without `settings.density`: one page, as dense as fits. With it: instances at that density on up to
-    `max_pages` pages, at a lower one where these are not enough.
+    Without `settings.density`: one page, at the largest density that fits. With it: instances at that density
+    on up to `max_pages` pages, at a lower one where these are not enough.
 
     Parameters
     ----------

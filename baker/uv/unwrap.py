@@ -158,7 +158,7 @@ def _lay_out(
 def _placements(
     scene: Scene, filled: list[int], shares: NDArray[np.float64], usable: NDArray[np.bool_]
 ) -> tuple[list[CutInstance | RigidInstance], list[_Cut]]:
-    """Return how each `filled` instance is placed, and the meshes to cut, each once for all alike."""
+    """Return the placement of each `filled` instance, and the meshes to cut, once for equal stretches."""
     placements: list[CutInstance | RigidInstance] = []
     cuts: list[_Cut] = []
     index: dict[tuple[int, bytes], int] = {}

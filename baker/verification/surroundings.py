@@ -170,9 +170,7 @@ def _add_rooms(
     left: NDArray[np.int64],
     room: NDArray[np.int32],
 ) -> None:
-    """Assign rooms to the texels `left` (p,) by their visibility from points in the air (m, 3); changes
-    `room` (n,).
-    """
+    """Write the rooms `room` (n,) of texels `left` (p,), by visibility from points in the air (m, 3)."""
     seen = visible(reference, air, points.position[left, 0], points.face_normal[left, 0])
     alone = np.ones(len(left), bool)
     while len(air):
@@ -187,7 +185,7 @@ def _add_rooms(
 def visible(
     reference: Reference, eye: NDArray[np.float64], point: NDArray[np.float64], face: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (m, n): whether the front of point (n, 3), normal `face` (n, 3), is seen from `eye` (m, 3)."""
+    """Return visibility (m, n) of the fronts of points (n, 3), normals `face` (n, 3), from `eye` (m, 3)."""
     m, n = len(eye), len(point)
     target = lifted(reference, point[:, None], face[:, None])
     segment = target[None] - eye[:, None]

@@ -1,4 +1,4 @@
-"""The data of the viewer page: one JSON object, and flat arrays that the browser uploads as they are.
+"""The data of the viewer page: one JSON object, and flat arrays that the browser uploads unchanged.
 
 World-space triangles are sorted by page and material, so that the page makes one draw call for each pair.
 """

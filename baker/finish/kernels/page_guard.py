@@ -31,7 +31,7 @@ _three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
 
 @kernel
 def high_pass(luminance, chart, covered, out, first_row, end_row):
-    """Filter a page by the kernel that is blind to planes, [1 -2 1; -2 4 -2; 1 -2 1] / 6.
+    """Filter a page by the kernel [1 -2 1; -2 4 -2; 1 -2 1] / 6, which is 0 on planes.
 
     For white noise the result has the noise's own standard deviation.
 
