@@ -155,7 +155,7 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
 
 @inner
 def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
-    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; return success.
+    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; False if dark.
 
     path, kept : (N_ROWS_BOTH, n) float64; row, kept_row : (5, n) float64
     value : (3,) float64, output, the light of an unblocked connection; spare : (3,) float64, working memory

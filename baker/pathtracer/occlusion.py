@@ -54,7 +54,7 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Return whether most points (n, 3) are closer than `alike` to the next one, so that sorting is useful."""
+    """Return whether most points (n, 3) are closer than `alike` to the next one: then sorting saves time."""
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
     return bool(2 * np.count_nonzero(step < alike) > len(first))
