@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import test_lights
 from tiny_scenes import Quad, box_quads, grey, quad_scene, world_of
 
 import baker.lights.kinds
@@ -16,9 +17,8 @@ from baker.checks.context import CheckContext
 from baker.checks.in_bake import bake_warnings
 from baker.checks.run import check_scene
 from baker.checks.settings import CheckSettings
-from baker.core import light_kind
 from baker.core.errors import InputError
-from baker.core.light_kind import LIGHT_KINDS, kind_of
+from baker.core.light_kind import LIGHT_KINDS, kind_of, kinds_by_gltf_type
 from baker.core.scene import PunctualLight
 from baker.core.settings import make_settings
 from baker.io.gltf.build_document import new_document
@@ -57,7 +57,10 @@ MOON = LIGHT_KINDS.register("moon")(
 )
 '''
 BEACON = '''
-"""A beacon: I(w) = I max(cos, 0)^n (1 + cos(phi - 0.7)) / 2, with a parameter n of its own."""
+"""A beacon: I(w) = I max(c, 0)^n (1 - s^2 (1 - cos(phi - 0.7)) / 2), with a parameter n of its own.
+
+c and s are cosine and sine of the angle to its axis, phi the azimuth.
+"""
 
 import math
 
@@ -65,33 +68,36 @@ import numpy as np
 
 from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightKind
 
-COSINES, AZIMUTHS = 512, 128
+# Between entries of the table, linear interpolation is off by less than 2e-5.
+COSINES, AZIMUTHS = 1024, 512
 
 
 def frame(light):
     axis = np.array(light.direction)
-    tangent = np.cross(axis, [0.0, 0.0, 1.0])
+    tangent = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     tangent /= np.linalg.norm(tangent)
     return axis, tangent, np.cross(axis, tangent)
 
 
-def turn(azimuth):
-    return 0.5 + 0.5 * np.cos(azimuth - 0.7)
+def fall_off(cosine, azimuth, sharpness):
+    cosine = np.clip(cosine, 0, 1)
+    return cosine**sharpness * (1 - (1 - cosine**2) * (0.5 - 0.5 * np.cos(azimuth - 0.7)))
 
 
 def beam(light, origin, normal, ray, weight):
     axis, tangent, bitangent = frame(light)
-    ray[..., :3], ray[..., 3] = np.array(light.position) - origin, 0.9999
-    length = np.linalg.norm(ray[..., :3], axis=-1)
+    # Shadow rays end just before the light.
+    ray[..., :3], ray[..., 3] = np.array(light.position) - origin, 0.99999
+    length = np.maximum(np.linalg.norm(ray[..., :3], axis=-1), 1e-10)
     away = -ray[..., :3] / length[..., None]
     azimuth = np.arctan2(away @ bitangent, away @ tangent)
-    share = np.maximum(away @ axis, 0) ** light.parameters["sharpness"] * turn(azimuth)
+    share = fall_off(away @ axis, azimuth, light.parameters["sharpness"])
     weight[:] = np.maximum(-(away * normal).sum(axis=-1), 0) / length**2 * share
 
 
 def emission(light):
-    cosine = np.linspace(0, 1, COSINES)[:, None] ** light.parameters["sharpness"]
-    table = cosine * turn(2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS)
+    cosine, azimuth = np.linspace(0, 1, COSINES)[:, None], 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
+    table = fall_off(cosine, azimuth, light.parameters["sharpness"]).astype(np.float32)
     tangent = tuple(frame(light)[1])
     return EmissionProfile(light.position, light.direction, min_cosine=0.0, table=table, tangent=tangent)
 
@@ -106,7 +112,7 @@ BEACON = LIGHT_KINDS.register("beacon")(
             "position": light.position, "direction": light.direction, **light.parameters
         },
         fill=beam, emission=emission,
-        power=lambda light, disc: math.pi / (light.parameters["sharpness"] + 1),
+        power=lambda light, disc: 2 * math.pi / (light.parameters["sharpness"] + 1),
     )
 )
 '''
@@ -187,12 +193,37 @@ def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
     assert "the beacon light has 100 cd" in finding.message
 
     # The same light, baked with azimuths the wrong way round, fails.
-    text = BEACON.replace("* turn(azimuth)", "* turn(-azimuth)")
+    text = BEACON.replace("away @ axis, azimuth, ", "away @ axis, -azimuth, ")
     assert text != BEACON
     mirrored = replace(LIGHT_KINDS.get("beacon"), fill=_fill_of(text))
     LIGHT_KINDS._plugins["beacon"] = mirrored
     bake(lit_by(light), settings=SETTINGS, out=out, force=True)
     assert not verify(out, VerifySettings(texels=200, spp=64)).passed
+
+
+def beacon_truth(point, normal):
+    """Return the irradiance of `BEACON` with a sharpness of 3, for the light of the contract."""
+    way, _, cosine = test_lights.toward(point)
+    tangent = np.cross(test_lights.DIRECTION, [0, 0, 1]) / np.hypot(0.48, 0.8)
+    turn = np.arctan2(-way @ np.cross(test_lights.DIRECTION, tangent), -way @ tangent)
+    share = 1 - (1 - cosine**2) * np.sin((turn - 0.7) / 2) ** 2
+    return test_lights.point_truth(point, normal) * np.maximum(cosine, 0) ** 3 * share
+
+
+def test_the_example_keeps_the_contract(add_kind, monkeypatch):
+    """The example that CONTRIBUTING.md names passes the tests that a copy of it has to pass."""
+    add_kind("beacon", BEACON)
+    monkeypatch.setitem(test_lights.TRUTH, "beacon", beacon_truth)
+    monkeypatch.setitem(test_lights.PARAMETERS, "beacon", {"sharpness": 3.0})
+    test_lights.test_every_kind_has_a_closed_form()
+    test_lights.test_a_record_agrees_with_what_its_light_does("beacon")
+    test_lights.test_what_is_written_is_read("beacon", np.inf)
+    test_lights.test_the_profile_for_the_path_tracer_is_the_same_light("beacon", np.inf)
+    test_lights.test_power_is_the_flux_or_a_bound_of_it("beacon", 0.0)
+    test_lights.test_weights_are_the_closed_form("beacon")
+    test_lights.test_rays_end_just_before_the_light("beacon")
+    test_lights.test_a_candela_a_metre_and_a_lux("beacon")
+    test_lights.test_odd_points("beacon")
 
 
 def _fill_of(text):
@@ -246,7 +277,7 @@ def test_an_unknown_kind_is_an_error_also_of_a_light_that_is_off(name):
     with pytest.raises(InputError) as caught:
         REFUSERS[name](laser())
     assert str(caught.value) == (
-        "light 'night': there is no kind of light 'laser'; known are directional, point, spot"
+        f"light 'night': there is no kind of light 'laser'; known are {', '.join(LIGHT_KINDS.names())}"
     )
     # The same call with a known kind is no error.
     REFUSERS[name](lit_by(shining("point"), shining("spot", 0.0)))
@@ -265,7 +296,7 @@ def test_a_file_with_an_unknown_kind_is_refused(command, tmp_path):
         "check": lambda: check_scene(path, CheckSettings(), SETTINGS),
         "render": lambda: render(path, RenderSettings(camera="0,1,2,0,0,0,50", width=8, height=8, spp=2)),
     }
-    with pytest.raises(InputError, match="'laser' is none of directional, point, spot"):
+    with pytest.raises(InputError, match=f"'laser' is none of {', '.join(kinds_by_gltf_type())}"):
         work[command]()
 
 
@@ -281,6 +312,6 @@ def test_what_gltf_cannot_hold_is_not_written(monkeypatch):
     scene = lit_by(shining("odd"))
     odd = replace(kind_of(shining("point")), name="odd", gltf_type=None)
     monkeypatch.setattr(LIGHT_KINDS, "_plugins", {**LIGHT_KINDS._plugins, "odd": odd})
-    assert None not in light_kind.kinds_by_gltf_type()
+    assert None not in kinds_by_gltf_type()
     with pytest.raises(InputError, match="has no odd lights"):
         new_document(scene, unwrap_scene(scene, SETTINGS))
