@@ -16,6 +16,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.errors import ResourceError
 from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
@@ -118,11 +119,38 @@ class Encoding(ABC, Generic[Options]):
         header: Mapping[str, str],
         names: tuple[str, ...] | None = None,
     ) -> None:
-        """Write pixels (H, W, C) to `path`; `names` are those of the components, where a format has names."""
+        """Write pixels (H, W, C) to `path`, row 0 on top; equal arguments give equal bytes.
+
+        Parameters
+        ----------
+        path : Path
+            The file; its folder exists.
+        pixels : (H, W, C) float32
+            Values beyond the limits are stored as these.
+        options : EncodingOptions
+            As `fitted` returns them.
+        header : mapping of str to str
+            Quantity, unit and so on, kept in the file as text for `decode`.
+        names : tuple of str, optional
+            Of the components, where a format has names.
+
+        Raises
+        ------
+        ValueError
+            See `check_pixels`.
+        ResourceError
+            See `write_image`.
+        """
 
     @abstractmethod
     def decode(self, path: Path) -> DecodedImage:
-        """Read a file of this format."""
+        """Read a file of this format; the pixels are those of `stored`.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or "is not a readable" image of this format, or ends early.
+        """
 
 
 @dataclass(frozen=True)
@@ -211,6 +239,27 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     if np.isnan(pixels.min()) or np.isnan(pixels.max()):
         count = int(np.isnan(pixels).any(axis=2).sum())
         raise ValueError(f"{count} texels are not a number; {name} is not written")
+
+
+def write_image(path: Path, data: bytes) -> None:
+    """Write the content of an image file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; replaced if it exists.
+    data : bytes
+        All of it.
+
+    Raises
+    ------
+    ResourceError
+        If the file cannot be written.
+    """
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise ResourceError(f"the image could not be written ({error.strerror})", file=str(path)) from None
 
 
 ENCODINGS: Registry[Encoding[Any]] = Registry("baker.encodings")

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import DecodedImage, Encoding, EncodingOptions, check_pixels
-from baker.core.errors import InputError, ResourceError
+from baker.core.encoding import DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.errors import InputError
 from baker.io.png import decode_png, encode_png
 
 
@@ -68,12 +68,7 @@ class GreyPng(Encoding[EncodingOptions]):
             If the file cannot be written.
         """
         check_pixels(pixels, self.components, path.name)
-        try:
-            path.write_bytes(encode_png(self._code(pixels)[:, :, 0], header))
-        except OSError as error:
-            raise ResourceError(
-                f"the image could not be written ({error.strerror})", file=str(path)
-            ) from None
+        write_image(path, encode_png(self._code(pixels)[:, :, 0], header))
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.

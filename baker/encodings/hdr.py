@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
-from baker.core.errors import InputError, ResourceError
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.errors import InputError
 
 # The largest mantissa with the largest exponent.
 HDR_MAX = 255.0 * 2.0 ** (255 - 136)
@@ -72,12 +72,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
         head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"
         rgbe = _to_rgbe(pixels)
         body = [_coded(row) for row in rgbe] if width in _CODED else [rgbe.tobytes()]
-        try:
-            path.write_bytes(head.encode("utf-8") + b"".join(body))
-        except OSError as error:
-            raise ResourceError(
-                f"the image could not be written ({error.strerror})", file=str(path)
-            ) from None
+        write_image(path, head.encode("utf-8") + b"".join(body))
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.

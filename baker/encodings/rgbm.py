@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
-from baker.core.errors import InputError, ResourceError, SettingsError
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.errors import InputError, SettingsError
 from baker.core.settings_model import Text, setting
 from baker.io.png import decode_png, encode_png
 
@@ -104,12 +104,7 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         check_pixels(pixels, self.components, path.name)
         about = {**header, "rgbm": "value = top * (rgb * a)^gamma", "top": repr(options.top)}
         data = encode_png(_to_rgbm(pixels, options.top), {**about, "gamma": repr(GAMMA)})
-        try:
-            path.write_bytes(data)
-        except OSError as error:
-            raise ResourceError(
-                f"the image could not be written ({error.strerror})", file=str(path)
-            ) from None
+        write_image(path, data)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file whose text chunks contain `top` and the gamma.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import test_encodings
 
 from baker.core.encoding import ENCODINGS, encoding_options
 from baker.core.settings import BakeSettings, CommonSettings
@@ -19,12 +21,17 @@ TOY = '''
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 
 import numpy as np
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.errors import InputError
 from baker.core.settings_model import setting
+
+TOP = 1000.0
 
 
 class ToyOptions(EncodingOptions):
@@ -35,13 +42,14 @@ class ToyEncoding(Encoding[ToyOptions]):
     suffix = ".toy"
     components = (1, 3)
     options_type = ToyOptions
-    when_clipped = when_banded = "raise `toy_steps`"
+    when_clipped = "use the EXR"
+    when_banded = "raise `toy_steps`"
 
     def limits(self, options):
-        return 0.0, 1000.0
+        return 0.0, TOP
 
     def stored(self, pixels, options):
-        steps = np.rint(np.clip(pixels, 0.0, 1000.0) * options.toy_steps)
+        steps = np.rint(np.clip(pixels, 0.0, TOP) * options.toy_steps)
         return (steps / options.toy_steps).astype(np.float32)
 
     def tolerance(self, pixels, options):
@@ -49,12 +57,19 @@ class ToyEncoding(Encoding[ToyOptions]):
 
     def encode(self, path, pixels, *, options, header, names=None):
         check_pixels(pixels, self.components, path.name)
-        with path.open("wb") as file:
-            np.save(file, self.stored(pixels, options))
+        stream = io.BytesIO()
+        np.savez(stream, pixels=self.stored(pixels, options), header=json.dumps(dict(header)))
+        write_image(path, stream.getvalue())
 
     def decode(self, path):
-        with path.open("rb") as file:
-            return DecodedImage(np.load(file), {}, "float", ("Y",))
+        try:
+            with np.load(io.BytesIO(path.read_bytes())) as file:
+                pixels, header = file["pixels"], json.loads(str(file["header"]))
+        except OSError as error:
+            raise InputError(f"the image cannot be read ({error.strerror})", file=str(path)) from None
+        except (ValueError, zipfile.BadZipFile) as error:
+            raise InputError(f"this is not a readable toy image ({error})", file=str(path)) from None
+        return DecodedImage(pixels, header, "float", ("Y",) if pixels.shape[2] == 1 else ("R", "G", "B"))
 
 
 ENCODINGS.register("toy")(ToyEncoding())
@@ -86,8 +101,8 @@ def test_an_encoding_with_an_option_is_one_file(run, tmp_path):
     assert manifest["settings"]["toy_steps"] == 5
     assert {entry["encoding"] for page in manifest["pages"] for entry in page["encodings"]} == {"toy"}
     assert any(w["code"] == "banding" and "raise `toy_steps`" in w["message"] for w in manifest["warnings"])
-    with (tmp_path / "out" / "ao_0.toy").open("rb") as file:
-        value = np.load(file)
+    with np.load(tmp_path / "out" / "ao_0.toy") as file:
+        value = file["pixels"]
     assert np.array_equal(value * 5, np.rint(value * 5))
     assert set(np.unique(np.rint(value * 5))) <= set(range(6))
 
@@ -108,9 +123,30 @@ def test_an_option_is_in_help_and_docs(run):
     assert "`toy` (any)" in page
 
 
+@pytest.mark.parametrize("number", [1, 3])
+def test_the_example_keeps_the_contract(number, tmp_path, monkeypatch):
+    """The example that CONTRIBUTING.md names passes the tests that a copy of it has to pass."""
+    ENCODINGS.names()
+    monkeypatch.setattr(ENCODINGS, "_plugins", dict(ENCODINGS._plugins))
+    (tmp_path / "toy.py").write_text(TOY)
+    spec = importlib.util.spec_from_file_location("baker.encodings.toy", tmp_path / "toy.py")
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "baker.encodings.toy", module)
+    spec.loader.exec_module(module)
+    case = "toy", number, module.ToyOptions()
+    test_encodings.test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, *case)
+    test_encodings.test_zero_stays_zero_and_the_top_is_held(tmp_path, *case)
+    test_encodings.test_what_does_not_fit_is_counted_and_stored_at_the_end(tmp_path, *case)
+    test_encodings.test_the_same_pixels_give_the_same_bytes(tmp_path, *case)
+    test_encodings.test_odd_sizes(tmp_path, "toy")
+    (tmp_path / "errors").mkdir()
+    test_encodings.test_errors_are_sentences(tmp_path / "errors", "toy")
+    test_encodings.test_suffixes_tell_encodings_apart()
+
+
 def test_options_are_settings():
     options = encoding_options()
-    assert set(options) == {"exr", "rgbm"}
+    assert {"exr", "rgbm"} <= set(options)
     names = [name for model in options.values() for name in model.model_fields]
     assert not set(names) & set(CommonSettings.model_fields)
     assert set(names) | set(CommonSettings.model_fields) == set(BakeSettings.model_fields)

@@ -146,7 +146,7 @@ def test_errors_are_sentences(tmp_path, name):
     with pytest.raises(ValueError, match="1 texels are not a number"):
         encoding.encode(path, bad, options=fitted(encoding), header={})
     with pytest.raises(ValueError, match="pixels of shape"):
-        encoding.encode(path, np.ones((4, 5, 2), np.float32), options=fitted(encoding), header={})
+        encoding.encode(path, np.ones((4, 5, 17), np.float32), options=fitted(encoding), header={})
     assert not path.exists()
     with pytest.raises(ResourceError, match="could not be written"):
         encoding.encode(
