@@ -144,7 +144,7 @@ class PunctualLight:
     Attributes
     ----------
     kind : str
-        Name of a `LightKind`: "point", "spot" or "directional" (KHR_lights_punctual).
+        Name of a `LightKind`, such as "point", "spot" or "directional".
     intensity : (3,) tuple
         Colour times intensity, in the unit of the kind.
     position : (3,) tuple, metres, world
@@ -152,7 +152,7 @@ class PunctualLight:
         Direction in which the light travels along the axis, away from the light.
     inner_cone, outer_cone : float, radians (spot)
     range : float, metres
-        Distance at which a point or spot light has faded to 0; inf for no limit.
+        Distance at which a light with a position has faded to 0; inf for no limit.
     parameters : mapping
         Further parameters that only this kind of light has, by name.
     """

@@ -46,7 +46,7 @@ def no_light(context: CheckContext) -> Iterator[RawFinding]:
     fix="give the light's node and its parents a scale other than zero; a bake leaves the light out",
 )
 def flat_light(context: CheckContext) -> Iterator[RawFinding]:
-    """Spot and directional lights whose node leaves them no direction.
+    """Lights with a direction whose node leaves them none.
 
     A scale of zero along the axis of the light, of the node or of a parent, maps the direction to zero or to
     rounding errors. Point lights need no direction and are kept.
@@ -63,7 +63,7 @@ def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     fix="raise or remove the range, if surfaces farther away are to be lit",
 )
 def light_range(context: CheckContext) -> Iterator[RawFinding]:
-    """Point and spot lights whose `range` ends inside the scene.
+    """Lights whose `range` ends inside the scene.
 
     Light fades to zero at the range, as KHR_lights_punctual defines it. Engines use other falloffs, and some
     ignore the range.
@@ -95,7 +95,7 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
     fix="move the light out of the geometry, or make the shade emissive or see-through",
 )
 def light_inside(context: CheckContext) -> Iterator[RawFinding]:
-    """A point or spot light inside a closed solid, such as a bulb.
+    """A light inside a closed solid, such as a bulb.
 
     Every surface blocks light from both sides, so none of it leaves the solid. Rooms, whose surfaces look
     inwards, and parts with a material that light may cross (MASK, BLEND) are not reported.
@@ -138,7 +138,7 @@ def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
     "light-intensity",
     group="light",
     severity="warning",
-    fix="set the intensity in cd (point, spot), lx (directional) or cd/m2 (emission)",
+    fix="set the intensity in cd (lights with a position), lx (parallel light) or cd/m2 (emission)",
 )
 def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
     """Lights that are negative, zero or absurdly strong.
