@@ -82,6 +82,8 @@ def _line(error: BakerError) -> str:
     """
     if error.object and error.message.startswith((f"`{error.object}`", f"'{error.object}'")):
         parts = [error.file, error.message]
+    elif error.object and error.file is None and isinstance(error, SettingsError):
+        parts = [in_flags(f"`{error.object}`").strip("`"), error.message]
     else:
         of_flag = isinstance(error, SettingsError) and error.object and not error.file
         named = in_flags(f"`{error.object}`").strip("`") if of_flag else error.object

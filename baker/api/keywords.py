@@ -194,7 +194,7 @@ class RenderKeywords(TypedDict, total=False):
 
     # Position, target, vertical field of view in degrees; or one of the file's own; default: its
     # first.
-    camera: str | None
+    camera: str | float | Sequence[float] | None
 
     # Width of the picture.
     width: int

@@ -172,7 +172,7 @@ def render(
     **keywords : Unpack[RenderKeywords]
         Settings by name, in place of those in `settings`:
 
-        camera : str | None, default None
+        camera : str | float | Sequence[float] | None, default None
             Position, target, vertical field of view in degrees; or one of the file's own; default: its
             first.
         width : int, pixels, 1 to 16384, default 640

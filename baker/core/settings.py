@@ -26,7 +26,7 @@ class CommonSettings(Settings):
     channels: Names = setting(("irradiance", "ao"), "Channels to bake.")
     resolution: int = setting(1024, "Page width and height, exact.", unit="texels", ge=16, le=16384)
     density: float | None = setting(
-        None, "Texels per metre; pages overflow into more.", unit="texels/m", gt=0
+        None, "Texels per metre; pages overflow into more.", unit="texels/m", gt=0, allow_inf_nan=False
     )
     max_pages: int = setting(16, "Most pages that `density` may fill.", ge=1, le=256)
     padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64)
@@ -60,7 +60,9 @@ class CommonSettings(Settings):
         repeated=True,
     )
     up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")
-    scale: float = setting(1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0)
+    scale: float = setting(
+        1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0, allow_inf_nan=False
+    )
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 
@@ -68,10 +70,10 @@ class CommonSettings(Settings):
         """Raise `SettingsError` for values that do not go together."""
         super().check()
         if max(self.sky_radiance) > BRIGHTEST:
-            raise SettingsError(f"sky: {self.sky} is above {BRIGHTEST:.0e} cd/m2", object="sky")
+            raise SettingsError(f"`sky` is above {BRIGHTEST:.0e} cd/m2 (was '{self.sky}')", object="sky")
         self.ao_reach(1.0)
         if not self.channels:
-            raise SettingsError("channels names nothing to bake", object="channels")
+            raise SettingsError("`channels` names nothing to bake", object="channels")
 
     @property
     def hemisphere_samples(self) -> int:
@@ -129,7 +131,8 @@ def ao_metres(distance: str, diagonal: float) -> float:
         metres = -1.0
     if not metres > 0:
         raise SettingsError(
-            f"ao_distance '{distance}' is not a positive number of metres, a percentage or inf"
+            f"`ao_distance` is not a positive number of metres, a percentage or inf (was '{distance}')",
+            object="ao_distance",
         )
     return metres
 
@@ -159,7 +162,8 @@ def parse_sky(text: str) -> tuple[float, float, float]:
     if len(values) == 1:
         values *= 3
     if len(values) != 3 or any(not 0.0 <= v < float("inf") for v in values):
-        raise SettingsError(f"sky '{text}' is not three numbers R,G,B of zero or more, like 1,1,1")
+        message = f"`sky` is not three numbers R,G,B of zero or more, like 1,1,1 (was '{text}')"
+        raise SettingsError(message, object="sky")
     return (values[0], values[1], values[2])
 
 

@@ -84,12 +84,21 @@ def _one_name(value: Any) -> Any:
 
 def _as_list_text(value: Any) -> Any:
     """Return numbers, and lists of them with commas, as text; other values as they are."""
-    return ",".join(map(str, value)) if isinstance(value, list | tuple) else _as_text(value)
+    value = _plain(value)
+    if isinstance(value, list | tuple) and all(not isinstance(part, list | tuple | dict) for part in value):
+        return ",".join(map(str, value))
+    return _as_text(value)
 
 
 def _as_text(value: Any) -> Any:
     """Return a number as text; other values as they are."""
+    value = _plain(value)
     return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def _plain(value: Any) -> Any:
+    """Return a number or an array of numpy as a number or a list of Python; other values as they are."""
+    return value.tolist() if hasattr(value, "dtype") and hasattr(value, "tolist") else value
 
 
 # A list of names, written with commas in one text or as a list.
@@ -131,7 +140,7 @@ class Settings(BaseModel):
         except ValidationError as error:
             first = error.errors()[0]
             name = str(first["loc"][0]) if first["loc"] else ""
-            text = first["msg"]
+            text = first["msg"].removesuffix(" for <class 'pathlib.Path'>")
             message = f"`{name}`{text[5:]}" if text.startswith("Input ") else f"`{name}`: {text}"
             raise SettingsError(f"{message} (was {first['input']!r})", object=name) from None
         self.check()

@@ -37,7 +37,7 @@ class RgbmOptions(EncodingOptions):
         except ValueError:
             fits = False
         if not fits:
-            why = f"rgbm_range '{self.rgbm_range}' is neither auto nor a number of lx above 0"
+            why = f"`rgbm_range` is neither auto nor a number of lx above 0 (was '{self.rgbm_range}')"
             raise SettingsError(why, object="rgbm_range")
 
     @property

@@ -50,7 +50,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
 
     instances = [i for i in scene.instances if kept(i.node, i.name)]
     if scene.instances and not instances:
-        message = "include and exclude leave no object to bake; look at the names with `baker inspect`"
+        message = "`include` and `exclude` leave no object to bake; look at the names with `baker inspect`"
         raise InputError(message, file=str(scene.path) if scene.path else None)
     lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
     used = sorted({i.mesh for i in instances})

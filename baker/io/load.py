@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 
 from baker.core.error_mapping import memory_errors
@@ -97,9 +98,11 @@ def load_scene(
     """
     path = Path(path)
     if up not in ("y", "z"):
-        raise SettingsError(f"up axis '{up}' is neither y nor z", object="up")
-    if not (math.isfinite(scale) and scale > 0):
-        raise SettingsError(f"scale {scale} is not a positive number of metres per unit", object="scale")
+        raise SettingsError(f"`up` is neither y nor z (was {up!r})", object="up")
+    if not (isinstance(scale, Real) and math.isfinite(scale) and scale > 0):
+        raise SettingsError(
+            f"`scale` is not a positive number of metres per unit (was {scale!r})", object="scale"
+        )
     data = read_scene_file(path)
     importer = _importer_of(path)
     if not data:

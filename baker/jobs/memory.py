@@ -25,7 +25,7 @@ def parse_size(text: str) -> int:
     match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([KMGT]?)(?:I?B)?\s*", text.upper())
     size = 0 if match is None else int(float(match.group(1)) * _UNITS[match.group(2)])
     if size <= 0:
-        raise SettingsError(f"memory '{text}' is no size; write it like 8G or 512M", object="memory")
+        raise SettingsError(f"`memory` is no size like 8G or 512M (was '{text}')", object="memory")
     return size
 
 

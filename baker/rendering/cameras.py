@@ -39,11 +39,11 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     if not cameras:
         message = "the file has no camera of its own; give seven numbers, PX,PY,PZ,TX,TY,TZ,FOV"
         raise SettingsError(message, object="camera")
-    listed = ", ".join(f"{number} '{camera.name}'" for number, camera in enumerate(cameras[:_LISTED]))
+    listed = ", ".join(f"{number} (named '{camera.name}')" for number, camera in enumerate(cameras[:_LISTED]))
     more = f" and {len(cameras) - _LISTED} more (see baker inspect)" if len(cameras) > _LISTED else ""
     what = (
         f"{len(found)} cameras are named '{text}'; say which by its number"
         if found
         else f"no camera '{text}'"
     )
-    raise SettingsError(f"{what}; the file has {listed}{more}", object="camera")
+    raise SettingsError(f"{what}; those of the file are {listed}{more}", object="camera")

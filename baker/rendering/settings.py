@@ -20,7 +20,7 @@ class RenderSettings(Settings):
     table: ClassVar[str] = "render"
     what: ClassVar[str] = "render setting"
 
-    camera: str | None = setting(
+    camera: Numbers | None = setting(
         None,
         "Position, target, vertical field of view in degrees; or one of the file's own; default: its first.",
         metavar="PX,PY,PZ,TX,TY,TZ,FOV|NAME|NUMBER",

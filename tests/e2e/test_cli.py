@@ -175,7 +175,7 @@ WRONG = [
     (("a.glb", "-o", "x", "--resolution", "big"), "resolution"),
     (("a.glb", "-o", "x", "--resolution", "3"), "16"),
     (("a.glb", "-o", "x", "--sky", "1,2"), "sky"),
-    (("a.glb", "-o", "x", "--ao-distance", "-1"), "ao_distance"),
+    (("a.glb", "-o", "x", "--ao-distance", "-1"), "--ao-distance"),
     (("a.glb", "-o", "x", "--channels", ","), "channels"),
     (("a.glb", "b.glb", "-o", "x"), "b.glb"),
 ]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import io
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from baker.cli.failures import report
 from baker.cli.flags import flag_names, in_flags, in_keys, values_in_flags
 from baker.core.errors import SettingsError
 from baker.core.settings import BakeSettings
@@ -103,6 +106,45 @@ def test_a_wrong_setting_is_a_settings_error_that_names_it(model, values, words)
     with pytest.raises(SettingsError) as caught:
         model.make(values, file="a.toml")
     assert caught.value.file == "a.toml"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"sky": "1,2"}, "`sky` is not three numbers R,G,B of zero or more, like 1,1,1 (was '1,2')"),
+        ({"sky": 1e30}, "`sky` is above 1e+15 cd/m2 (was '1e+30')"),
+        (
+            {"ao_distance": -1},
+            "`ao_distance` is not a positive number of metres, a percentage or inf (was '-1')",
+        ),
+        ({"rgbm_range": -1}, "`rgbm_range` is neither auto nor a number of lx above 0 (was '-1')"),
+        ({"channels": ""}, "`channels` names nothing to bake"),
+        ({"density": float("inf")}, "`density` should be a finite number (was inf)"),
+        ({"scale": float("inf")}, "`scale` should be a finite number (was inf)"),
+    ],
+)
+def test_a_value_out_of_range_is_named_once_as_setting_flag_or_key(values, message):
+    with pytest.raises(SettingsError) as caught:
+        BakeSettings(**values)
+    assert (caught.value.message, caught.value.object) == (message, next(iter(values)))
+
+
+def test_a_message_that_does_not_name_its_setting_gets_the_flag(capsys):
+    error = SettingsError("there is no figure 'p96'", object="fail_if")
+    report(error, as_json=False, traceback=False, out=io.StringIO())
+    assert capsys.readouterr().err == "baker: --fail-if: there is no figure 'p96'\n"
+
+
+def test_numbers_and_arrays_of_numpy_are_settings():
+    settings = BakeSettings(sky=np.array([1, 2, 3.5]), ao_distance=np.float32(0.5), samples=np.int64(4))
+    assert (settings.sky_radiance, settings.ao_reach(9.0), settings.samples) == ((1, 2, 3.5), 0.5, 4)
+    camera = (0, 1, 3, 0, 1, 0, 50)
+    assert RenderSettings(camera=camera).camera == RenderSettings(camera=np.array(camera)).camera
+    assert (RenderSettings(camera=camera).camera, RenderSettings(camera=1).camera) == ("0,1,3,0,1,0,50", "1")
+    with pytest.raises(SettingsError, match=r"`lightmap` is not a valid path \(was 3\)"):
+        RenderSettings(lightmap=3)
+    with pytest.raises(SettingsError, match="`sky` should be a valid string"):
+        BakeSettings(sky=[[1, 2, 3]])
 
 
 def test_changed_settings_are_checked():

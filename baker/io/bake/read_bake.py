@@ -102,7 +102,8 @@ def read_bake(folder: Path | str) -> StoredBake:
     try:
         bake.sky  # noqa: B018
     except SettingsError as error:
-        message = f"the manifest is damaged: {error.message}; bake the scene again"
+        why = error.message.replace("`", "")
+        message = f"the manifest is damaged: {why}; bake the scene again"
         raise InputError(message, file=str(folder / MANIFEST_NAME)) from None
     return bake
 
