@@ -106,7 +106,8 @@ def bilinear(
 ) -> NDArray[np.float64]:
     """Look pages (P, H, W, C) up at uv (n, 2), v = 0 being the first row; return (n, C)."""
     height, width = pages.shape[1:3]
-    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    # Bounded first: uv far outside of the page fit no integer.
+    x, y = (np.clip(uv[:, axis] * size - 0.5, -1, size) for axis, size in ((0, width), (1, height)))
     left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     total = np.zeros((len(uv), pages.shape[3]))
     for down in range(2):

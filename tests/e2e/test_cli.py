@@ -366,6 +366,14 @@ def test_a_bake_into_a_folder_that_another_run_holds_is_refused(pipeline, comman
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def test_a_bake_into_the_root_of_the_file_system_is_wrong_use(command, capsys):
+    code, text = command(
+        "bake", Path(__file__).parents[2] / "assets" / "cornell.glb", "-o", "/", "--force", "--json"
+    )
+    assert code == 2
+    assert "root of the file system" in json.loads(text)["error"]["message"]
+
+
 def test_a_bake_holds_its_folder_and_frees_it_whatever_happens(pipeline, command, tmp_path):
     held = []
 

@@ -19,6 +19,7 @@ from baker.core.stage import Stage
 from baker.encodings.exr import decode_exr, encode_exr
 from baker.io.png import decode_png
 from baker.pipeline.bake import bake
+from baker.rendering.baked import bilinear
 from baker.rendering.render import render
 from baker.rendering.settings import RenderSettings
 
@@ -148,10 +149,13 @@ def test_a_camera_of_the_file_by_name_or_number(watched, tmp_path, text, number)
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("bottom", "no camera 'bottom'; the file has 0 'eye', 1 'top', 2 '0', 3 'eye'"),
-        ("4", "no camera '4'; the file has 0 'eye'"),
+        (
+            "bottom",
+            "no camera 'bottom'; those of the file are 0 (named 'eye'), 1 (named 'top'), 2 (named '0')",
+        ),
+        ("4", "no camera '4'; those of the file are 0 (named 'eye')"),
         ("-1", "no camera '-1'"),
-        ("eye", "2 cameras are named 'eye'; say which by its number; the file has 0 'eye'"),
+        ("eye", "2 cameras are named 'eye'; say which by its number; those of the file are 0"),
     ],
 )
 def test_an_unknown_camera_is_told_what_there_is(watched, tmp_path, text, sentence):
@@ -205,7 +209,7 @@ def test_no_camera_is_one_sentence_with_a_view_that_works(emissive, tmp_path):
         (["--max-depth", "2", "--ao"], "--max-depth"),
         (["--estimator", "mos"], "did you mean 'mis'"),
         (["--aov", "colour"], "no AOV 'colour'"),
-        (["--ao", "--ao-distance", "-1"], "ao_distance"),
+        (["--ao", "--ao-distance", "-1"], "--ao-distance"),
         (["--ao-distance", "1"], "needs --ao"),
         (["--ao", "--lightmap", "x"], "exclude each other"),
         (["--sky", "blue"], "sky"),
@@ -402,3 +406,11 @@ def test_a_tampered_bake_is_shown_as_it_is(baked, tmp_path):
     # Emitters themselves stay as they are.
     lit = once.colour > 0
     assert np.median(twice.colour[lit] / once.colour[lit]) == pytest.approx(2, rel=1e-3)
+
+
+def test_uv_far_outside_of_a_page_have_the_colour_of_its_rim():
+    pages = np.arange(4, dtype=np.float32).reshape(1, 2, 2, 1)
+    uv = np.array([[1e37, 1e37], [-1e37, -1e37], [1.5, 0.25], [0.5, 0.5]])
+    with np.errstate(all="raise"):
+        found = bilinear(pages, np.zeros(4, np.int32), uv)
+    np.testing.assert_array_equal(found[:, 0], [3, 0, 1, 1.5])

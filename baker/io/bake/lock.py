@@ -28,7 +28,7 @@ class OutputLock:
     def __init__(self, out: Path) -> None:
         folder = out.resolve()
         self.out = out
-        self.path = folder.with_name(f".{folder.name}.baker.lock")
+        self.path = folder.parent / f".{folder.name}.baker.lock"
         self._made: list[Path] = []
         self._file: int | None = None
 

@@ -45,6 +45,8 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
         If nothing can be written there.
     """
     folder = out.resolve()
+    if not folder.name:
+        raise SettingsError("this is the root of the file system; name a folder in it", file=str(out))
     if folder.exists() and not folder.is_dir():
         raise SettingsError("the output is a file; name a folder", file=str(out))
     parent = next(path for path in folder.parents if path.exists())
@@ -99,6 +101,14 @@ def _lies_inside(folder: Path, name: object) -> bool:
     return not any(folder.joinpath(*parents[: n + 1]).is_symlink() for n in range(len(parents)))
 
 
+def is_file(path: Path) -> bool:
+    """Return whether a file exists; False for a name that is too long for any."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def file_state(path: Path, sha256: str) -> str:
     """Compare a file of a bake with the hash in its manifest.
 
@@ -114,7 +124,7 @@ def file_state(path: Path, sha256: str) -> str:
     str
         "as baked", "changed" or "missing".
     """
-    if not path.is_file():
+    if not is_file(path):
         return "missing"
     with path.open("rb") as file:
         return AS_BAKED if hashlib.file_digest(file, "sha256").hexdigest() == sha256 else "changed"

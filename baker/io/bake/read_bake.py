@@ -17,7 +17,7 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError, SettingsError
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import make_settings
-from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
+from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state, is_file
 from baker.io.bake.read_manifest import read_manifest
 from baker.io.choose import choose_objects
 from baker.io.load import load_scene
@@ -110,7 +110,7 @@ def read_bake(folder: Path | str) -> StoredBake:
 
 def _present(folder: Path, name: str) -> Path:
     path = folder / name
-    if not path.is_file():
+    if not is_file(path):
         raise InputError("this file of the bake is missing; bake the scene again", file=str(path))
     return path
 
@@ -121,7 +121,7 @@ def _differs(folder: Path, entry: dict[str, Any]) -> bool:
 
 def _changed(folder: Path, entry: dict[str, Any]) -> SceneWarning:
     name = str(entry["file"])
-    if (folder / name).is_file():
+    if is_file(folder / name):
         return SceneWarning("changed-file", f"{name} is not as it was baked; it is read as it is", name)
     return SceneWarning("missing-file", f"{name} is missing", name)
 

@@ -10,6 +10,7 @@ from io_scenes import quad_result
 from baker.core.errors import InputError
 from baker.io.bake.read_bake import read_bake
 from baker.io.bake.write_bake import write_bake
+from baker.io.inspect import inspect_path
 
 
 @pytest.fixture
@@ -43,6 +44,19 @@ def test_a_changed_file_is_read_and_named(out: Path) -> None:
     (out / "bake.json").write_text(json.dumps(manifest))
     warnings = read_bake(out).warnings
     assert [(w.code, w.object) for w in warnings] == [("changed-file", manifest["files"][0]["file"])]
+
+
+def test_a_name_that_no_file_can_have_is_a_missing_file(out: Path) -> None:
+    manifest = json.loads((out / "bake.json").read_text())
+    name = "x" * 3000
+    manifest["files"].append({"file": name, "sha256": "0" * 64})
+    (out / "bake.json").write_text(json.dumps(manifest))
+    assert [(w.code, w.object) for w in read_bake(out).warnings] == [("missing-file", name)]
+    assert {entry["state"] for entry in inspect_path(out)["files"]} == {"as baked", "missing"}
+    manifest["pages"][0]["file"] = f"{name}.exr"
+    (out / "bake.json").write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match="this file of the bake is missing"):
+        read_bake(out)
 
 
 @pytest.mark.parametrize(

@@ -127,6 +127,8 @@ def test_places_that_cannot_be_a_folder_are_refused(tmp_path: Path) -> None:
     for place in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(SettingsError, match="is a file"):
             check_out(place, force=True)
+    with pytest.raises(SettingsError, match="the root of the file system; name a folder in it"):
+        check_out(Path(tmp_path.anchor), force=True)
     (tmp_path / "empty").mkdir()
     check_out(tmp_path / "empty")
     check_out(tmp_path / "no" / "such" / "parent")
