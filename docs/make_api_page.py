@@ -36,7 +36,8 @@ baker.verify("out").channels["irradiance"].figures["median"]
 
 Settings are keywords, or an object of the class that is named in the signature, or both: keywords win. All
 are checked when the object is made. Errors are children of `BakerError`. Results have a one-line `repr`, a
-table with a small picture in notebooks, and `to_dict()`, which returns plain values for JSON.
+table with a small picture in notebooks, and `to_dict()`, which returns plain values for JSON. They can be
+pickled; two results are equal only if they are the same object.
 
 This page is made from docstrings by `docs/make_api_page.py`; its examples run as tests, in this order.
 [SETTINGS.md](SETTINGS.md) has the settings of all functions in tables.

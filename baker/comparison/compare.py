@@ -37,7 +37,7 @@ from baker.metrics.worst_texels import worst_texels
 LIMITED = (*(name for name in METRICS if not name.startswith(("noise", "z_", "energy"))), "flip")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChannelDifference(Metrics):
     """A channel at the points of both bakes.
 
@@ -54,7 +54,7 @@ class ChannelDifference(Metrics):
     metrics: dict[str, Any]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DiffReport(Result):
     """The differences of two bakes.
 

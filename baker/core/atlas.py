@@ -6,14 +6,16 @@ A chart is a connected piece of uv; a page is one image; padding is the empty bo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.result import Result
 from baker.core.scene import SceneWarning
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InstanceLayout:
     """One instance's lightmap uv. An instance lies in exactly one page.
 
@@ -46,8 +48,8 @@ class InstanceLayout:
     texels_per_metre: float
 
 
-@dataclass(frozen=True)
-class Atlas:
+@dataclass(frozen=True, eq=False, repr=False)
+class Atlas(Result):
     """All instances' layouts.
 
     Attributes
@@ -66,3 +68,33 @@ class Atlas:
     n_charts: int
     padding: int
     warnings: tuple[SceneWarning, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        return {
+            "pages": f"{self.n_pages} of {self.resolution} x {self.resolution}",
+            "objects": len(self.layouts),
+            "charts": self.n_charts,
+            "padding": self.padding,
+            "warnings": len(self.warnings),
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return sizes, and the page and density of each object, as plain values."""
+        return {
+            "resolution": self.resolution,
+            "n_pages": self.n_pages,
+            "n_charts": self.n_charts,
+            "padding": self.padding,
+            "layouts": [
+                {
+                    "instance": layout.instance,
+                    "page": layout.page,
+                    "triangles": len(layout.triangle),
+                    "kept": layout.kept,
+                    "texels_per_metre": float(layout.texels_per_metre),
+                }
+                for layout in self.layouts
+            ],
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }

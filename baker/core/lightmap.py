@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -73,8 +73,8 @@ class ChannelDescription:
         return tuple(groups)
 
 
-@dataclass(frozen=True)
-class Lightmap:
+@dataclass(frozen=True, eq=False, repr=False)
+class Lightmap(Result):
     """One channel of a bake.
 
     Attributes
@@ -95,8 +95,27 @@ class Lightmap:
         """Return the unit of the values: "lx" for irradiance, "1" for AO."""
         return self.description.unit
 
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        pages, height, width, _ = self.value.shape
+        return {
+            "channel": self.channel,
+            "unit": self.unit,
+            "components": " ".join(self.description.components),
+            "pages": f"{pages} of {width} x {height}",
+        }
 
-@dataclass(frozen=True, repr=False)
+    def picture(self) -> NDArray[np.float32] | None:
+        """Return the first page; None for components that are neither one value nor one colour."""
+        return self.value[0] if self.value.shape[-1] in (1, 3) else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return channel, size and meaning as plain values, without the texels."""
+        meaning = {**asdict(self.description), "components": list(self.description.components)}
+        return {"channel": self.channel, "shape": list(self.value.shape), **meaning}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class BakeResult(Result):
     """The results of a bake.
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.origin import scene_origin
+from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
 # Metres; the inverse square of a shorter range would overflow float32.
@@ -230,8 +231,8 @@ class SourceDocument:
     chunks: tuple[tuple[int, bytes], ...] = ()
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Result):
     """Meshes, materials and lights of a scene.
 
     Attributes
@@ -255,6 +256,34 @@ class Scene:
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
     source_scene: SourceScene | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return the rows of the short text."""
+        return {
+            "name": self.name,
+            "objects": len(self.instances),
+            "triangles": self.n_triangles,
+            "materials": len(self.materials),
+            "lights": len(self.lights),
+            "cameras": len(self.cameras),
+            "warnings": len(self.warnings),
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return names and counts as plain values."""
+        return {
+            "name": self.name,
+            "path": None if self.path is None else str(self.path),
+            "sha256": self.sha256,
+            "objects": [
+                {"node": i.node, "name": i.name, "triangles": len(self.meshes[i.mesh].triangle)}
+                for i in self.instances
+            ],
+            "materials": [material.name for material in self.materials],
+            "lights": [{"node": x.node, "name": x.name, "kind": x.kind} for x in self.lights],
+            "cameras": [{"node": camera.node, "name": camera.name} for camera in self.cameras],
+            "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in self.warnings],
+        }
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ from baker.rendering.passes import Run, ambient_occlusion, first_layers, lit_by,
 from baker.rendering.settings import RenderSettings
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Picture(Result):
     """A rendered picture.
 

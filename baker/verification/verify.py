@@ -53,7 +53,7 @@ CHANNELS = ("irradiance", "ao")
 _CROP_TIME = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChannelCheck(Metrics):
     """Stored and path-traced values of a channel's n texels, with metrics.
 
@@ -91,7 +91,7 @@ class ChannelCheck(Metrics):
         return power
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VerifyReport(Result):
     """The result of `verify`.
 

@@ -57,6 +57,9 @@ class ViewServer(ThreadingHTTPServer):
         super().__init__((HOST, port), _Handler)
         self.answers = answers
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.url}>"
+
     @property
     def url(self) -> str:
         """Return the address of the page."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import inspect
 import json
+import pickle
 import pkgutil
 import pydoc
 import shutil
@@ -132,6 +133,39 @@ def test_results_have_a_short_text_a_picture_and_plain_values(tmp_path):
     assert "data:image/png;base64," in result._repr_html_()
     assert len(result._repr_html_()) < 200_000
     assert result.to_dict()["pages"] == json.loads((tmp_path / "out" / "bake.json").read_text())["pages"]
+
+
+def test_what_is_made_on_the_way_has_a_short_text_too():
+    scene = baker.load(CORNELL)
+    atlas = baker.unwrap(scene, resolution=32)
+    result = baker.bake(scene, atlas=atlas, samples=2, denoise=False)
+    for found, words in (
+        (scene, "objects 8, triangles 32"),
+        (atlas, "pages 1 of 32 x 32, objects 8"),
+        (result.lightmaps["irradiance"], "channel irradiance, unit lx, components R G B, pages 1 of 32 x 32"),
+    ):
+        assert words in repr(found)
+        assert len(repr(found)) < 200
+        assert "\n" not in repr(found)
+        assert json.loads(json.dumps(found.to_dict(), allow_nan=False)) == found.to_dict()
+        assert "<table>" in found._repr_html_()
+    assert "data:image/png;base64," in result.lightmaps["ao"]._repr_html_()
+
+
+def test_results_are_compared_by_identity_and_pickled(tmp_path):
+    scene = baker.load(CORNELL)
+    result = baker.bake(scene, resolution=32, samples=2, denoise=False)
+    picture = baker.render(scene, width=8, height=6, spp=2)
+    for found in (scene, result, result.atlas, result.lightmaps["ao"], picture):
+        copy = pickle.loads(pickle.dumps(found))
+        assert found == found
+        assert found != copy
+        assert len({found, copy}) == 2
+        assert repr(copy) == repr(found)
+    saved = baker.save(pickle.loads(pickle.dumps(result)), tmp_path / "out")
+    report = baker.diff(saved, saved, texels=20)
+    assert report != baker.diff(saved, saved, texels=20)
+    assert report.channels["ao"] != pickle.loads(pickle.dumps(report)).channels["ao"]
 
 
 def test_texts_are_escaped_and_thumbnails_are_png(tmp_path):
