@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from baker.api.arguments import instance_of, of_the_api, path_of, wrong_type
 from baker.core.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from baker.core.settings import BakeSettings
 
 
+@of_the_api
 def bake(
     scene: Scene | str | Path,
     settings: BakeSettings | None = None,
@@ -42,7 +44,7 @@ def bake(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[BakeKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -135,13 +137,20 @@ def bake(
     64
     """
     from baker.api.settings_of import settings_of
+    from baker.core.atlas import Atlas
+    from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
     from baker.pipeline.bake import bake as run
 
     wanted = settings_of(BakeSettings, settings, keywords)
+    scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
+    if atlas is not None:
+        atlas = instance_of(atlas, Atlas, "atlas", "; baker.unwrap makes one")
+    out = None if out is None else path_of(out, "out")
     return run(scene, settings=wanted, out=out, progress=progress, force=force, atlas=atlas)
 
 
+@of_the_api
 def ao(
     scene: Scene | str | Path,
     settings: BakeSettings | None = None,
@@ -164,7 +173,7 @@ def ao(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[AoKeywords]
         Settings by name, in place of those in `settings`; as of `bake`, without `channels`.
 
@@ -191,13 +200,17 @@ def ao(
     ['ao']
     """
     from baker.api.settings_of import settings_of
+    from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
     from baker.pipeline.bake import bake as run
 
     wanted = settings_of(BakeSettings, settings, {**keywords, "channels": "ao"})
+    scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
+    out = None if out is None else path_of(out, "out")
     return run(scene, settings=wanted, out=out, progress=progress, force=force)
 
 
+@of_the_api
 def save(
     bake: BakeResult,
     out: str | Path,
@@ -219,7 +232,7 @@ def save(
     force : bool
         Replace an `out` that baker did not write.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
 
     Returns
     -------
@@ -242,9 +255,10 @@ def save(
     ['ao_0.exr', 'bake.json', 'gltf', 'scene.glb', 'status_0.png']
     """
     from baker.core.export import check_exports
+    from baker.core.lightmap import BakeResult
     from baker.io.bake.write_bake import check_out, write_bake
 
-    folder = Path(out)
+    bake, folder = instance_of(bake, BakeResult, "bake", "; baker.bake makes one"), path_of(out, "out")
     settings = bake.settings.changed(export=export) if export else bake.settings
     check_exports(settings.export, settings.channels)
     check_out(folder, force=force, scene_path=bake.scene.path)
@@ -252,6 +266,7 @@ def save(
     return replace(bake, settings=settings, out=folder, manifest=manifest)
 
 
+@of_the_api
 def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
     """Make a folder for one engine from a finished output folder.
 
@@ -286,9 +301,11 @@ def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
     from baker.core.export import EXPORTS, check_exports
     from baker.io.bake.read_bake import read_bake
 
+    if not isinstance(engine, str):
+        raise wrong_type("engine", "the name of one export", engine)
     stored = read_bake(folder_of(bake))
     check_exports((engine,), tuple(stored.maps))
-    target = Path(out)
+    target = path_of(out, "out")
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise SettingsError("there are files here already; name another folder", file=str(target))
     target.mkdir(parents=True, exist_ok=True)

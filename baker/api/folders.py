@@ -5,22 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from baker.api.arguments import path_of
 from baker.core.errors import InputError
 
 if TYPE_CHECKING:
     from baker.core.lightmap import BakeResult
 
 
-def folder_of(bake: str | Path | BakeResult) -> Path:
-    """Return the output folder of a bake.
+def folder_of(bake: str | Path | BakeResult, name: str = "bake") -> Path:
+    """Return the output folder of a bake; `name` is that of the argument.
 
     Raises
     ------
     InputError
         If a bake is only in memory.
+    SettingsError
+        If it is neither a path nor a bake.
     """
-    if isinstance(bake, str | Path):
-        return Path(bake)
+    from baker.core.lightmap import BakeResult
+
+    if not isinstance(bake, BakeResult):
+        return path_of(bake, name, "an output folder or a baker.BakeResult")
     if bake.out is None:
         raise InputError("the bake is only in memory; write it with baker.save first")
     return bake.out

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from baker.api.arguments import of_the_api, path_of
 from baker.core.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from baker.viewer.server import ViewServer
 
 
+@of_the_api
 def verify(
     bake: str | Path | BakeResult,
     settings: VerifySettings | None = None,
@@ -38,7 +40,7 @@ def verify(
     settings : VerifySettings, optional
         How much is path-traced, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[VerifyKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -89,6 +91,7 @@ def verify(
     return run(folder_of(bake), settings_of(VerifySettings, settings, keywords), progress)
 
 
+@of_the_api
 def diff(
     a: str | Path | BakeResult,
     b: str | Path | BakeResult,
@@ -106,7 +109,7 @@ def diff(
     settings : DiffSettings, optional
         How much is compared, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[DiffKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -146,9 +149,12 @@ def diff(
     from baker.comparison.compare import compare
     from baker.comparison.settings import DiffSettings
 
-    return compare(folder_of(a), folder_of(b), settings_of(DiffSettings, settings, keywords), progress)
+    return compare(
+        folder_of(a, "a"), folder_of(b, "b"), settings_of(DiffSettings, settings, keywords), progress
+    )
 
 
+@of_the_api
 def render(
     scene: Scene | str | Path,
     settings: RenderSettings | None = None,
@@ -168,7 +174,7 @@ def render(
     out : str or Path, optional
         An EXR or PNG file to write, too.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[RenderKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -229,19 +235,22 @@ def render(
     (24, 32, 3)
     """
     from baker.api.settings_of import settings_of
+    from baker.core.scene import Scene
     from baker.rendering.render import render as run
     from baker.rendering.settings import RenderSettings
     from baker.rendering.write import check_image, write_picture
 
     wanted = settings_of(RenderSettings, settings, keywords)
+    scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
     if out is not None:
-        check_image(Path(out), wanted.aov)
+        check_image(path_of(out, "out"), wanted.aov)
     picture = run(scene, wanted, progress)
     if out is not None:
         write_picture(Path(out), picture)
     return picture
 
 
+@of_the_api
 def view(
     bake: str | Path | BakeResult, *, port: int = 0, three: str | Path | None = None, browser: bool = True
 ) -> ViewServer:
@@ -267,6 +276,8 @@ def view(
     ------
     InputError
         If the folder holds no bake, or `three` is no three.js.
+    SettingsError
+        If `port` is no number of a port.
     ResourceError
         If the port is taken, or three.js is not installed.
 
@@ -282,11 +293,14 @@ def view(
     import webbrowser
 
     from baker.api.folders import folder_of
+    from baker.core.errors import SettingsError
     from baker.io.bake.read_bake import read_bake
     from baker.viewer.script import find_three
     from baker.viewer.server import make_server
 
-    script = find_three(None if three is None else Path(three))
+    if not (isinstance(port, int) and 0 <= port <= 65535):
+        raise SettingsError(f"`port` is no number from 0 to 65535 (was {port!r})", object="port")
+    script = find_three(None if three is None else path_of(three, "three"))
     server = make_server(read_bake(folder_of(bake)), script, port=port)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     if browser:
@@ -294,6 +308,7 @@ def view(
     return server
 
 
+@of_the_api
 def batch(
     jobs_file: str | Path,
     settings: BatchSettings | None = None,
@@ -310,7 +325,7 @@ def batch(
     settings : BatchSettings, optional
         Processes, memory, and the jobs to bake.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[BatchKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -355,4 +370,6 @@ def batch(
     from baker.jobs.report import run_jobs_file
     from baker.jobs.settings import BatchSettings
 
-    return run_jobs_file(Path(jobs_file), settings_of(BatchSettings, settings, keywords), progress)
+    return run_jobs_file(
+        path_of(jobs_file, "jobs_file"), settings_of(BatchSettings, settings, keywords), progress
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from baker.api.arguments import instance_of, of_the_api, path_of
 from baker.core.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from baker.uv.settings import UnwrapSettings
 
 
+@of_the_api
 def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     """Read a scene file.
 
@@ -50,9 +52,10 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     """
     from baker.io.load import load_scene
 
-    return load_scene(path, up=up, scale=scale)
+    return load_scene(path_of(path, "path", "a scene file"), up=up, scale=scale)
 
 
+@of_the_api
 def check(
     scene: Scene | str | Path,
     settings: CheckSettings | None = None,
@@ -73,7 +76,7 @@ def check(
     bake : BakeSettings, optional
         Settings of the bake that the scene is for: resolution, padding, uv, sky ...
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[CheckKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -113,13 +116,15 @@ def check(
     from baker.api.settings_of import settings_of
     from baker.checks.run import check_scene
     from baker.checks.settings import CheckSettings
+    from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
 
-    return check_scene(
-        scene, settings_of(CheckSettings, settings, keywords), bake or BakeSettings(), progress
-    )
+    scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
+    bake = BakeSettings() if bake is None else instance_of(bake, BakeSettings, "bake")
+    return check_scene(scene, settings_of(CheckSettings, settings, keywords), bake, progress)
 
 
+@of_the_api
 def repair(
     scene: str | Path,
     out: str | Path | None = None,
@@ -142,7 +147,7 @@ def repair(
     force : bool
         Replace an `out` that exists.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[RepairKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -186,14 +191,16 @@ def repair(
     from baker.repairs.write import check_fixed, write_fixed
 
     wanted = settings_of(RepairSettings, settings, keywords)
+    file = path_of(scene, "scene", "a scene file")
     if out is not None:
-        check_fixed(Path(out), Path(scene), force=force)
-    result = fix_file(Path(scene), wanted, progress)
+        check_fixed(path_of(out, "out"), file, force=force)
+    result = fix_file(file, wanted, progress)
     if out is not None:
         write_fixed(Path(out), result.data)
     return result
 
 
+@of_the_api
 def unwrap(
     scene: Scene,
     settings: UnwrapSettings | None = None,
@@ -210,7 +217,7 @@ def unwrap(
     settings : UnwrapSettings, optional
         Size of the pages, and how charts are cut and packed.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
     **keywords : Unpack[UnwrapKeywords]
         Settings by name, in place of those in `settings`:
 
@@ -250,7 +257,9 @@ def unwrap(
     (64, 1, 8)
     """
     from baker.api.settings_of import settings_of
+    from baker.core.scene import Scene
     from baker.uv.settings import UnwrapSettings
     from baker.uv.unwrap import unwrap_scene
 
+    scene = instance_of(scene, Scene, "scene", "; baker.load reads one")
     return unwrap_scene(scene, settings_of(UnwrapSettings, settings, keywords).for_bake(), progress)

@@ -125,7 +125,7 @@ def compare(
     settings : DiffSettings, optional
         How much is compared, and limits.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
 
     Returns
     -------

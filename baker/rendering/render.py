@@ -103,7 +103,7 @@ def render(
     settings : RenderSettings, optional
         Camera, size, samples, and which quantity is rendered.
     progress : Progress
-        Called with stage and fraction; a truthy return value cancels.
+        Called with stage, fraction and a detail in words; a truthy return value cancels.
 
     Returns
     -------

@@ -222,3 +222,50 @@ def test_examples_run(tmp_path, monkeypatch):
         runner.run(test, clear_globs=False)
         names = test.globs
     assert runner.summarize().failed == 0
+
+
+WRONG_ARGUMENTS = [
+    (lambda: baker.load(None), "`path` should be a scene file (was NoneType)"),
+    (lambda: baker.load(CORNELL, scale="2"), "`scale` is not a positive number of metres per unit (was '2')"),
+    (lambda: baker.check(3), "`scene` should be a file or a baker.Scene (was int)"),
+    (
+        lambda: baker.check(CORNELL, bake={"resolution": 32}),
+        "`bake` should be a baker.BakeSettings (was dict)",
+    ),
+    (lambda: baker.repair(baker.load(CORNELL)), "`scene` should be a scene file (was Scene)"),
+    (lambda: baker.unwrap(str(CORNELL)), "`scene` should be a baker.Scene (was str); baker.load reads one"),
+    (lambda: baker.bake(None), "`scene` should be a file or a baker.Scene (was NoneType)"),
+    (
+        lambda: baker.bake(CORNELL, atlas=3),
+        "`atlas` should be a baker.Atlas (was int); baker.unwrap makes one",
+    ),
+    (lambda: baker.bake(CORNELL, out=3), "`out` should be a path (was int)"),
+    (
+        lambda: baker.bake(CORNELL, progress=3),
+        "`progress` should be a function of stage, fraction and detail (was int)",
+    ),
+    (lambda: baker.ao([]), "`scene` should be a file or a baker.Scene (was list)"),
+    (lambda: baker.save("out", "x"), "`bake` should be a baker.BakeResult (was str); baker.bake makes one"),
+    (lambda: baker.export("out", ["godot"], "x"), "`engine` should be the name of one export (was list)"),
+    (lambda: baker.verify(3), "`bake` should be an output folder or a baker.BakeResult (was int)"),
+    (lambda: baker.diff("out", None), "`b` should be an output folder or a baker.BakeResult (was NoneType)"),
+    (lambda: baker.render(None), "`scene` should be a file or a baker.Scene (was NoneType)"),
+    (lambda: baker.view("out", port=70000), "`port` is no number from 0 to 65535 (was 70000)"),
+    (lambda: baker.batch(["a"]), "`jobs_file` should be a path (was list)"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), WRONG_ARGUMENTS)
+def test_an_argument_of_a_wrong_type_is_a_sentence(call, message):
+    with pytest.raises(baker.SettingsError) as caught:
+        call()
+    assert caught.value.message == message
+
+
+def test_errors_of_the_system_are_those_of_baker(tmp_path):
+    (tmp_path / "out").mkdir()
+    baker.ao(CORNELL, resolution=32, samples=2, denoise=False, out=tmp_path / "bake")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(baker.ResourceError) as caught:
+        baker.export(tmp_path / "bake", "gltf", tmp_path / "file" / "below")
+    assert isinstance(caught.value.__cause__, OSError)
