@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from baker.cli.flags import in_keys
 from baker.core.errors import SettingsError
+from baker.core.names import unknown_name
 from baker.core.settings_model import Settings
 
 # Its keys may also be at the top level of the file.
@@ -36,10 +37,13 @@ def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
     Raises
     ------
     SettingsError
-        If the file cannot be read, is not TOML, has something else in place of the table, or mixes settings
-        at the top with a table `[bake]`.
+        If the file cannot be read, is not TOML, has an unknown table or something else in place of the table,
+        or mixes settings at the top with a table `[bake]`.
     """
     document = _read_toml(path)
+    for key, value in document.items():
+        if isinstance(value, dict) and key not in TABLES and key.replace("-", "_") not in _top_keys():
+            raise unknown_name("table", key, TABLES, file=str(path), object=key)
     table = document.get(name, {})
     if not isinstance(table, dict):
         raise SettingsError(
@@ -59,6 +63,12 @@ def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
         why = f"'{stray}' stands outside [{name}]; move every setting into it, or drop the table"
         raise SettingsError(why, file=str(path), object=stray)
     return table
+
+
+def _top_keys() -> Collection[str]:
+    from baker.core.settings import BakeSettings
+
+    return BakeSettings.model_fields
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

@@ -68,7 +68,7 @@ fail-on = "warning"
 texels = 5000
 ```
 
-A key that does not exist ends the run with exit code 2 and the name of the nearest one that does.
+A key or table that does not exist ends the run with exit code 2 and the name of the nearest one that does.
 """
 
 

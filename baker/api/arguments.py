@@ -1,4 +1,4 @@
-"""Checks arguments of the Python API that are no settings, and turns errors of the system into those of baker."""
+"""Checks of arguments of the Python API that are no settings; errors of the system as those of baker."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from baker.comparison.match import Sides, SurfacePoints, make_sides, match
 from baker.comparison.pairs import pair_objects
 from baker.comparison.pictures import FlipMeans, page_flip, read
 from baker.comparison.settings import DiffSettings
-from baker.core.errors import InputError
+from baker.core.errors import InputError, SettingsError
 from baker.core.geometry import world_geometry
 from baker.core.lightmap import TexelStatus
 from baker.core.progress import Progress, report, silent
@@ -151,6 +151,8 @@ def compare(
     if not names:
         raise InputError("the bakes have no channel in common", file=str(b))
     limits = parse_limits(settings.fail_if, names, LIMITED) if settings.fail_if else []
+    if not settings.flip and any(limit.metric == "flip" for limit in limits):
+        raise SettingsError("`fail_if` limits flip, which `flip=False` leaves out", object="fail_if")
     for bake in (first, second):
         _check_pages(bake, names)
     pairs = pair_objects(first.scene, second.scene)

@@ -16,6 +16,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 
+# Characters of a wrong value that an error repeats.
+_LONGEST = 80
+
 
 def setting(
     default: Any,
@@ -142,7 +145,9 @@ class Settings(BaseModel):
             name = str(first["loc"][0]) if first["loc"] else ""
             text = first["msg"].removesuffix(" for <class 'pathlib.Path'>")
             message = f"`{name}`{text[5:]}" if text.startswith("Input ") else f"`{name}`: {text}"
-            raise SettingsError(f"{message} (was {first['input']!r})", object=name) from None
+            was = repr(first["input"])
+            was = was if len(was) <= _LONGEST else f"{was[:_LONGEST]}..."
+            raise SettingsError(f"{message} (was {was})", object=name) from None
         self.check()
 
     def check(self) -> None:

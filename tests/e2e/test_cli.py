@@ -145,7 +145,10 @@ def test_command_line_wins_over_config(head, pipeline, command, tmp_path):
         ("resolution = 128\nseed = = 2", ["not valid TOML", "line 2"]),
         ("resolution = ", ["not valid TOML"]),
         ("resolution = 3", ["resolution", "16"]),
-        ("[bake]\nseed = 1\n[other]\nx = 1", ["other", "[bake]"]),
+        ("x = 1\n[bake]\nseed = 1", ["'x' stands outside [bake]"]),
+        ("[bake]\nseed = 1\n[veryfy]\nx = 1", ["no table 'veryfy'; did you mean 'verify'"]),
+        ("[other]\nx = 1", ["no table 'other'; known are bake, check"]),
+        ("sky = {a = 1}", ["'sky' should be a valid string"]),
         ("bake = 3", ["table"]),
         ("ao-distance = 1\nao_distance = 2", ["twice"]),
     ],
@@ -161,6 +164,15 @@ def test_bad_config_is_one_sentence_naming_the_file(text, words, pipeline, comma
     line = capsys.readouterr().err
     assert line.count("\n") == 1
     assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize("name", ["verify", "diff", "render", "check"])
+def test_a_misspelt_table_is_wrong_use_of_every_command(name, command, tmp_path, capsys):
+    config = tmp_path / "bake.toml"
+    config.write_text(f"[{name}s]\ntexels = 3")
+    words = {"diff": ["a", "b"], "render": ["a.glb", "-o", "a.exr"]}.get(name, ["a"])
+    assert command(name, *words, "--config", config)[0] == 2
+    assert f"no table '{name}s'; did you mean '{name}'?" in capsys.readouterr().err
 
 
 def test_missing_config_is_wrong_use(command, tmp_path, capsys):

@@ -148,6 +148,7 @@ def test_limits_decide_the_exit_code(first, doubled, limit, code):
         (["--fail-if", "ao.noise_floor > 1"], "no figure 'noise_floor'"),
         (["--fail-if", "nonsense"], "not of the form"),
         (["--texels", "0"], "--texels"),
+        (["--no-flip", "--fail-if", "ao.flip > 1"], "--fail-if limits flip, which --no-flip leaves out"),
     ],
 )
 def test_wrong_use(first, argv, said):

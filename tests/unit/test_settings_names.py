@@ -135,6 +135,13 @@ def test_a_message_that_does_not_name_its_setting_gets_the_flag(capsys):
     assert capsys.readouterr().err == "baker: --fail-if: there is no figure 'p96'\n"
 
 
+def test_a_long_value_is_cut_in_the_message():
+    with pytest.raises(SettingsError) as caught:
+        BakeSettings(resolution="x" * 5000)
+    assert len(caught.value.message) < 250
+    assert caught.value.message.endswith("xxx...)")
+
+
 def test_numbers_and_arrays_of_numpy_are_settings():
     settings = BakeSettings(sky=np.array([1, 2, 3.5]), ao_distance=np.float32(0.5), samples=np.int64(4))
     assert (settings.sky_radiance, settings.ao_reach(9.0), settings.samples) == ((1, 2, 3.5), 0.5, 4)

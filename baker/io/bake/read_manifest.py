@@ -43,6 +43,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     if not folder.exists():
         raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
+    if folder.is_file():
+        raise InputError("this is a file; name the output folder of a bake", file=str(folder))
     path = folder / MANIFEST_NAME
     if own_files(folder) is None or path.stat().st_size > _LONGEST:
         raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))

@@ -117,6 +117,11 @@ def test_the_ranges_of_encodings_are_read_back(tmp_path: Path) -> None:
     assert read_manifest(tmp_path / "out")["pages"] == manifest["pages"]
 
 
+def test_a_file_in_place_of_the_folder_is_refused(out: Path) -> None:
+    with pytest.raises(InputError, match="this is a file; name the output folder of a bake"):
+        read_manifest(out / "scene.glb")
+
+
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, '{"a":' * 900 + "1" + "}" * 900, "NaN", "[1]", '"bake"', "\x00"]
 )
