@@ -150,6 +150,11 @@ class Settings(BaseModel):
             raise SettingsError(f"{message} (was {was})", object=name) from None
         self.check()
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise SettingsError(
+            f"settings are not changed in place; changed({name}=...) returns a copy", object=name
+        )
+
     def check(self) -> None:
         """Raise `SettingsError` for values that do not go together; a subclass may override it."""
 

@@ -161,3 +161,6 @@ def test_changed_settings_are_checked():
     assert VerifySettings(time_limit="inf").seconds is None
     with pytest.raises(SettingsError):
         settings.changed(spp=0)
+    with pytest.raises(SettingsError, match=r"changed\(spp=...\) returns a copy"):
+        settings.spp = 8
+    assert settings.spp == 7
