@@ -83,7 +83,7 @@ def _asks_json(argv: list[str]) -> bool:
 
 
 def _verbosity(argv: list[str]) -> int:
-    # Read before parsing, since it applies to usage errors, too.
+    # Count the flags in the unparsed arguments: after a usage error there is no parsed value.
     count = argv.count("--verbose")
     return count + sum(len(word) - 1 for word in argv if word[:1] == "-" and set(word[1:]) == {"v"})
 

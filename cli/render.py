@@ -39,7 +39,7 @@ def render(
 
 
 def write_text(picture: Picture, out: Path, settings: RenderSettings, stream: TextIO) -> None:
-    """Write warnings, the size, the rate of rays, and how colours became levels."""
+    """Write warnings, the size of the image, rays per second, and the tone mapping of a PNG."""
     from baker.rendering.write import tone_of
 
     for warning in picture.warnings:

@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """The points of texels, which are ray origins, and the surface they lie on.
 
-Each texel has 16 points, uniform in the area of its square that triangles cover, stratified by a scrambled
-(0,2)-net. Points on low-poly curved surfaces are moved to the smooth surface that the shading normals imply
-(Hanika 2021). Otherwise facets would block each other's rays at the shadow terminator.
+Each texel has 16 points. They are uniform in the part of its square that triangles cover, and stratified by
+a scrambled (0,2)-net. Points on low-poly curved surfaces are moved to the smooth surface that the shading
+normals imply (Hanika 2021). Otherwise facets would block each other's rays at the shadow terminator.
 
 Based on: Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021; Waechter and Binder, A
 fast and robust method for avoiding self-intersection, Ray Tracing Gems, 2019.
@@ -22,16 +22,16 @@ from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 N_POINTS = 16
-# Offset of ray origins along the face normal: OFFSET times the largest coordinate or the triangle's size,
-# whichever is less, but at least ROUNDING times the larger of both. That is sixteen float32 steps: rounding
-# of an origin and of a hit takes one each, vertices of faces meant to be coplanar differ by some.
+# Offset of ray origins along the face normal, for a largest coordinate x and a triangle of size s:
+# max(ROUNDING max(x, s), OFFSET min(x, s)). ROUNDING is sixteen steps of float32. Rounding moves an origin
+# and a hit by one step each, and faces that are meant to be coplanar may be a few steps apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Points near the border also move towards the centroid of their triangle: INWARD offsets, at most half way.
 INWARD = 2.0
 # A point is near the border if a barycentric is below this.
 BORDER = 0.01
-# No shadow-terminator offset (Hanika 2021) from vertices whose normal deviates from the face normal by more
-# than this (cosine): a hard edge, not a smooth surface.
+# A vertex takes no part in the shadow-terminator offset (Hanika 2021) if the cosine between its normal and
+# the face normal is at most this: it is on a hard edge, not on a smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
 # Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal, and the triangle's size (1).
@@ -61,15 +61,15 @@ class Surface(NamedTuple):
     back : (n,) bool
         Whether the entry is the back of a double-sided surface.
     first : (n_front + 1,) int64
-        Triangles of front entry i are first[i] to first[i + 1] of the next two.
+        Front entry i lies on the triangles entry[first[i]:first[i + 1]], with areas in `entry_area`.
     entry : (m,) int32
         Triangle.
     entry_area : (m,) float32
         Area of that triangle in the texel's square, texels.
     sobol_points : (16, 2) uint32
-        Bit-reversed, of the points of a texel.
+        Bit-reversed Sobol numbers of the 16 points of a texel.
     min_offset_scale : float32
-        Metres, lower bound of the largest coordinate in `offset_step`.
+        Metres. The term with OFFSET in `offset_step` treats a smaller largest coordinate as this.
     """
 
     position: NDArray[np.float32]
@@ -90,7 +90,9 @@ class Surface(NamedTuple):
 
 @inner
 def inverse_uv(uv, triangle, size, t):
-    """Return a to f of b1 = a x + b y + c, b2 = d x + e y + f, barycentrics of triangle t at texels (x, y).
+    """Return the coefficients a to f that map a page position to barycentrics of triangle t.
+
+    They are b1 = a x + b y + c and b2 = d x + e y + f, with x and y in texels.
 
     uv : (V, 2) float32; triangle : (T, 3) int32; size : int, of a page
     """
@@ -143,8 +145,8 @@ def place_point(
     sign = -1.0 if flip else 1.0
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     facing = nx * fx + ny * fy + nz * fz
-    # Use the face normal where the shading normal is no direction or points to the other side; else move the
-    # point by the mean of its distances below the tangent planes of the vertices (Hanika 2021).
+    # If the shading normal is zero or points to the other side, use the face normal. Otherwise lift the point
+    # towards the tangent planes of the vertices that it is below, weighted by barycentrics (Hanika 2021).
     lx = ly = lz = 0.0
     if length < 1.0e-6 or facing <= 0.0:
         nx, ny, nz, length = fx, fy, fz, 1.0
@@ -174,7 +176,8 @@ def place_point(
     step = offset_step(px, py, pz, size, min_offset_scale)
     away = sign * step
     if smaller(smaller(b0, b1), b2) < BORDER:
-        # Offset along the face, too: rounding may put a point of its border behind a wall that meets it.
+        # Also move the point along the face: where a wall meets the border of the face, rounding may put a
+        # point on the border behind the wall.
         mx = (position[i0, 0] + position[i1, 0] + position[i2, 0]) / 3.0 - px
         my = (position[i0, 1] + position[i1, 1] + position[i2, 1]) / 3.0 - py
         mz = (position[i0, 2] + position[i1, 2] + position[i2, 2]) / 3.0 - pz
@@ -193,7 +196,9 @@ def place_point(
 
 @inner
 def load_flat(position, shading, face, triangle, t, sign, row):
-    """Return whether all of triangle t is shaded with its face normal; write the row of `place_flat_point`.
+    """Write the row that `place_flat_point` reads; return whether triangle t is flat.
+
+    It is flat if the shading normals of its vertices equal its face normal.
 
     position, shading : (V, 3) float32, metres, and unit shading normals; face : (T, 3) float32, face normals
     triangle : (T, 3) int32; sign : 1 for the front, -1 for the back
@@ -240,9 +245,11 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
     surface : Surface
     valid_points : (n,) uint16, bit k is set where point k of a texel is not inside geometry; another point of
         the texel, if it has a valid one, replaces an invalid point
-    chosen : (m,) int64, entries; wanted : (m, w) uint8, which of their 16 points, (1, w) for the same of all
+    chosen : (m,) int64, entries
+    wanted : (m, w) uint8, numbers of the points to write for each entry; (1, w) if they are the same for all
     origin, normal : (m, w, 3) float32 output, metres, world, and unit
-    hit_triangle : (m, w) int32 output, triangle that each point lies on; (0, w): not wanted
+    hit_triangle : (m, w) int32 output, triangle that each point lies on; with shape (0, w), neither it nor
+        `bary` is written
     bary : (m, w, 2) float32 output, barycentrics b1 and b2 on it
     """
     corner, cut, spare, flat_row = new_triangle(), new_polygon(), new_polygon(), _flat_row()
@@ -338,7 +345,10 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
 
 @inner
 def valid_point(bits, k):
-    """Return point k if its bit is set, else the set bit number k modulo their count, else k."""
+    """Return k if bit k is set or none is; else the number of another set bit.
+
+    Of n set bits, counted from 0, it takes bit k % n.
+    """
     bits = np.int64(bits)
     k = np.int64(k)
     if (bits >> k) & 1 or bits == 0:

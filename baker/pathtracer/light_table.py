@@ -1,8 +1,9 @@
 """The table of all lights that paths sample: emitters, lights without area, the sky.
 
-A light is chosen with a fixed probability, half of which is proportional to power and half divided equally
-among kinds, so that weak kinds of light have enough samples beside a sun. Each estimate is divided by the
-probability of its light, so its expectation does not depend on the probabilities.
+A light is chosen with a fixed probability. One half of the total probability is distributed by power. The
+other half is divided equally among groups (all emitters, each light without area, the sky), so that weak
+lights have enough samples beside a sun. Each estimate is divided by the probability of its light, so its
+expectation does not depend on the probabilities.
 
 The files of `baker.lights.kinds` supply lights without area as `EmissionProfile`s. Kernels
 distinguish four forms of profile: even, cone, parallel, and tabulated. A light whose fall-off is none of the
@@ -42,8 +43,8 @@ from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Columns of a light without area: form of its profile; position and axis; intensity; smallest cosine to the
-# axis and cone scale, see `EmissionProfile`; chance to be chosen; 1 / range^2; tangent; first element of its
-# table in `LightTable.falloff`, cosines and azimuths of it.
+# axis and cone scale, see `EmissionProfile`; chance to be chosen; 1 / range^2; tangent; start of its table in
+# `LightTable.falloff`, and the table's numbers of cosines and azimuths.
 DELTA_FORM, DELTA_POSITION, DELTA_AXIS, DELTA_INTENSITY, DELTA_MIN_COSINE, DELTA_CONE_SCALE = (
     0,
     1,
@@ -62,18 +63,20 @@ EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
 #   ROW_EDGE      edges from corner 0 of an emitter; else 0
 #   ROW_NORMAL    normal of an emitter, axis of a light without area
 #   ROW_GAIN      area / chance of an emitter, 1 / chance of other lights
-#   ROW_TWO_SIDED 1 for two-sided emitters;  ROW_INVERSE_RANGE, the same column, for lights without area
+#   ROW_TWO_SIDED 1 for two-sided emitters; lights without area have ROW_INVERSE_RANGE in this column
 #   ROW_KIND      see below
 ROW_ORIGIN, ROW_EDGE, ROW_NORMAL, ROW_GAIN, ROW_TWO_SIDED = 0, 3, 9, 12, 13
 ROW_MIN_COSINE, ROW_CONE_SCALE, ROW_RADIANCE, ROW_KIND = 14, 15, 16, 19
 ROW_INVERSE_RANGE = ROW_TWO_SIDED
 ROW_COLUMNS = 20
-# Kinds of row. Those below KIND_PARALLEL are at a finite distance; kernels make KIND_TABULATED KIND_EVEN.
+# Kinds of row. `vertex_simd` takes kinds below KIND_PARALLEL as lights at a finite distance. It first
+# multiplies the gain of a tabulated light by its fall-off, and then treats the light as KIND_EVEN.
 KIND_EMITTER, KIND_EVEN, KIND_CONE, KIND_PARALLEL, KIND_SKY, KIND_TABULATED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ROW_KIND = {EVEN: KIND_EVEN, CONE: KIND_CONE, PARALLEL: KIND_PARALLEL, TABULATED: KIND_TABULATED}
 # Columns of the sky: radiance, chance.
 SKY_RADIANCE, SKY_CHANCE = 0, 3
-# Rays to parallel light and to the sky have this length; rays to other lights this share of the distance.
+# Rays to parallel light and to the sky have length FAR. Rays to other lights end at the share SHORT of the
+# distance.
 FAR = 1.0e30
 SHORT = 0.9999
 
@@ -100,7 +103,7 @@ class LightTable(NamedTuple):
     row : (E + P + 1, 20) float32
         All lights, see the column names.
     falloff : (N,) float32
-        Tables of the profiles, one after another, cosines by azimuths.
+        Tables of the profiles, one after another; each has a row for each cosine, a column for each azimuth.
     textured : int
         1 if any emitter has a texture.
     """
@@ -165,7 +168,9 @@ def build_light_table(
 def _without_area(
     lights: tuple[PunctualLight, ...], disc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """Return rows (P, 20) without probabilities, power (P,), tables (N,) of lights without area, not black.
+    """Return the rows (P, 20), power (P,) and tables (N,) of lights without area; leave out black lights.
+
+    The column DELTA_CHANCE is still 0.
 
     disc : float, m2, area of a disc as wide as the scene
     """
@@ -380,9 +385,9 @@ def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
 
 @inner
 def falloff(lights, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return f of the profile of light e with a position, in unit direction d, at this cosine to its axis.
+    """Return the fall-off f of light e, which has a position, in a direction; see `EmissionProfile`.
 
-    lights : `LightTable`
+    lights : `LightTable`; dx, dy, dz : unit direction from the light; cosine : of its angle to the axis
     """
     delta = lights.delta
     if delta[e, DELTA_FORM] == EVEN:

@@ -1,8 +1,8 @@
 """Direct light of every texel: emissive triangles, then lights without area.
 
-There are two estimates. `weighted` has the MIS weights of light samples; the final gather adds the weighted
-emitter hits of its rays. `complete` has no part in the final gather; it is the light that surfaces reflect in
-later bounces.
+There are two estimates. `weighted` is the share of the light that MIS assigns to shadow rays; the final
+gather adds the rest, from its rays that hit emitters. `complete` is all direct light. The final gather does
+not use it; it is the light that surfaces reflect in later bounces.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from baker.trace.packets import PacketBuffers
 TILE = 512
 # Columns of the light of a tile: RGB of both estimates.
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
-# Hemisphere rays that `complete` has besides shadow rays close to emitters: where radius / distance of a
-# visible cluster is above CLOSE.
+# Close to emitters, `complete` combines shadow rays with N_HEMISPHERE hemisphere rays. A texel is close if
+# the radius of a visible cluster, divided by its distance, is above CLOSE.
 N_HEMISPHERE = 4
 CLOSE = 0.5
 
@@ -49,7 +49,7 @@ class DirectLight:
     complete : (n, 3) float32, lx
     variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
     analytic : (n,) uint8, 1 where `weighted` is complete, too
-    rays : int, shadow rays to emitters that were cast, and all others that may be needed
+    rays : int, rays that were cast for emitters, plus the largest possible number for lights without area
     """
 
     weighted: NDArray[np.float32]
@@ -65,11 +65,11 @@ def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: Emi
     Parameters
     ----------
     job : TraceJob
-        Where rays start; points stay in its cache for later stages with the same tiles.
+        Gives the ray origins. Its cache keeps them for later stages with the same tiles.
     lights : tuple of PunctualLight
         Lights without area.
     sampling : EmitterSampling
-        Emitters, shadow rays to them, and the hemisphere rays that these are weighted against.
+        Emitters, and the numbers of shadow rays and hemisphere rays, from which MIS weights follow.
 
     Returns
     -------
@@ -195,7 +195,8 @@ class _EmitterLight:
     ) -> int:
         """Add light found by shadow rays; return their number."""
         n_cast = 0
-        # Hemisphere rays that find the same emitters: of the final gather, and of `_gather`.
+        # Numbers of hemisphere rays in the MIS weights: for `weighted` those of the final gather, for
+        # `complete` those of `_gather`.
         hemisphere = np.array([self.n_gather, N_HEMISPHERE * (choice.view > CLOSE)], np.float64)
         for emitters, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
             if emitters is None or not emitters.chance.any():
@@ -218,7 +219,7 @@ class _EmitterLight:
         buffers: PacketBuffers,
         out: _Tile,
     ) -> int:
-        """Complete the second estimate with hemisphere rays; return their number."""
+        """Add emitters that hemisphere rays hit to `complete`; return the number of these rays."""
         found = np.zeros((len(out.light), N_COLUMNS), np.float32)
         limits, black = np.array([0.0, self.n_light], np.float64), np.zeros(3, np.float32)
         gather(
@@ -230,14 +231,14 @@ class _EmitterLight:
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the variance of the mean of RGB of sums over 16 batches.
+    """Return the variance of (R + G + B) / 3, where each channel is the sum of 16 batches.
 
     Parameters
     ----------
     total : (m,) float32
         Sum of R, G and B over all batches.
     squares : (m,) float32
-        Sum of the squares of the batches' shares of it.
+        Sum of (R + G + B)^2 of each batch over all batches.
     """
     spread = np.maximum(squares - total * total / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
     return spread.astype(np.float32)

@@ -1,8 +1,8 @@
 """Finds faces of closed pieces that are wound against the others.
 
 A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
-The front is the side that the vertex normals point to if they agree over most of the piece's area, else the
-side on which the larger area of faces has its front already.
+If the vertex normals agree over most of the piece's area, the front is the side that they point to. Otherwise
+it is the side that most of the area has as its front in the file; if that is half of it, the outside.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected, number_by_first
 
-# Mean of sign(normal . front) over a piece's area, in absolute value, above which faces are flipped by their
-# normals.
+# The vertex normals decide if the mean of sign(vertex normal . face normal) over a piece's area is above
+# this, in absolute value. For the mean, all faces are wound like the first one.
 _CLEAR = 0.5
 
 
@@ -51,7 +51,8 @@ def find_wrong_winding(
     ----------
     position : (P, 3) float32
     corner : (T, 3) int64
-        Rows of `position` of each face's corners, all different; equal positions have the same number.
+        Rows of `position` of each face's corners. The three rows of a face differ, and corners of different
+        faces at the same position have the same row.
     normal : (T, 3) float32 or None
         Mean of the vertex normals of each face, zero where the file has none.
     open_too : bool
@@ -88,7 +89,8 @@ def find_wrong_winding(
     if normal is not None:
         agree = np.sign(np.einsum("ij,ij->i", double_area, normal.astype(np.float64)))
         by_normal = np.bincount(piece, sign * area * agree, n_pieces_all) / total
-    # +1: the first face's winding is right. By normals, else by area, else outwards.
+    # `right` is +1 if the first face of the piece is wound correctly, else -1. The normals decide it; if they
+    # do not agree, the area; if that is balanced, the signed volume.
     outside = np.where(volume >= 0, 1.0, -1.0)
     leaning = np.where(np.abs(as_wound) > 1e-9, np.sign(as_wound), outside)
     right = np.where(np.abs(by_normal) > _CLEAR, np.sign(by_normal), leaning)
@@ -98,7 +100,7 @@ def find_wrong_winding(
 
 
 def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the number of (T, 3) faces at each of their edges, (E,) int64."""
+    """Return the number of faces at each edge of a mesh, (E,) int64; `corner` (T, 3) are its faces."""
     return _Edges(corner).count
 
 
@@ -116,7 +118,7 @@ class _Edges:
     count : (E,) int64
         Faces at each edge.
     second : (K,) int64
-        Half edges that follow another one of the same edge.
+        Sorted half edges whose predecessor belongs to the same edge.
     """
 
     def __init__(self, corner: NDArray[np.int64]) -> None:
@@ -136,7 +138,7 @@ class _Edges:
     def pieces(self, n_faces: int, *, open_too: bool) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the (T,) piece of each face, and the (P,) mask of closed pieces.
 
-        With `open_too`, pieces without an edge of more than two faces count as closed.
+        With `open_too`, a piece counts as closed if none of its edges belongs to more than two faces.
         """
         a, b = self.face[self.second - 1], self.face[self.second]
         piece = _components(a, b, n_faces)

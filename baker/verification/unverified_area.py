@@ -15,7 +15,7 @@ from baker.pathtracer.scene import Reference
 from baker.verification.points import Pages
 from baker.verification.surroundings import visible
 
-# Invalid texels whose visibility is tested, and points in each texel for its area.
+# Number of invalid texels whose visibility is tested, and number of points that measure the area of a texel.
 _TESTED, _POINTS = 400, 4
 
 
@@ -30,7 +30,8 @@ class UnverifiedArea:
     invalid : float
         Surface on invalid texels, which the bake filled from their neighbours.
     visible : float
-        The part of `invalid` that is seen from points in the air: it should have a value of its own.
+        The part of `invalid` that is visible from points in the air. Since it can be seen, the bake should
+        have computed its light.
     uncovered : float
         Surface on all other texels without a measured value.
     """

@@ -107,7 +107,7 @@ def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
 
 
 def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
-    """Return the uv of each vertex in the texture, (V, 2) float64; 0 where it has no such set."""
+    """Return the uv of each vertex in the texture, (V, 2) float64; primitives without that uv set have 0."""
     parts = [
         np.nan_to_num(
             p.texcoord.get(texture.texcoord, np.zeros((len(p.position), 2))), nan=0.0, posinf=0.0, neginf=0.0
@@ -118,7 +118,9 @@ def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
 
 
 def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[str, str]) -> bool:
-    """Return whether any triangle's uv bounding box, one texel wider for the lookup, has a texel of a mask.
+    """Return whether any texel of a mask is in the uv bounding box of a triangle.
+
+    Boxes include the neighbouring texels that a bilinear lookup reads.
 
     Parameters
     ----------
@@ -126,7 +128,7 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
     uv : (T, 3, 2) float64
     wrap : (str, str)
     """
-    # Summed-area table: the count in a box is the sum over its four corners.
+    # Summed-area table: the values at the four corners of a box give the number of texels in it.
     total = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int64)
     total[1:, 1:] = mask.cumsum(axis=0).cumsum(axis=1)
     (left, right), (top, bottom) = (
@@ -139,7 +141,7 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
 def _range(value: NDArray[np.float64], size: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the first and the last texel (exclusive) that triangles sample along one axis, (T,) int64 each.
 
-    A triangle across a repeat of the image gets the whole range.
+    If a triangle crosses from one repeat of the image to the next, its range is the whole image.
     """
     low, high = value.min(axis=1), value.max(axis=1)
     if wrap == "clamp":

@@ -8,9 +8,10 @@ from baker.trace.jit import kernel
 
 @kernel
 def join_linked(link, root):
-    """Write the smallest node that each node is connected to by links (union-find).
+    """Find the smallest node in the connected component of each node (union-find).
 
-    link : (m, 2) int32, nodes; root : (n,) int32, each node's own number on entry
+    link : (m, 2) int32, pairs of connected nodes
+    root : (n,) int32, each node's own number on entry; the smallest node of its component on return
     """
     for m in range(len(link)):
         a, b = link[m, 0], link[m, 1]
@@ -25,15 +26,16 @@ def join_linked(link, root):
         else:
             root[a] = b
     for i in range(len(root)):
-        # A root is smaller than its nodes, so its own root is final already.
+        # root[i] is at most i, and the roots of smaller nodes are final already.
         root[i] = root[root[i]]
 
 
 @kernel
 def flood_regions(chart, region, queue):
-    """Assign regions to texels of a page without one, ring by ring from neighbours of the same chart.
+    """Give texels without a region that of a neighbour in the same chart, ring by ring, on one page.
 
-    chart : (H, W) int32, -1 for empty texels; region : (H, W) int32, -1 for texels without one; filled
+    chart : (H, W) int32, -1 for empty texels
+    region : (H, W) int32, -1 for texels without a region; these are filled in
     queue : (H * W,) int64, working memory
     """
     height, width = chart.shape
