@@ -62,7 +62,7 @@ def measure_unverified_area(
         Its triangles.
     pages : Pages
         The texels of all pages.
-    air : (m, 3) float64, metres, world, relative to the geometry's origin
+    air : (m, 3) float64, metres, world axes, relative to the geometry's origin
         Points in the air between surfaces.
     seed : int
         Seed of the random choice.
