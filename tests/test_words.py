@@ -14,7 +14,6 @@ SUFFIXES = {".py", ".md", ".js", ".html", ".toml"}
 # Quoted names of objects in scenes are data of these files, such as "lamp", "lamp 3" or f"lamp {k}".
 OBJECT_NAME = re.compile(r"""(["'])(?:(?:floor_)?lamp(?: (?:\d+|\{\w+\}))?|(?:\{name\} )?glow)\1""")
 WITH_OBJECTS = ("assets", "benchmarks", "tests")
-PENDING = {path.name for path in (ROOT / "tests" / "pending_words").glob("*")}
 # Names of glTF extensions are given by others.
 EXTENSION = re.compile(r"\b(?:ADOBE|EXT|KHR|MSFT)_\w+")
 
@@ -113,8 +112,6 @@ def faults(part):
 @pytest.mark.parametrize("part", sorted(places()))
 def test_retired_words_are_gone(part):
     found = faults(part)
-    if part in PENDING:
-        pytest.skip(f"{len(found)} retired words left")
     assert not found, "\n" + "\n".join(found)
 
 

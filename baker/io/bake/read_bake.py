@@ -86,7 +86,7 @@ def read_bake(folder: Path | str) -> StoredBake:
     manifest = read_manifest(folder)
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
     scene = load_scene(_present(folder, SCENE_NAME))
-    settings = manifest.get("settings", {})
+    settings = manifest["settings"]
     scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
     maps = {name: _pages(folder, manifest, name) for name in dict.fromkeys(p["channel"] for p in pages)}
@@ -95,7 +95,7 @@ def read_bake(folder: Path | str) -> StoredBake:
         _layout(folder, scene, index, rows.get(instance.node))
         for index, instance in enumerate(scene.instances)
     )
-    padding = int(manifest.get("settings", {}).get("padding", 0))
+    padding = int(settings["padding"])
     atlas = Atlas(resolution, n_pages, layouts, len(layouts), padding)
     status = np.stack([_status(folder, page, resolution) for page in range(n_pages)])
     bake = StoredBake(folder, manifest, scene, atlas, maps, status, warnings)
