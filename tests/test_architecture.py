@@ -13,6 +13,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from kernel_marks import is_kernel
 
 from baker.core.stage import Stage
 
@@ -115,12 +116,8 @@ def test_no_two_tests_have_one_name():
 
 def long_functions(tree):
     """Yield (name, lines without docstring, parameters without self) of the functions that are no kernels."""
-    marks = {"kernel", "inner", "cfunc"}
     for node in ast.walk(tree):
-        if not isinstance(node, ast.FunctionDef):
-            continue
-        names = {n.id for mark in node.decorator_list for n in ast.walk(mark) if isinstance(n, ast.Name)}
-        if names & marks:
+        if not isinstance(node, ast.FunctionDef) or is_kernel(node):
             continue
         first = node.body[0]
         text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)

@@ -13,6 +13,7 @@ import re
 from pathlib import Path
 
 import pytest
+from kernel_marks import is_kernel
 from numpydoc.hooks.validate_docstrings import AstValidator
 from numpydoc.validate import validate
 
@@ -34,7 +35,6 @@ PACKAGES = sorted(
     {path.stem for path in (ROOT / "baker").iterdir() if (path / "__init__.py").exists()}
     | {"__init__", "cli"}
 )
-KERNEL_MARKS = {"kernel", "inner", "njit", "jit", "cfunc", "vectorize", "guvectorize"}
 
 
 def package_of(path):
@@ -64,11 +64,6 @@ def public_names():
             if owner != package_of(path):
                 names |= {(node.module, alias.name) for alias in node.names}
     return names
-
-
-def is_kernel(node):
-    marks = {name.id for mark in node.decorator_list for name in ast.walk(mark) if isinstance(name, ast.Name)}
-    return bool(marks & KERNEL_MARKS)
 
 
 def indexed_arguments(node):

@@ -1,0 +1,13 @@
+"""Which functions of a parsed file are compiled kernels."""
+
+from __future__ import annotations
+
+import ast
+
+KERNEL_MARKS = {"kernel", "inner", "njit", "jit", "cfunc", "vectorize", "guvectorize"}
+
+
+def is_kernel(node):
+    """Return whether a decorator of a function is, or is made from, one of `KERNEL_MARKS`."""
+    marks = {name.id for mark in node.decorator_list for name in ast.walk(mark) if isinstance(name, ast.Name)}
+    return bool(marks & KERNEL_MARKS)
