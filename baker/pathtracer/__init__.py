@@ -1,10 +1,14 @@
 """The reference: irradiance, ambient occlusion and pictures by path tracing.
 
-A bake is verified against this package, so it computes light without the bake's code. Both read the same
-scene, resolved materials, textures, alpha and solids, cast rays with the same tree and filters, and take
-random numbers and directions from `kernels.sampling`; both divide emissive textures with
-`lights.emissive_texture.cut`, which determines sampling densities only. Emitters, lights without area,
-shading, estimators and sums are this package's own.
+Bakes are verified against this package, so it computes light without the bake's code. The bake and this
+package share:
+
+- the scene, resolved materials, textures, alpha and solids;
+- the Embree scene and its hit filters;
+- random numbers and direction sampling of `kernels.sampling`;
+- `lights.emissive_texture.cut`, which divides textured emitters. It changes sampling densities only.
+
+This package has its own code for emitters, lights without area, shading, estimators and sums.
 """
 
 from baker.trace.kernel_cache import keep_kernels

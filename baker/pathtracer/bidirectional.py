@@ -1,13 +1,14 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Bidirectional path tracing: subpaths from lights and from the eye, connected in all ways, in ray packets.
+"""Bidirectional path tracing: subpaths from lights and from the eye, with all connections between them.
 
-Each sample traces a subpath from a light and stores its vertices, then traces a subpath from the eye. Every
-eye vertex is connected to a light and to all stored vertices. With a camera, stored vertices are connected to
-its pinhole as well; that light is a *splat* on the pixel in which the vertex is visible. MIS weights:
-`bidirectional_weights`.
+The eye is a camera or a surface point. Each sample traces a subpath from a light and stores its vertices,
+then traces a subpath from the eye. Every eye vertex is connected to a sampled light and to all stored
+vertices. If the eye is a camera, stored vertices are connected to its pinhole as well. The light of such a
+connection is a *splat*: it is added to the pixel in which the vertex is visible. `bidirectional_weights`
+computes MIS weights.
 
-A light subpath has at most `MAX_LIGHT_VERTICES` vertices; eye subpaths end by Russian roulette. The weights
-count exactly the techniques that exist within this limit.
+A light subpath has at most `MAX_LIGHT_VERTICES` vertices. Eye subpaths end by Russian roulette. The MIS
+weights include only techniques that exist within this limit.
 
 Based on: Lafortune and Willems, Bi-directional path tracing, 1993; Veach and Guibas, Bidirectional estimators
 for light transport, 1994; Dutre, Lafortune and Willems, Monte Carlo light tracing with direct computation of
@@ -75,8 +76,9 @@ from baker.pathtracer.vertex import (
 from baker.trace.jit import inner, kernel, scratch
 from baker.trace.packets import GEOM_ID, HIT_U, HIT_V, MAX_WIDTH, NO_HIT, PRIM_ID, TFAR, set_ray, trace
 
+# Stages of a lane: without a subpath; waiting for its ray to be traced; at a vertex.
 _IDLE, _RAY, _VERTEX = 0, 1, 2
-# Working memory of a tile; stored vertices are in column vertex * MAX_WIDTH + lane.
+# Stack arrays of `trace_both_ways`. Stored vertex i of a lane is column i * MAX_WIDTH + lane.
 _new_path, _new_kept = (scratch((N_ROWS_BOTH, n * MAX_WIDTH), np.float64) for n in (1, MAX_LIGHT_VERTICES))
 _new_row, _new_kept_row = (
     scratch((N_PARAMETERS, n * MAX_WIDTH), np.float64) for n in (1, MAX_LIGHT_VERTICES)
@@ -90,10 +92,10 @@ _new_values = scratch((3, MAX_WIDTH), np.float64)
 
 @inner
 def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, sizes):
-    """Start a subpath at a white surface point, or (n_subpaths > 0) at a camera.
+    """Start an eye subpath at a white surface point or, if n_subpaths > 0, at a camera.
 
-    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; where, toward, normal, sizes : see `start_path`
-    camera, n_subpaths : see `trace_both_ways`
+    path : (N_ROWS_BOTH, n) float64; row : (5, n) float64
+    where, toward, normal, sizes : see `start_path`; camera, n_subpaths : see `trace_both_ways`
     """
     at_surface = n_subpaths == 0.0
     start_path(path, row, lane, where, toward, normal, at_surface, sizes)
@@ -110,10 +112,10 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, siz
 
 @inner
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
-    """Sample the next direction of a subpath; return False where it ends.
+    """Sample the next direction of a subpath, and update its throughput and MIS sums; False if it ends.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; eye : whether the subpath started at the eye
-    choice, u, w : uniform numbers; value, spare : (3,) float64, working memory
+    choice, u, w : random numbers in [0, 1), see `bsdf_sample`; value, spare : (3,) float64, working memory
     """
     lx, ly, lz, density, smooth = bsdf_sample(
         row, lane, path[TO, lane], path[TO + 1, lane], path[TO + 2, lane], choice, u, w, value
@@ -129,8 +131,8 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
         density = reverse = 1.0
         shaded = bx * path[SHADED, lane] + by * path[SHADED + 1, lane] + bz * path[SHADED + 2, lane]
         if shaded <= GRAZE:
-            # `arrive` replaced the shading normal for this direction; a path from the light would use another
-            # normal.
+            # `arrive` replaced the shading normal for this view direction. A subpath from the other end would
+            # use another normal, so it cannot sample this reflection.
             if not eye:
                 return False
             reverse = 0.0
@@ -155,10 +157,13 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
 
 @inner
 def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
-    """Connect the end of an eye subpath to stored vertex k, the s-th of a light subpath; False if dark.
+    """Connect the end of an eye subpath to the stored vertex in column k; return False if no light arrives.
 
-    path, kept : (N_ROWS_BOTH, n) float64; row, kept_row : (5, n) float64
-    value : (3,) float64, output, the light of an unblocked connection; spare : (3,) float64, working memory
+    path, kept : (N_ROWS_BOTH, n) float64, the eye subpath and the stored vertices
+    row, kept_row : (5, n) float64, BSDF parameters of both
+    s : number of vertices of the light subpath up to the stored vertex
+    value : (3,) float64, output, MIS-weighted light if nothing blocks the connection
+    spare : (3,) float64, working memory
     ray : (6,) float64, output: unit direction, length in metres, 2 unused
     """
     dx = kept[POSITION, k] - path[POSITION, lane]
@@ -192,11 +197,13 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
 
 @inner
 def show(path, row, lane, camera, n_subpaths, value, ray):
-    """Connect the end of a light subpath to the camera; return the pixel in which it is visible, or -1.
+    """Connect the end of a light subpath to the camera; return the number of its pixel, or -1 if invisible.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
-    value : (3,) float64, output, light for the sum over the subpaths of all pixels
-    ray : (6,) float64, output, see `connect`
+    value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection. The radiance of a pixel
+    is
+        the sum of such splats over the light subpaths of all pixels
+    ray : (6,) float64, output, from the vertex to the camera, see `connect`
     """
     for a in range(3):
         ray[a] = path[POSITION + a, lane] - camera[EYE + a]
@@ -231,16 +238,18 @@ def trace_both_ways(
     where, toward, normal, begin, camera, n_subpaths, surfaces, lights, shading, sphere, buffers,
     sobol_points, settings, out, splat_pixel, splat,
 ):  # fmt: skip
-    """Add the light of all paths to the sums of m points, with subpaths from both ends; see `trace_paths`.
+    """Trace n bidirectional samples for each of m points or pixels, and add their light to `out` and `splat`.
 
     where, toward, normal, begin, surfaces, lights, shading, sobol_points, settings, out : see `trace_paths`
     buffers : `PacketBuffers`
-    camera : (15,) float64, see `camera`
-    n_subpaths : float, light subpaths that one pixel can see for each of its own samples: the number of
-        pixels; 0 if paths start at surfaces
+    camera : (15,) float64, see `camera`; unused if paths start at surface points
+    n_subpaths : float, number of light subpaths of the whole picture for each sample of a pixel, which is the
+        number of pixels; 0 if paths start at surface points
     sphere : (4,) float64, `Reference.sphere`
-    splat_pixel : (q,) int64, splat : (q, 3) float64, outputs, light for pixels anywhere, in the units of
-        `out`; q at least m n (`MAX_LIGHT_VERTICES` - 1) with a camera
+    splat_pixel : (q,) int64, output, number of the pixel of each splat, which may be outside this tile
+    splat : (q, 3) float64, output, light of each splat, in the unit of `out`. With a camera, q must be at
+    least
+        m n (`MAX_LIGHT_VERTICES` - 1)
 
     Returns
     -------
@@ -260,16 +269,16 @@ def trace_both_ways(
     alpha = len(shading.alpha.slot) > 0
     strata, max_bounces = settings.strata, settings.max_bounces
     seed, number_of_pass = settings.seed, settings.number_of_pass
-    # With a limit of bounces, light subpaths are shorter.
+    # Largest number of vertices of a light subpath within the limit of bounces.
     most_kept = MAX_LIGHT_VERTICES
     if max_bounces >= 0:
         most_kept = min(MAX_LIGHT_VERTICES, max_bounces + (2 if n_subpaths > 0.0 else 1))
     lit = lights.cumulative[len(lights.cumulative) - 1] > 0.0
     path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
-    # Vertices of the lane's light subpath, the one on the light among them.
+    # For each lane, number of vertices of its light subpath, including the vertex on the light.
     count = _new_numbers()
-    # Whether the lane traces an eye subpath; largest throughput at the start of its light subpath; 1 /
-    # range^2.
+    # For each lane: whether it traces an eye subpath; largest component of the throughput at the start of its
+    # light subpath; 1 / range^2 of that light.
     eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
     value, spare, ray, rgba, spot = _new_value(), _new_value(), _new_ray(), _new_rgba(), _new_spot()
     values, state = _new_values(), _new_state()
@@ -279,7 +288,7 @@ def trace_both_ways(
     samples, m, n_positions = len(sobol_points), where.shape[0], where.shape[1]
     following = rays = shadows = splats = 0
     while True:
-        # Start subpaths in idle lanes, and set the rays of all lanes that need one
+        # Start subpaths in idle lanes, and write the rays of all lanes at stage _RAY
         any_ray = any_path = False
         for lane in range(width):
             if stage[lane] == _IDLE and following < m * samples:
@@ -334,7 +343,7 @@ def trace_both_ways(
                 if stage[lane] == _RAY:
                     for c in range(3):
                         path[BETA + c, lane] *= transmittance(buffers.blend, c, lane)
-        # Make vertices of hits: add emission to eye subpaths, store vertices of light subpaths
+        # Set up vertices at hits, add emission to eye subpaths, and store vertices of light subpaths
         for lane in range(width):
             if stage[lane] != _RAY:
                 continue
@@ -380,7 +389,8 @@ def trace_both_ways(
                 for r in range(N_PARAMETERS):
                     kept_row[r, k] = row[r, lane]
             stage[lane] = _VERTEX if alive else _IDLE
-        # Cast connections: 0 to a light or, from a light subpath, to the camera; others to stored vertices
+        # Cast connections. Step 0: from an eye subpath to a light, from a light subpath to the camera. Step
+        # i: from an eye subpath to stored vertex i
         step = 0
         while step < MAX_LIGHT_VERTICES:
             any_shadow = more = False
@@ -440,8 +450,8 @@ def trace_both_ways(
             if not more:
                 break
             step += 1
-        # Sample the next directions, with Russian roulette; finish eye subpaths, and begin them after light
-        # subpaths
+        # Sample the next directions, with Russian roulette. Add the light of ended eye subpaths to the sums,
+        # and start eye subpaths after ended light subpaths
         for lane in range(width):
             alive = stage[lane] == _VERTEX
             if alive and not eye[lane]:

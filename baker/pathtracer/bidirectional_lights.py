@@ -1,9 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Lights at both ends of a path: starts of light subpaths, light samples, hits on emitters and the sky.
+"""Lights in bidirectional path tracing: starts of light subpaths, light samples, hits on emitters and sky.
 
-A light is chosen as in `light_table`. A light subpath starts at a uniform point of an emitter with a
-cosine-weighted direction; at a light with a position, uniformly over its cone; for parallel light and the
-sky, on a disc as wide as the scene.
+A light is chosen as in `light_table`. Where a light subpath starts depends on the light:
+
+- Emitter: at a point chosen uniformly, in a cosine-weighted direction.
+- Light with a position: at that position, in a direction uniform over its cone.
+- Parallel light and the sky: on a disc of the radius of `Reference.sphere`, in front of the scene.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 10.3; Pharr, Jakob and
 Humphreys, Physically based rendering, 3rd ed. 2016, ch. 16 (light from infinity).
@@ -76,16 +78,16 @@ _INV_4_PI = 0.25 / math.pi
 
 @inner
 def to_world(nx, ny, nz, a, b, c):
-    """Return in world space the direction (a, b, c) of the frame around the unit normal n."""
+    """Return the world direction with components (a, b, c) in the tangent frame of the unit normal n."""
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     return a * tx + b * bx + c * nx, a * ty + b * by + c * ny, a * tz + b * bz + c * nz
 
 
 @inner
 def start_density(delta, e):
-    """Return the density per steradian of directions that start at light e, which has a position.
+    """Return the density, per steradian, of the directions of light subpaths that start at light e.
 
-    delta : (P, 20) float64, see `LightTable`
+    delta : (P, 20) float64, see `LightTable`; row e is a light with a position
     """
     if delta[e, DELTA_FORM] == EVEN:
         return _INV_4_PI
@@ -94,16 +96,18 @@ def start_density(delta, e):
 
 @inner
 def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a, b, spot):
-    """Start a path at a light: write its position, direction, throughput and densities.
+    """Start a light subpath: write its position, direction, throughput and densities to column `lane`.
 
     path : (N_ROWS_BOTH, n) float64; lights : `LightTable`; sphere : (4,) float64, `Reference.sphere`
-    choice, u, w, a, b : uniform numbers
-    spot : (2,) float64, output, barycentrics of the start on an emitter; the caller applies its texture
+    min_offset_scale : metres, see `Surfaces`
+    choice, u, w, a, b : random numbers in [0, 1): for the light, a point (u, w) and a direction (a, b)
+    spot : (2,) float64, output, barycentrics of the start on an emitter. The caller multiplies by the
+        emitter's texture
 
     Returns
     -------
     int
-        The light.
+        Number of the light.
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -135,8 +139,8 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         dx, dy, dz = to_world(nx, ny, nz, dx, dy, dz)
         path[DENSITY, lane] = max(cosine, 1.0e-12) * INV_PI / sides
         path[LEAVE, lane] = cosine
-        # Density with which a path hits this point at random; the cosine at the light converts it to one per
-        # area.
+        # Sum for the technique in which the eye subpath hits the emitter: 1 / density of the start.
+        # `reach_vertex` multiplies by the cosine at the light.
         path[CHAIN, lane] = 1.0 / density
         scale = math.pi * sides / density
         red, green, blue = (
@@ -187,7 +191,7 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
 
 @inner
 def range_of_light(lights, light):
-    """Return 1 / range^2 of a light; 0 if it has no range.
+    """Return 1 / range^2, 1/m2, of light number `light`; 0 if the light has no range.
 
     lights : `LightTable`
     """
@@ -199,10 +203,12 @@ def range_of_light(lights, light):
 
 @inner
 def fade(path, lane, distance, inverse_range):
-    """Multiply throughput by the range window at the first hit of a light subpath; return if any is left.
+    """Multiply the throughput of a light subpath by the range window at its first hit.
+
+    Densities do not change. Returns False if the throughput becomes 0.
 
     path : (N_ROWS_BOTH, n) float64; distance : metres from the light
-    The window does not affect densities.
+    inverse_range : 1 / range^2, 1/m2
     """
     share = range_window(distance * distance, inverse_range)
     for c in range(3):
@@ -212,9 +218,10 @@ def fade(path, lane, distance, inverse_range):
 
 @inner
 def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
-    """Start parallel light of direction d on a disc in front of the scene.
+    """Write a start for light of direction d: a uniform point on a disc that touches the scene's sphere.
 
     path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`
+    u, w : random numbers in [0, 1)
     """
     radius = sphere[3]
     r = radius * math.sqrt(u)
@@ -231,10 +238,10 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
 
 @inner
 def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
-    """Sample one light from the end of an eye subpath, weighted for all techniques; see `vertex.aim`.
+    """Do what `vertex.aim` does, at the end of an eye subpath and with the MIS weight of all techniques.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; sphere : (4,) float64, `Reference.sphere`
-    value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
+    choice, u, w : random numbers in [0, 1); value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -251,7 +258,8 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
         dx, dy, dz = dx / length, dy / length, dz / length
         max_distance = length * SHORT
         scale = 1.0 / density
-        # Density per area, without the cosine here, of this vertex if sampled from the light.
+        # Density, per area, with which a subpath from the light samples this vertex, without the cosine at
+        # this vertex.
         onward = emitter_cosine(emitter, light, dx, dy, dz) * emission_density(emitter, light) / square
         red, green, blue = (
             emitter[light, EMITTER_RADIANCE],
@@ -296,7 +304,7 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
 
 @inner
 def emitter_cosine(emitter, e, dx, dy, dz):
-    """Return the cosine at emitter e of a ray of unit direction d; below 0 at the dark side.
+    """Return the cosine at emitter e of a ray that arrives in unit direction d; negative on its dark side.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -310,7 +318,7 @@ def emitter_cosine(emitter, e, dx, dy, dz):
 
 @inner
 def emission_density(emitter, e):
-    """Return the density per projected solid angle of directions from emitter e.
+    """Return the density, per projected solid angle, of the directions of light subpaths from emitter e.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -319,13 +327,15 @@ def emission_density(emitter, e):
 
 @inner
 def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
-    """Write to `value` (3,) the light of triangle prim, hit by the eye subpath, with its MIS weight.
+    """Write the MIS-weighted light of triangle `prim`, which an eye subpath hit, to `value` (3,) float64.
 
-    The caller multiplies by the texture.
+    The caller multiplies `value` by the emission texture.
 
-    path : (N_ROWS_BOTH, n) float64; surface : (T, 32) float32; emitter : (E, 24) float64
-    e : the emitter that was hit, -1 if no light subpath starts there
-    seen : whether the path comes straight from a camera; no other technique makes such paths
+    path : (N_ROWS_BOTH, n) float64; surface : (T, 32) float32, see `Surfaces`
+    emitter : (E, 24) float64, see `emitters`
+    e : number of the emitter that was hit, -1 if no light subpath starts there
+    seen : whether the ray comes from the camera directly. No other technique makes such paths, so the weight
+        is 1
     """
     value[0] = value[1] = value[2] = 0.0
     cosine = -(
@@ -348,10 +358,10 @@ def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
 
 @inner
 def meet_sky(path, lane, sky, sphere, seen, value):
-    """Write to `value` (3,) the light of the sky for an eye subpath that leaves the scene, with its MIS
-    weight.
+    """Write the MIS-weighted light of the sky to `value`, for an eye subpath that left the scene.
 
-    path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`; value : (3,) float64, output
+    path : (N_ROWS_BOTH, n) float64; sky : (4,) float64, see `LightTable`
+    sphere : (4,) float64, `Reference.sphere`; seen : see `meet_emitter`; value : (3,) float64, output
     """
     weight = 1.0
     if not seen and sky[SKY_CHANCE] > 0.0:

@@ -1,7 +1,8 @@
 """Passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
 
-A splat may be in any pixel. Each tile returns a list of its splats; the lists are added in the order of
-tiles, so that sums do not depend on threads, and block by block, which bounds the memory.
+A picture is divided into blocks, and a block into tiles. A splat may be in any pixel, so each tile returns a
+list of its splats. The lists are added in the order of tiles, so that sums do not depend on the number of
+threads. They are added after each block, which limits memory.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
 from baker.trace.packets import new_packet_buffers
 
+# Number of pixels of a tile and of a block.
 _TILE = 512
 _BLOCK = 64 * _TILE
 
@@ -35,9 +37,10 @@ def surface_tile(
     settings: PathSettings,
     out: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Add E / pi of points to `out` (m, 3); return the numbers of closest-hit and shadow rays.
+    """Add E / pi of each sample of m points to `out` (m, 3); return two numbers of rays, as `trace_paths` does.
 
-    points : position, normal and face normal, see `irradiance_pass`
+    points : position, normal and face normal, each (m, k, 3), see `irradiance_pass`
+    begin : number of the first point, for its random numbers
     """
     rays, shadows, _ = trace_both_ways(
         *points, begin, np.zeros(CAMERA_COLUMNS), 0.0, reference.surfaces, reference.lights,
@@ -57,7 +60,10 @@ def picture_pass(
     settings: PathSettings,
     progress: Progress,
 ) -> None:
-    """Add one pass of radiance through every pixel; size : width, height in pixels; see `radiance_pass`."""
+    """Add one pass of radiance through every pixel to an estimate; see `radiance_pass`.
+
+    size : width and height of the picture, pixels; sobol_points, settings : see `trace_paths`
+    """
     width, height = size
     n, samples, number = width * height, estimate.samples, estimate.rounds
     eye = reference.local(camera.position)
@@ -88,7 +94,6 @@ def picture_pass(
             return progress(stage, (block + fraction * span) / n, detail)
 
         run_tiles(span, _TILE, work, threads=reference.threads, stage=Stage.PATH_TRACING, progress=report)
-        # Add splats in the order of tiles.
         for splat_pixel, splat, cast, shadows in found:
             for c in range(3):
                 splatted[:, c] += np.bincount(splat_pixel, splat[:, c], n)

@@ -1,16 +1,19 @@
 # mypy: disable-error-code="no-untyped-def"
 """MIS weights of `bidirectional`: densities of all techniques relative to the one that sampled the path.
 
-A path x_0 (light) .. x_k-1 (eye) can be made with s vertices from the light and t = k - s from the eye, with
-density p_s (per area):
+Let a path have vertices x_0 (on the light) to x_k-1 (at the eye). Technique s samples s of its vertices from
+the light and k - s from the eye. Its density is p_s, and its weight by the balance heuristic is w_s:
 
-    p_s+1 / p_s = pL(x_s) / pE(x_s)    w_s = 1 / (1 + sum over s' != s of p_s' / p_s)    (balance heuristic)
+    p_s+1 / p_s = pL(x_s) / pE(x_s)        w_s = 1 / (1 + sum over s' != s of p_s' / p_s)
 
-pL and pE are the densities of a vertex sampled from the light side and from the eye side. Both sums are
-updated while a subpath grows, so that a connection costs the same for subpaths of any length. A light subpath
-has one sum, since all techniques with fewer light vertices exist. An eye subpath has one sum for each number
-of light vertices that may be added, since that number is bounded. The density of a mirror reflection is set
-to 1, since it cancels in the ratio; connections at mirrors have weight 0.
+pL and pE are the densities, per area, of a vertex sampled from the light side and from the eye side. The sum
+is split at the connection: s' < s is stored with the light subpath, s' > s with the eye subpath. Both sums
+are updated while a subpath grows, so that the cost of a connection does not depend on the subpaths' lengths.
+
+A light subpath stores one sum, because all techniques with fewer light vertices exist. An eye subpath stores
+one sum for each number of vertices that a light subpath may still add, because light subpaths are limited to
+`MAX_LIGHT_VERTICES` vertices. The density of a mirror reflection is set to 1, because it cancels in the
+ratio. Connections at mirrors have weight 0.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 5.3 (shading normals), 8
 and 10; van Antwerpen, Unbiased physically based rendering on the GPU, 2011 (recursive sums); Georgiev,
@@ -28,33 +31,37 @@ from baker.trace.jit import inner
 
 # Largest number of vertices of a light subpath, including the vertex on the light.
 MAX_LIGHT_VERTICES = 8
-# Further rows of a path:
-#   BACK     unit direction to the previous vertex
-#   INVERSE  1 / density of this vertex, per area
-#   OPEN     weight of the technique that connects the previous vertex to this one: 1, but 0 if the previous
-#            one reflected as a mirror, the number of light subpaths of a pixel if it is the camera, and
-#            the ratio of densities in `reach_vertex` if it is the sky
-#   LEAVE    cosine to the geometric normal of the direction in which the path leaves
-#   ORIGIN   kind of the light at which it started: 0 finite distance, 1 parallel light, 2 sky; 0 from the
-#            second vertex
-#   CHAIN    first of the sums over all techniques that end at earlier vertices
+# Rows of `path` after those of `vertex`:
+#
+#     BACK      unit direction to the previous vertex, world (3)
+#     INVERSE   1 / density, per area, with which this vertex was sampled
+#     OPEN      factor of the technique that connects the previous vertex to this one. It is 1 except in three
+#               cases. Mirror reflection at the previous vertex: 0. Camera: `n_subpaths` of `trace_both_ways`.
+#               Sky: the ratio of densities in `reach_vertex`
+#     LEAVE     cosine of the next ray to the geometric normal
+#     ORIGIN    before the first hit: 0 if the path started at a finite distance, 1 for parallel light, 2 for
+#               the sky. After the first hit: 0
+#     CHAIN     sums of p_s' / p_s over the techniques that connect at earlier vertices (MAX_LIGHT_VERTICES)
 BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3, 4, 5, 6, 7))
 N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 
 
 @inner
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
-    """Evaluate the vertex in column k for light that comes from l and goes to e (unit, world, outwards).
+    """Evaluate the BSDF at the vertex in column k for light from direction l that is reflected to direction e.
+
+    e and l are unit world directions away from the vertex; e is on the side of the eye, l on that of the
+    light.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64
-    value : (3,) float64, output, f(e, l) |n.l| / |ng.l| with n the shading and ng the geometric normal.
-        Callers multiply by geometric cosines only, so the result does not depend on the end the path started
-        at.
+    value : (3,) float64, output, f(e, l) |n.l| / |ng.l|, where n is the shading and ng the geometric normal.
+        Callers multiply `value` by geometric cosines only, so light and eye subpaths give the same result
 
     Returns
     -------
     tuple of float
-        Densities per steradian with which a path from the eye samples l, and one from the light samples e.
+        Density, per steradian, with which an eye subpath samples l; density with which a light subpath
+        samples e.
     """
     value[0] = value[1] = value[2] = 0.0
     ge = ex * path[NORMAL, k] + ey * path[NORMAL + 1, k] + ez * path[NORMAL + 2, k]
@@ -70,8 +77,8 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
             value[c] = row[BASE + c, k] * INV_PI * nl / gl
         return nl * INV_PI, max(ne, 0.0) * INV_PI
     el = ex * lx + ey * ly + ez * lz
-    # Where the shading normal faces away from the viewer, use the geometric normal, as `arrive` does. For the
-    # density from the light, the viewer is the light.
+    # If the shading normal does not face the viewer, use the geometric normal, as `arrive` does. A light
+    # subpath arrives from l, so l is the view direction of its density.
     if ne > GRAZE:
         from_eye = bsdf_cosines(row, k, ne, nl, el, value)
     else:
@@ -85,14 +92,14 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
 
 @inner
 def leave_vertex(path, lane, density, reverse, smooth, depth):
-    """Update the sums at a vertex that the path leaves in direction `GO`.
+    """Update the MIS sums of a path at its current vertex, after its next direction `GO` has been sampled.
 
     path : (N_ROWS_BOTH, n) float64
-    density : per steradian, of that direction; 1 at a mirror
-    reverse : density, per steradian, with which a subpath from the other side samples the opposite direction;
-        1 at a mirror, 0 if it cannot
-    smooth : whether the direction is a mirror reflection
-    depth : number of sums, 1 for light subpaths
+    density : density of `GO`, per steradian; 1 for a mirror reflection
+    reverse : density, per steradian, with which a subpath from the other end that arrives along -`GO` samples
+        `BACK`; 1 for a mirror reflection, 0 if no such subpath exists
+    smooth : whether `GO` is a mirror reflection
+    depth : number of sums: 1 for light subpaths, `MAX_LIGHT_VERTICES` for eye subpaths
     """
     near = 0.0 if smooth else path[OPEN, lane]
     inverse = path[INVERSE, lane]
@@ -114,10 +121,11 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):
 
 @inner
 def carry(path, lane, factor, depth):
-    """Multiply the sums by a factor that converts a density per steradian at the next vertex to one per area
-    here.
+    """Multiply the MIS sums of a path by `factor`.
 
-    path : (N_ROWS_BOTH, n) float64; depth : number of sums
+    The factor converts a density per steradian at the next vertex to a density per area at this vertex.
+
+    path : (N_ROWS_BOTH, n) float64; depth : see `leave_vertex`
     """
     for r in range(depth):
         path[CHAIN + r, lane] *= factor
@@ -125,14 +133,15 @@ def carry(path, lane, factor, depth):
 
 @inner
 def reach_vertex(path, lane, distance, depth):
-    """Update a path at a new vertex: its geometric normal is in `path`, the ray's direction still in `GO`.
+    """Update `BACK`, `INVERSE` and the MIS sums of a path that has arrived at a new vertex.
 
-    path : (N_ROWS_BOTH, n) float64; distance : metres, of the ray; depth : number of sums
+    path : (N_ROWS_BOTH, n) float64, with `NORMAL` of the new vertex and `GO` of the ray that arrived
+    distance : metres, length of the ray; depth : see `leave_vertex`
 
     Returns
     -------
     float
-        Cosine of arrival.
+        Cosine of the arriving ray to the geometric normal.
     """
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
     path[BACK, lane], path[BACK + 1, lane], path[BACK + 2, lane] = -dx, -dy, -dz
@@ -143,22 +152,23 @@ def reach_vertex(path, lane, distance, depth):
         carry(path, lane, path[LEAVE, lane] / square, depth)
         path[INVERSE, lane] = square / (path[DENSITY, lane] * cosine)
     else:
-        # Parallel light: its density per area does not change with the distance.
+        # Light from infinity: its density per area does not depend on the distance.
         path[INVERSE, lane] = 1.0 / (path[DENSITY, lane] * cosine)
         if path[ORIGIN, lane] == 2.0:
-            # Density of light samples of the sky, cosine / pi, relative to that of light subpaths, 0.25 / pi.
+            # Ratio of the density of light samples of the sky, cosine / pi, to that of light subpaths, 0.25 /
+            # pi.
             path[OPEN, lane] = 4.0 * cosine
     return cosine
 
 
 @inner
 def towards_eye(path, lane, density, reverse, left):
-    """Return sum p_s' / p_s over techniques with more light vertices, for an eye subpath that ends in `lane`.
+    """Return the sum of p_s' / p_s over s' > s, for an eye subpath that ends in column `lane`.
 
     path : (N_ROWS_BOTH, n) float64
-    density : per area, of this vertex, sampled by the light subpath
-    reverse : per steradian, of the direction to the previous vertex, sampled by the light subpath
-    left : number of vertices that the light subpath may still have
+    density : density, per area, with which the light subpath samples the last vertex of the eye subpath
+    reverse : density, per steradian, with which the light subpath then samples `BACK` of that vertex
+    left : number of vertices that the light subpath may still add
     """
     if left < 1:
         return 0.0
@@ -167,19 +177,20 @@ def towards_eye(path, lane, density, reverse, left):
 
 @inner
 def towards_light(path, k, density, reverse):
-    """Return sum p_s' / p_s over techniques with fewer light vertices, for a light subpath that ends in
-    column k.
+    """Return the sum of p_s' / p_s over s' < s, for a light subpath that ends in column k.
 
-    path : (N_ROWS_BOTH, n) float64; density, reverse : as in `towards_eye`, sampled by the eye subpath
+    path : (N_ROWS_BOTH, n) float64
+    density : density, per area, with which the eye subpath samples the last vertex of the light subpath
+    reverse : density, per steradian, with which the eye subpath then samples `BACK` of that vertex
     """
     return density * path[INVERSE, k] * (path[OPEN, k] + reverse * path[CHAIN, k])
 
 
 @inner
 def pixel_density(camera, direction):
-    """Return the density per steradian of a pixel's own rays; 0 behind the camera.
+    """Return the density, per steradian, of the camera rays of one pixel in a direction; 0 behind the camera.
 
-    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the eye
+    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the camera
     """
     cosine = (
         direction[0] * camera[FORWARD]
@@ -194,9 +205,9 @@ def pixel_density(camera, direction):
 
 @inner
 def pixel_of(camera, direction):
-    """Return the number of the pixel through which a direction passes, or -1.
+    """Return the number of the pixel through which a direction passes; -1 if it is outside the picture.
 
-    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the eye
+    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the camera
     """
     z = (
         direction[0] * camera[FORWARD]

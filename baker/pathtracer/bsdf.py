@@ -1,13 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The BSDFs: Lambert, and glTF's metallic-roughness model with its limit of a mirror.
+"""The BSDFs: Lambert, and glTF's metallic-roughness model, which becomes a mirror at low roughness.
 
     f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
     D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)      a = roughness^2
     V = 0.5 / (n.l sqrt((n.v)^2 (1 - a^2) + a^2) + n.v sqrt((n.l)^2 (1 - a^2) + a^2))
     F = F0 + (1 - F0)(1 - v.h)^5
 
-Directions are in the frame of the shading normal (+z). The lobe D V is sampled by its visible normals, the
-diffuse one by the cosine. Below `SMOOTH` the specular lobe is a mirror, which is sampled and never evaluated.
+n is the shading normal, l and v are the unit directions to the light and to the viewer, h is their half
+vector. Directions are in the frame of the shading normal (+z). The specular lobe F D V is sampled by visible
+normals, the diffuse lobe by the cosine. If a is below `SMOOTH`, the specular lobe is a mirror: `bsdf_sample`
+samples it, and `bsdf_eval` leaves it out.
 
 Based on: Khronos Group, glTF 2.0 Specification, appendix B; Heitz, Sampling the GGX distribution of
 visible normals, 2018; Heitz, Understanding the masking-shadowing function, 2014; Schlick, 1994.
@@ -20,44 +22,49 @@ import math
 from baker.trace.jit import inner
 
 INV_PI = 1.0 / math.pi
-# GGX widths below this are mirrors.
+# GGX width a, below which the specular lobe is a mirror.
 SMOOTH = 1.0e-3
+# F0 of a non-metal.
 DIELECTRIC = 0.04
-# Numbers of a surface's parameter row: base colour (3), metallic, width a; a negative width means Lambert.
+# Rows of `row`, the parameters of a BSDF: base colour (3), metallic, GGX width a. A negative width means
+# Lambert.
 BASE, METALLIC, WIDTH = 0, 3, 4
 N_PARAMETERS = 5
 
 
 @inner
 def fresnel(f0, cosine):
-    """Return Schlick's reflectance for the cosine between direction and half vector."""
+    """Return Schlick's reflectance F; cosine : v.h."""
     m = min(max(1.0 - cosine, 0.0), 1.0)
     return f0 + (1.0 - f0) * m * m * m * m * m
 
 
 @inner
 def ggx_density(nh, a):
-    """Return D of a half vector with cosine nh."""
+    """Return the GGX distribution D for n.h = nh and width a."""
     t = nh * nh * (a * a - 1.0) + 1.0
     return a * a / max(math.pi * t * t, 1.0e-300)
 
 
 @inner
 def ggx_masking(nv, a):
-    """Return Smith's G1 for a direction with cosine nv."""
+    """Return Smith's masking function G1 for n.v = nv and width a."""
     return 2.0 * nv / max(nv + math.sqrt(a * a + (1.0 - a * a) * nv * nv), 1.0e-300)
 
 
 @inner
 def ggx_visibility(nl, nv, a):
-    """Return V = G2 / (4 nl nv), height-correlated."""
+    """Return V = G2 / (4 nl nv) with Smith's height-correlated G2, for n.l = nl, n.v = nv and width a."""
     s = nl * math.sqrt(nv * nv * (1.0 - a * a) + a * a) + nv * math.sqrt(nl * nl * (1.0 - a * a) + a * a)
     return 0.5 / max(s, 1.0e-300)
 
 
 @inner
 def specular_chance(row, lane, nv):
-    """Return the probability of sampling the specular lobe of parameters row[:, lane] at view cosine nv."""
+    """Return the probability with which `bsdf_sample` chooses the specular lobe, for n.v = nv.
+
+    row : (5, n) float64, parameters; those of `lane` are one column
+    """
     if row[WIDTH, lane] < 0.0:
         return 0.0
     metallic = row[METALLIC, lane]
@@ -71,19 +78,21 @@ def specular_chance(row, lane, nv):
 
 @inner
 def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
-    """Write f(v, l) n.l (RGB) to `out` (3,) and return the density per steradian of l in `bsdf_sample`.
+    """Write f(v, l) n.l (RGB) to `out` (3,), and return the density with which `bsdf_sample` samples l.
 
-    row : (5, n) parameters, those of `lane` in one column
-    v, l : unit, pointing away from the surface, in its frame
+    The density is per steradian.
+
+    row : (5, n) float64, parameters; those of `lane` are one column
+    v, l : unit directions away from the surface, in the frame of the shading normal
     """
     return bsdf_cosines(row, lane, vz, lz, vx * lx + vy * ly + vz * lz, out)
 
 
 @inner
 def bsdf_cosines(row, lane, nv, nl, vl, out):
-    """Write f n.l to out (3,) and return the density, as `bsdf_eval`, from the cosines n.v, n.l and v.l.
+    """Compute the results of `bsdf_eval` from the cosines nv = n.v, nl = n.l and vl = v.l.
 
-    row : (5, n) float64, parameters
+    row : (5, n) float64, parameters; out : (3,) float64, output, f n.l
     """
     out[0] = out[1] = out[2] = 0.0
     if nv <= 0.0 or nl <= 0.0:
@@ -109,13 +118,16 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):
 
 @inner
 def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):
-    """Return the density per steradian with which `bsdf_sample` samples l from v, without mirrors."""
+    """Return the density per steradian with which `bsdf_sample` samples l, without mirror reflections."""
     return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
 
 
 @inner
 def cosines_pdf(row, lane, nv, nl, vl):
-    """Return the density of `bsdf_pdf` from the cosines n.v, n.l and v.l; row : (5, n) float64."""
+    """Return the density of `bsdf_pdf` from the cosines nv = n.v, nl = n.l and vl = v.l.
+
+    row : (5, n) float64, parameters
+    """
     if nv <= 0.0 or nl <= 0.0:
         return 0.0
     a = row[WIDTH, lane]
@@ -131,7 +143,10 @@ def cosines_pdf(row, lane, nv, nl, vl):
 
 @inner
 def visible_normal(vx, vy, vz, a, u, w):
-    """Return a half vector, distributed as the GGX normals visible from v (Heitz 2018, listing 1)."""
+    """Sample a half vector from the distribution of GGX normals visible from v (Heitz 2018, listing 1).
+
+    a : width; u, w : random numbers in [0, 1)
+    """
     sx, sy, sz = a * vx, a * vy, vz
     length = math.sqrt(sx * sx + sy * sy + sz * sz)
     sx, sy, sz = sx / length, sy / length, sz / length
@@ -156,7 +171,7 @@ def visible_normal(vx, vy, vz, a, u, w):
 
 @inner
 def cosine_sample(u, w):
-    """Map the unit square to the cosine-weighted hemisphere about +z."""
+    """Map (u, w) of the unit square to a cosine-weighted unit direction of the hemisphere about +z."""
     r = math.sqrt(u)
     phi = 2.0 * math.pi * w
     return r * math.cos(phi), r * math.sin(phi), math.sqrt(max(1.0 - u, 0.0))
@@ -164,15 +179,16 @@ def cosine_sample(u, w):
 
 @inner
 def bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight):
-    """Sample a direction; write f n.l / density (RGB) to `weight` (3,).
+    """Sample a direction l for the view direction v; write f n.l / density (RGB) to `weight` (3,).
 
     row : (5, n) float64, parameters
-    choice, u, w : uniform numbers
+    choice, u, w : random numbers in [0, 1), for the lobe and for the direction
 
     Returns
     -------
     tuple
-        l (three floats), density per steradian, and whether it is a mirror direction (density 0 then).
+        l (three floats); its density per steradian; and whether l is a mirror reflection, whose density is
+        returned as 0.
     """
     weight[0] = weight[1] = weight[2] = 0.0
     a = row[WIDTH, lane]

@@ -1,4 +1,4 @@
-"""A pinhole camera: rays through its pixels, and its description on a command line."""
+"""A pinhole camera: rays through its pixels, and the parser of its description on the command line."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from baker.kernels.sampling import hash_u32
 from baker.pathtracer.rng import mix64
 from baker.trace.jit import inner, kernel
 
-# Columns of a camera as kernels take it: position, right, up, forward, tangent of half the vertical field of
-# view, pixels across and down.
+# Columns of a camera in kernels: position, metres (3); unit directions right, up and forward (3 each);
+# tangent of half the vertical field of view; width and height of the picture, pixels.
 EYE, RIGHT, UP, FORWARD, TAN_HALF_FOV, PIXELS_ACROSS, PIXELS_DOWN = 0, 3, 6, 9, 12, 13, 14
 CAMERA_COLUMNS = 15
 
 
 def parse_camera(text: str) -> Camera:
-    """Return the camera of a description.
+    """Return the camera that a text describes.
 
     Parameters
     ----------
     text : str
-        "PX,PY,PZ,TX,TY,TZ,FOV": position, target, vertical field of view in degrees.
+        "PX,PY,PZ,TX,TY,TZ,FOV": position and target, metres, world; vertical field of view, degrees.
 
     Returns
     -------
     Camera
-        With +Y up.
+        A camera at the position, directed at the target, with +Y up.
 
     Raises
     ------
     SettingsError
-        If the text is not of this form, or position and target are equal.
+        If the text does not have this form, a number is not finite, the field of view is not between 0 and
+        180 degrees, or `look_at` raises.
     """
     try:
         px, py, pz, tx, ty, tz, fov = (float(part) for part in text.split(","))
@@ -51,12 +52,14 @@ def parse_camera(text: str) -> Camera:
 
 
 def look_at(position: tuple[float, float, float], target: tuple[float, float, float], fov: float) -> Camera:
-    """Return a camera at `position` towards `target` with +Y up; fov in degrees.
+    """Return a camera at `position`, directed at `target`, with +Y up.
+
+    position, target : metres, world; fov : vertical field of view, degrees
 
     Raises
     ------
     SettingsError
-        If target and position are equal, or their distance is too large.
+        If target and position are equal, or their distance is not finite.
     """
     length = math.dist(target, position)
     if not length > 0:
@@ -64,7 +67,7 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     if not math.isfinite(length):
         raise SettingsError("position and target are too far apart", object="camera")
     forward = np.subtract(target, position) / length
-    # For a view along +Y or -Y, -Z is up in the picture.
+    # If the view is along +Y or -Y, use -Z as the up direction of the picture.
     hint = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.99999 else np.array([0.0, 0.0, -1.0])
     right = np.cross(forward, hint)
     right /= np.linalg.norm(right)
@@ -76,23 +79,23 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
 def camera_columns(
     camera: Camera, position: Sequence[float] | NDArray[np.float64], width: int, height: int
 ) -> NDArray[np.float64]:
-    """Return a camera as kernels take it.
+    """Return a camera in the layout that kernels take.
 
     Parameters
     ----------
     camera : Camera
-        Its position is not used.
+        Axes and field of view; its position is not used.
     position : (3,) sequence of float
-        Metres, relative to the geometry's origin.
+        Position of the camera, metres, relative to the geometry's origin.
     width : int
-        Pixels.
+        Width of the picture, pixels.
     height : int
-        Pixels.
+        Height of the picture, pixels.
 
     Returns
     -------
     (15,) float64
-        See the column names.
+        Columns `EYE` to `PIXELS_DOWN`.
     """
     axes = [*camera.right, *camera.up, *camera.forward]
     return np.array([*position, *axes, math.tan(0.5 * camera.fov), width, height])
@@ -101,29 +104,30 @@ def camera_columns(
 def camera_rays(
     camera: Camera, width: int, height: int, pixel: NDArray[np.int64], samples: int, seed: int, number: int
 ) -> NDArray[np.float64]:
-    """Return unit directions through pixels, evenly distributed over each pixel's square.
+    """Return unit directions through n pixels, evenly distributed over the square of each pixel.
 
     Parameters
     ----------
     camera : Camera
-        Its position is not used.
+        Axes and field of view.
     width : int
-        Pixels.
+        Width of the picture, pixels.
     height : int
-        Pixels.
+        Height of the picture, pixels.
     pixel : (n,) int64
-        row * width + column, row 0 on top.
+        Numbers of the pixels: row * width + column, row 0 on top.
     samples : int
-        Directions of each pixel in this pass: a lattice, shifted at random for each pixel and pass.
+        Number of directions through each pixel. They form a lattice in the pixel's square, which is shifted
+        at random for each pixel and pass.
     seed : int
-        Of the shifts.
+        Seed of the shifts.
     number : int
-        The pass.
+        Number of the pass.
 
     Returns
     -------
     (n, samples, 3) float64
-        Unit, world.
+        Unit directions, world.
     """
     lens = camera_columns(camera, camera.position, width, height)
     direction = np.zeros((len(pixel), samples, 3))
@@ -133,17 +137,18 @@ def camera_rays(
 
 @kernel
 def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore[no-untyped-def]
-    """Write unit directions to `direction` (n, samples, 3).
+    """Write unit directions through n pixels to `direction` (n, samples, 3) float64.
 
-    lens : (15,) float64, see the column names
-    pixel : (n,) int64; first, second : uint64, salts
+    lens : (15,) float64, see `camera_columns`; pixel : (n,) int64, see `camera_rays`
+    first, second : uint64, salts of the horizontal and of the vertical shift of the lattice
     """
     high = lens[TAN_HALF_FOV]
     for i in range(len(pixel)):
         row, column = pixel[i] // width, pixel[i] % width
         u, v = _uniform(pixel[i], first), _uniform(pixel[i], second)
         for k in range(direction.shape[1]):
-            # Kronecker lattice of the plastic number (Roberts 2018): even for any count.
+            # Kronecker lattice of the plastic number (Roberts 2018): evenly distributed for any number of
+            # samples.
             x = (k * 0.7548776662466927 + u) % 1.0
             y = (k * 0.5698402909980532 + v) % 1.0
             x = (2.0 * (column + x) / width - 1.0) * high * width / height
@@ -158,15 +163,15 @@ def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore
 
 
 def _salt(seed: int, number: int) -> np.uint64:
-    """Return a salt for the random numbers of a seed and pass."""
+    """Return a hash of (seed, number); the random numbers of `_uniform` depend on it."""
     word = (seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF
-    # An array: arithmetic on single numbers warns of overflow.
+    # Hash an array, because NumPy scalars warn of overflow.
     return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)
 
 
 @inner
 def _uniform(pixel, salt):  # type: ignore[no-untyped-def]
-    """Return a uniform number of a pixel."""
+    """Return a random number, uniform in [0, 1), from a pixel's number and a salt."""
     return np.float64(mix64(np.uint64(pixel + 1) * np.uint64(0x9E3779B97F4A7C15) ^ salt) >> np.uint64(11)) * (
         1.0 / 9007199254740992.0
     )

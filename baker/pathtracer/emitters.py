@@ -1,11 +1,13 @@
 """The emissive triangles of a scene, for the path tracer.
 
-This search is independent of `lights.emissive.build_emitters`, so that an emitter missed by the bake is still
-in the reference. Which triangles emit, their area, radiance, sides and power are computed here from the
-resolved materials. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`. The parts
-determine where samples are taken; the radiance of a point is looked up in the material.
+This module does not use `lights.emissive.build_emitters`, so that an emitter which the bake misses is still
+in the reference. It computes from the resolved materials which triangles emit, and their area, radiance,
+sides and power. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`. The parts
+change sampling densities only: the radiance of a point is looked up in the material.
 
-    power = pi area L (twice that if two-sided)      L: luminance, or mean of RGB of a textured part
+    power = pi area L, twice that if two-sided
+
+L is the luminance of the radiance; for a part of a textured triangle it is the mean of R, G and B.
 """
 
 from __future__ import annotations
@@ -20,37 +22,48 @@ from baker.core.geometry import Geometry
 from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, Parts, brightness, cut
 
-# Columns of an emitter, which is a triangle or a part of one: three corners, face normal, area, 1 if
-# two-sided, chance to be chosen, radiance without texture, 1 if it has a texture, and its position in its
-# triangle: barycentrics b1, b2 of corner 0 and size, negative if turned (0, 0, 1: all of it).
+# Columns of an emitter, which is a triangle of the scene or a part of one:
+#
+#     EMITTER_CORNER      positions of the three corners, metres (9)
+#     EMITTER_NORMAL      unit face normal (3)
+#     EMITTER_AREA        m2
+#     EMITTER_TWO_SIDED   1 if both sides emit, else 0
+#     EMITTER_CHANCE      probability with which it is chosen
+#     EMITTER_RADIANCE    radiance without texture, cd/m2 (3)
+#     EMITTER_TEXTURED    1 if it has a texture, else 0
+#     EMITTER_PART        position in the scene's triangle: barycentrics b1, b2 of its corner 0; edge length
+#                         as a share of the triangle's, negative if rotated by 180 degrees. It is (0, 0, 1)
+#                         for a whole triangle
 EMITTER_CORNER, EMITTER_NORMAL, EMITTER_AREA, EMITTER_TWO_SIDED, EMITTER_CHANCE = 0, 9, 12, 13, 14
 EMITTER_RADIANCE, EMITTER_TEXTURED, EMITTER_PART = 15, 18, 19
 EMITTER_COLUMNS = 24
-# Parts that textured triangles may be cut into: four times as many as in bakes, which average each part.
+# Number of parts that cutting textured triangles may add: four times as many as in bakes, which use the mean
+# radiance of each part.
 MAX_PARTS = 131072
-# Parts at most a texel wide and this share of the scene's diagonal are not cut further.
+# Share of the scene's diagonal: parts that are smaller and at most one texture texel wide are not cut
+# further.
 _SMALL = 1.0 / 128.0
-# Cells along the longest axis of the grid that orders emitters in space.
+# Number of cells, less one, along the longest axis of the grid of `_spatial_order`.
 _CELLS = 1023.0
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
 
 class FoundEmitters(NamedTuple):
-    """E emitters of a scene of T triangles, neighbours in space after each other.
+    """E emitters of a scene of T triangles, ordered along a Morton curve.
 
     Attributes
     ----------
     row : (E, 24) float64
-        See the column names; chances are still 0.
+        Columns: `EMITTER_CORNER` to `EMITTER_PART`. EMITTER_CHANCE is still 0.
     triangle : (E,) int32
-        The scene's triangle that each is, or is a part of.
+        For each emitter, the triangle of the scene that it is, or is a part of.
     power : (E,) float64
-        lm.
+        Power of each emitter, lm.
     code : (T,) int32
-        Code of each triangle of the scene: its row, -1 if it emits nothing, -2 - k for the parts in
-        `node[k]`.
+        For each triangle of the scene: m >= 0 if it is emitter m; -1 if it emits nothing; -2 - k if it is
+        divided into the parts `node[k]`.
     node : (K, 4) int32
-        Codes of the four parts of each subdivision, see `kernels.emitters.emitter_at`.
+        For each division, the codes of its four parts, see `kernels.emitters.emitter_at`.
     """
 
     row: NDArray[np.float64]
@@ -61,20 +74,21 @@ class FoundEmitters(NamedTuple):
 
 
 def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PARTS) -> FoundEmitters:
-    """Find the triangles that emit.
+    """Find the triangles that emit, and divide textured ones into parts.
 
     Parameters
     ----------
     geometry : Geometry
-        Triangles, relative to its origin.
+        The scene's triangles.
     shading : Shading
-        Their materials.
+        The materials of the triangles.
     max_parts : int
-        Parts that textured triangles may be cut into, beside one for each.
+        Number of parts that cutting textured triangles may add.
 
     Returns
     -------
     FoundEmitters
+        The emitters; their positions are relative to the geometry's origin.
     """
     emits = (shading.emission.max(axis=1, initial=0.0) > 0)[geometry.material] & (geometry.area > 0)
     has_texture = (shading.emission_texture >= 0)[geometry.material]
@@ -84,7 +98,7 @@ def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PAR
     part = np.concatenate([np.tile([0.0, 0.0, 1.0], (len(whole), 1)), parts.inside])
     radiance = shading.emission[geometry.material[whole]].astype(np.float64)
     level = np.concatenate([radiance @ _LUMINANCE, brightness(parts.mean)])
-    # Codes of whole triangles, then of parts.
+    # Number untextured triangles first, then the parts of textured ones.
     code = np.full(len(geometry.triangle), -1, np.int32)
     code[whole] = np.arange(len(whole))
     code[image] = np.where(parts.root >= 0, parts.root + len(whole), parts.root)
@@ -106,20 +120,20 @@ def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PAR
     row[:, EMITTER_RADIANCE : EMITTER_RADIANCE + 3] = shading.emission[material]
     row[:, EMITTER_TEXTURED] = shading.emission_texture[material] >= 0
     row[:, EMITTER_PART : EMITTER_PART + 3] = part[order]
-    # Map numbers before ordering to rows; emitters without power are left out.
+    # Replace each emitter's number by its row after sorting; emitters without power get -1.
     rank = np.full(len(power) + 1, -1, np.int32)
     rank[order] = np.arange(len(order))
     code, node = (
         np.where(numbers >= 0, rank[np.maximum(numbers, -1)], numbers).astype(np.int32)
         for numbers in (code, node)
     )
-    # Single precision, as triangles have it.
+    # Round power to float32, the precision of the triangles.
     power = power[order].astype(np.float32).astype(np.float64)
     return FoundEmitters(row, triangle.astype(np.int32), power, code, node.reshape(-1, 4))
 
 
 def _cut(geometry: Geometry, shading: Shading, image: NDArray[np.int64], max_parts: int) -> Parts:
-    """Divide the textured triangles `image` (n,)."""
+    """Divide the textured triangles with indices `image` (n,) into parts."""
     if not len(image):
         none = np.zeros(0, np.int64)
         empty = np.zeros((0, 3))
@@ -135,7 +149,10 @@ def _cut(geometry: Geometry, shading: Shading, image: NDArray[np.int64], max_par
 def _corners(
     geometry: Geometry, triangle: NDArray[np.int64], part: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return the corners (m, 3, 3), metres, of parts (m, 3) of triangles (m,)."""
+    """Return the corners (m, 3, 3) float32, metres, of m parts.
+
+    triangle : (m,) int64, the scene's triangle of each part; part : (m, 3) float64, see `EMITTER_PART`
+    """
     corner = geometry.position[geometry.triangle[triangle]].copy()
     cut_off = np.flatnonzero(part[:, 2] != 1.0)
     whole, inside = corner[cut_off].astype(np.float64), part[cut_off]
@@ -147,7 +164,7 @@ def _corners(
 
 
 def _spatial_order(centre: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the order (n,) of points (n, 3) along a Morton curve; ties keep their order."""
+    """Return the order (n,) of points (n, 3) along a Morton curve; points of one cell keep their order."""
     if not len(centre):
         return np.zeros(0, np.int64)
     cell = (centre - centre.min(axis=0)) / max(float(np.ptp(centre, axis=0).max()), 1e-12)

@@ -1,9 +1,9 @@
 """Estimators of the rendering equation, by name, and the options of paths that each sets.
 
-With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit lights at random; `light` samples lights from
-every vertex; `mis` combines both by multiple importance sampling; `bdpt` connects paths from the eye with
-paths from lights. Lights without area cannot be hit, so every estimator samples them, or starts paths at
-them.
+With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit emitters and the sky at random. `light` samples
+a light at every vertex. `mis` and `mis-power` combine both techniques by multiple importance sampling. `bdpt`
+connects paths from the eye with paths from lights. Paths cannot hit lights without area, so every estimator
+samples these lights or starts paths at them.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.
@@ -18,21 +18,24 @@ from baker.core.names import unknown_name
 
 
 class Estimator(NamedTuple):
-    """The options of a path.
+    """How an estimator samples directions and lights.
 
     Attributes
     ----------
     hemisphere : int
-        0: directions follow the BSDF; 1: uniform over the hemisphere; 2: cosine over it.
+        Distribution of directions. 0: proportional to the BSDF; 1: uniform over the hemisphere; 2:
+        cosine-weighted.
     aim : int
-        Sampling of lights with area and the sky: 0 never; 1 at every vertex, and emission that paths hit is
-        ignored; 2 combined with hits by MIS.
+        Sampling of emitters and the sky. 0: never. 1: at every vertex; light that paths hit is then added
+        only if the camera sees it directly or in mirrors. 2: at every vertex, combined with hits by MIS.
     strata : int
-        1: the first two random pairs of a pass's samples are a scrambled (0,2)-sequence.
+        1 if the light pair and the direction pair of each path's first vertex are stratified: over the
+        samples of a pass, each pair is a scrambled (0,2)-sequence.
     power : int
-        MIS by the power heuristic (exponent 2) instead of the balance heuristic.
+        1 for the power heuristic of MIS (exponent 2), 0 for the balance heuristic.
     both : int
-        1: a second path starts at a light, and the two are connected in all ways (`bidirectional`).
+        1 if a second path starts at a light and every vertex of one path is connected to every vertex of the
+        other (`bidirectional`).
     """
 
     hemisphere: int
@@ -51,12 +54,13 @@ class PassOptions:
     estimator : str
         A key of `ESTIMATORS`.
     stratify : bool
-        Stratify the first directions at points of surfaces, even if the estimator does not.
+        Whether paths from surface points are stratified (`Estimator.strata`) even if the estimator does not
+        ask for it.
     max_bounces : int or None
-        Reflections before light arrives at a point, or between light and the first surface that a camera
-        sees; None is unlimited.
+        Largest number of reflections between the light and the surface point, or between the light and the
+        first surface that a camera sees. None: no limit.
     seed : int
-        Of all random numbers.
+        Seed of all random numbers.
     """
 
     estimator: str = "mis"
@@ -76,9 +80,11 @@ class PathSettings(NamedTuple):
     hemisphere, aim, strata, power : int
         See `Estimator`.
     max_bounces : int
-        -1: no limit.
+        See `PassOptions`; -1: no limit.
     seed : int
+        Seed of all random numbers.
     number_of_pass : int
+        Number of the pass, from 0.
     salt : int
         `rng.seed_salt` of the seed.
     """
@@ -106,7 +112,7 @@ ESTIMATORS = {
 
 
 def estimator_named(name: str) -> Estimator:
-    """Return an estimator.
+    """Return the estimator with a name.
 
     Parameters
     ----------
@@ -121,7 +127,7 @@ def estimator_named(name: str) -> Estimator:
     Raises
     ------
     SettingsError
-        If there is none of that name.
+        If no estimator has that name.
     """
     if name not in ESTIMATORS:
         raise unknown_name("estimator", name, ESTIMATORS, object="estimator")

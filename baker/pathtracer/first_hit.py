@@ -42,20 +42,21 @@ class FirstHits:
     Attributes
     ----------
     triangle : (n,) int32
-        -1 without a hit.
+        The triangle that was hit, -1 without a hit.
     bary : (n, 2) float64
-        Barycentrics: weights of corners 1 and 2.
+        Barycentrics of the hit: weights of corners 1 and 2.
     depth : (n,) float64
-        Metres along the ray, inf without a hit.
+        Distance of the hit, metres; inf without a hit.
     albedo : (n, 3) float64
+        Base colour with texture and vertex colour, linear Rec.709; 0 without a hit.
     position : (n, 3) float64
-        Metres, relative to the geometry's origin.
+        Position of the hit, metres, relative to the geometry's origin; undefined without a hit.
     normal, face_normal : (n, 3) float64
-        Unit, on the viewer's side; 0 without a hit.
+        Unit shading normal and geometric normal, on the viewer's side; 0 without a hit.
     front : (n,) bool
-        The front of the triangle was hit.
+        Whether the front of the triangle was hit.
     lit : (n,) bool
-        The side that was hit reflects: a front, or either side of a two-sided surface.
+        Whether the side that was hit reflects light: a front, or either side of a two-sided surface.
     kept : (n, 3) float64
         Transmittance of the `BLEND` surfaces along the ray.
     """
@@ -75,21 +76,21 @@ class FirstHits:
 def first_hits(
     reference: Reference, origin: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> FirstHits:
-    """Trace rays from one point, or each from its own.
+    """Trace n rays to their first hits.
 
     Parameters
     ----------
     reference : Reference
         The scene.
     origin : (3,) or (n, 3) float64
-        Metres, relative to the geometry's origin.
+        One origin for all rays, or one for each ray; metres, relative to the geometry's origin.
     direction : (n, 3) float64
-        Unit, world.
+        Unit directions, world.
 
     Returns
     -------
     FirstHits
-        Of the n rays.
+        The first hits of the n rays.
     """
     n = len(direction)
     triangle, bary = np.full(n, -1, np.int32), np.zeros((n, 2))
@@ -117,10 +118,10 @@ def first_hits(
 
 @kernel
 def _meet(origin, direction, buffers, surface, material, shading, triangle, bary, depth, albedo, kept):  # type: ignore[no-untyped-def]
-    """Trace n rays in packets and write their hits.
+    """Trace n rays in packets, and write their hits to the outputs.
 
-    origin, direction : (n, 3) float64; buffers : `PacketBuffers`; surface : (T, 32), material : (M, 8)
-        float32
+    origin, direction : (n, 3) float64; buffers : `PacketBuffers`
+    surface : (T, 32), material : (M, 8) float32, see `Surfaces`; shading : `Shading`
     triangle (n,) int32; bary (n, 2), depth (n,), albedo, kept (n, 3) float64 : outputs, see `FirstHits`
     """
     width, scene, intersect = buffers.width, buffers.scene, buffers.intersect

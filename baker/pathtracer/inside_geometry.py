@@ -1,7 +1,7 @@
-"""Whether points are inside geometry, by the bake's rule with independent rays.
+"""Find points inside geometry, by the same rule as the bake but with different rays.
 
-A point is inside geometry if enough of its rays hit a solid from inside, or all rays hit such a side or a
-black back.
+A point is inside geometry if at least `PROOF` of its rays hit a solid from inside. It is also inside if every
+ray hits either a solid from inside or a black back.
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ from baker.kernels.probe import BLACK_BACK, PROOF, SOLID_BACK, SOLID_FRONT
 from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.scene import Reference
 
-# Rays for each point.
+# Number of rays from each point.
 RAYS = 8
 
 
 class Views(NamedTuple):
-    """Counts of rays from n points that hit a solid from inside, and that hit a black back.
+    """What the rays from n points hit.
 
     Attributes
     ----------
     rays : int
-        Of each point.
-    inside, black : (n,) int64
+        Number of rays from each point.
+    inside : (n,) int64
+        Number of each point's rays that hit a solid from inside.
+    black : (n,) int64
+        Number of each point's rays that hit a black back.
     """
 
     rays: int
@@ -35,17 +38,17 @@ class Views(NamedTuple):
 
 
 def is_inside_geometry(views: Views) -> NDArray[np.bool_]:
-    """Return which points are inside geometry.
+    """Return which of n points are inside geometry.
 
     Parameters
     ----------
     views : Views
-        Of n points.
+        What the rays from the points hit.
 
     Returns
     -------
     (n,) bool
-        True inside geometry.
+        True for points inside geometry.
     """
     found: NDArray[np.bool_] = (views.inside >= PROOF) | (views.inside + views.black == views.rays)
     return found
@@ -58,29 +61,29 @@ def look_around(
     rays: int,
     random: np.random.Generator,
 ) -> Views:
-    """Cast cosine-weighted rays from points.
+    """Cast cosine-weighted rays from n points, and count those that hit a solid from inside or a black back.
 
     Parameters
     ----------
     reference : Reference
-        Built with `find_solids=True`.
+        The scene, built with `find_solids=True`.
     origin : (n, 3) float64
-        Metres, relative to the geometry's origin.
+        Points, metres, relative to the geometry's origin.
     normal : (n, 3) float64
-        Unit, world.
+        Normals at the points, unit, world.
     rays : int
-        For each point.
+        Number of rays from each point.
     random : Generator
-        Of the directions.
+        Generator of the random directions.
 
     Returns
     -------
     Views
-        Of the n points.
+        The counts of each point.
     """
     inside, black = np.zeros(len(origin), np.int64), np.zeros(len(origin), np.int64)
     for _ in range(rays):
-        # Add a point of the unit sphere to the normal.
+        # The normal plus a random unit vector, normalized, is cosine-weighted.
         ball = random.standard_normal((len(origin), 3))
         direction = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)

@@ -1,9 +1,10 @@
 """Irradiance and ambient occlusion at points of surfaces, in passes, with standard errors.
 
-    E = pi mean(L of a white Lambertian point)    AO = share of cosine-weighted rays without a hit
+    E = pi mean(L)        L: radiance of a white Lambertian surface at the point, one sample
+    AO                    share of cosine-weighted rays without a hit
 
-A pass is a fixed number of samples of every point. Passes are independent, so the standard error of their
-mean follows from their variance, however the samples of a pass are distributed.
+A pass is a fixed number of samples at every point. The samples of a pass may be stratified, but passes are
+independent. So the standard error of the mean over passes follows from the variance between passes.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from baker.pathtracer.rng import seed_salt
 from baker.pathtracer.scene import Reference
 from baker.trace.packets import arguments_of
 
+# Number of points of a tile.
 _TILE = 128
 
 
@@ -48,18 +50,18 @@ def irradiance_pass(
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Of (n, 3); changed in place. The pass traced is `estimate.rounds`.
+        Estimate of n points, 3 channels; changed in place. The number of the pass is `estimate.rounds`.
     position : (n, k, 3) float64
-        Metres, relative to the geometry's origin: k positions of each point, such as points in a texel's
-        area. The samples of a point take them in turn.
+        For each point, k positions, metres, relative to the geometry's origin, for example points in the
+        area of a texel. Sample s of pass p, with S samples per pass, starts at position (p S + s) modulo k.
     normal : (n, k, 3) float64
-        Shading normals, unit, world.
+        Shading normals at the positions, unit, world.
     face_normal : (n, k, 3) float64
-        Geometric normals, unit, world, on the side at which light arrives.
+        Geometric normals at the positions, unit, world, on the side at which light arrives.
     options : PassOptions
-        Estimator, stratification, number of reflections and seed.
+        Estimator, stratification, limit of reflections and seed.
     chosen : (m,) int64, optional
-        Only these points, all by default.
+        Indices of the points to sample; by default all points.
     progress : Progress
         Called with stage, fraction and detail.
     """
@@ -75,7 +77,7 @@ def irradiance_pass(
         out = np.zeros((end - begin, 3))
         points = (position[rows], normal[rows], face_normal[rows])
         if estimator.both:
-            # Imported here: other estimators do not load its kernels.
+            # Import here, so that other estimators do not load these kernels.
             from baker.pathtracer.bidirectional_pass import surface_tile
 
             counted[begin // _TILE] = surface_tile(reference, points, begin, sobol_points, settings, out)
@@ -106,24 +108,24 @@ def ambient_occlusion_pass(
     seed: int = 0,
     progress: Progress = silent,
 ) -> None:
-    """Add one pass of ambient occlusion (1: no hits) to an estimate.
+    """Add one pass of ambient occlusion, 0 to 1 (1: no ray has a hit), to an estimate.
 
     Parameters
     ----------
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Of (n, 1); changed in place.
+        Estimate of n points, 1 channel; changed in place. The number of the pass is `estimate.rounds`.
     position : (n, k, 3) float64
-        See `irradiance_pass`.
+        Positions of each point, see `irradiance_pass`.
     normal : (n, k, 3) float64
-        See `irradiance_pass`.
+        Shading normals, see `irradiance_pass`.
     face_normal : (n, k, 3) float64
-        See `irradiance_pass`.
+        Geometric normals, see `irradiance_pass`.
     distance : float
-        Largest distance of hits, metres; may be inf.
+        Length of the rays, metres; may be inf.
     seed : int
-        Of all random numbers.
+        Seed of all random numbers.
     progress : Progress
         Called with stage, fraction and detail.
     """
@@ -150,7 +152,8 @@ def ambient_occlusion_pass(
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 
-    # Large tiles hold more neighbours; small ones keep threads from waiting at the end.
+    # If points are dense, use larger tiles, because more neighbours of a point are then in its own tile. The
+    # limits keep at least 32 tiles, so that threads rarely wait for the last tile.
     tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
     run_tiles(
         len(position), tile, work, threads=reference.threads, stage=Stage.AMBIENT_OCCLUSION, progress=progress

@@ -1,13 +1,13 @@
 """The table of all lights that paths sample: emitters, lights without area, the sky.
 
-A light is chosen with a fixed probability. One half of the total probability is distributed by power. The
-other half is divided equally among groups (all emitters, each light without area, the sky), so that weak
-lights have enough samples beside a sun. Each estimate is divided by the probability of its light, so its
-expectation does not depend on the probabilities.
+Each light is chosen with a fixed probability. Half of the total probability is distributed in proportion to
+power. The other half is divided equally among groups: all emitters, each light without area, the sky. So weak
+lights get enough samples beside a strong one such as the sun. Each estimate is divided by the probability of
+its light, so that its expectation does not depend on the probabilities.
 
-The files of `baker.lights.kinds` supply lights without area as `EmissionProfile`s. Kernels
-distinguish four forms of profile: even, cone, parallel, and tabulated. A light whose fall-off is none of the
-first three is a table, which the kernels interpolate; new kinds of light need no change here.
+The modules of `baker.lights.kinds` describe lights without area as `EmissionProfile`s. Kernels distinguish
+four forms of profile: even, cone, parallel and tabulated. A profile that has none of the first three forms is
+a table of fall-off values, which the kernels interpolate. So new kinds of light need no change in this file.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.
@@ -42,9 +42,20 @@ from baker.pathtracer.emitters import (
 from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# Columns of a light without area: form of its profile; position and axis; intensity; smallest cosine to the
-# axis and cone scale, see `EmissionProfile`; chance to be chosen; 1 / range^2; tangent; start of its table in
-# `LightTable.falloff`, and the table's numbers of cosines and azimuths.
+# Columns of a light without area, from its `EmissionProfile`:
+#
+#     DELTA_FORM            form of the profile, see below
+#     DELTA_POSITION        metres, relative to the geometry's origin; 0 for parallel light (3)
+#     DELTA_AXIS            unit direction in which the light shines (3)
+#     DELTA_INTENSITY       cd, or lx for parallel light (3)
+#     DELTA_MIN_COSINE      cosine of the largest angle to the axis
+#     DELTA_CONE_SCALE      cone_scale; 0 if None
+#     DELTA_CHANCE          probability with which the light is chosen
+#     DELTA_INVERSE_RANGE   1 / range^2, 1/m2; 0 without a range
+#     DELTA_TANGENT         unit direction of azimuth 0, if tabulated (3)
+#     DELTA_TABLE           index of its table's first number in `LightTable.falloff`
+#     DELTA_COSINES         number of the table's rows
+#     DELTA_AZIMUTHS        number of the table's columns
 DELTA_FORM, DELTA_POSITION, DELTA_AXIS, DELTA_INTENSITY, DELTA_MIN_COSINE, DELTA_CONE_SCALE = (
     0,
     1,
@@ -56,54 +67,60 @@ DELTA_FORM, DELTA_POSITION, DELTA_AXIS, DELTA_INTENSITY, DELTA_MIN_COSINE, DELTA
 DELTA_CHANCE, DELTA_INVERSE_RANGE, DELTA_TANGENT = 12, 13, 14
 DELTA_TABLE, DELTA_COSINES, DELTA_AZIMUTHS = 17, 18, 19
 DELTA_COLUMNS = 20
-# Forms of a profile, in DELTA_FORM.
+# Values of DELTA_FORM.
 EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
-# Columns of any light in single precision, as `vertex_simd` takes it.
-#   ROW_ORIGIN    corner 0 of an emitter, position, or direction towards parallel light
-#   ROW_EDGE      edges from corner 0 of an emitter; else 0
-#   ROW_NORMAL    normal of an emitter, axis of a light without area
-#   ROW_GAIN      area / chance of an emitter, 1 / chance of other lights
-#   ROW_TWO_SIDED 1 for two-sided emitters; lights without area have ROW_INVERSE_RANGE in this column
-#   ROW_KIND      see below
+# Columns of any light in `LightTable.row`, which `vertex_simd` reads:
+#
+#     ROW_ORIGIN          corner 0 of an emitter, position of a light, or direction towards parallel light (3)
+#     ROW_EDGE            the two edges at corner 0 of an emitter; 0 for other lights (6)
+#     ROW_NORMAL          unit normal of an emitter, axis of a light without area (3)
+#     ROW_GAIN            area / probability of an emitter; 1 / probability of other lights
+#     ROW_TWO_SIDED       1 for two-sided emitters
+#     ROW_INVERSE_RANGE   1 / range^2 of a light without area; shares the column of ROW_TWO_SIDED
+#     ROW_MIN_COSINE      DELTA_MIN_COSINE of a light without area
+#     ROW_CONE_SCALE      DELTA_CONE_SCALE of a light without area
+#     ROW_RADIANCE        radiance of an emitter without texture or of the sky; intensity of other lights (3)
+#     ROW_KIND            see below
 ROW_ORIGIN, ROW_EDGE, ROW_NORMAL, ROW_GAIN, ROW_TWO_SIDED = 0, 3, 9, 12, 13
 ROW_MIN_COSINE, ROW_CONE_SCALE, ROW_RADIANCE, ROW_KIND = 14, 15, 16, 19
 ROW_INVERSE_RANGE = ROW_TWO_SIDED
 ROW_COLUMNS = 20
-# Kinds of row. `vertex_simd` takes kinds below KIND_PARALLEL as lights at a finite distance. It first
-# multiplies the gain of a tabulated light by its fall-off, and then treats the light as KIND_EVEN.
+# Values of ROW_KIND. `vertex_simd` treats kinds below KIND_PARALLEL as lights at a finite distance. It
+# multiplies the gain of a tabulated light by its fall-off first, and then treats the light as KIND_EVEN.
 KIND_EMITTER, KIND_EVEN, KIND_CONE, KIND_PARALLEL, KIND_SKY, KIND_TABULATED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ROW_KIND = {EVEN: KIND_EVEN, CONE: KIND_CONE, PARALLEL: KIND_PARALLEL, TABULATED: KIND_TABULATED}
-# Columns of the sky: radiance, chance.
+# Columns of the sky: radiance, cd/m2 (3); probability with which it is chosen.
 SKY_RADIANCE, SKY_CHANCE = 0, 3
-# Rays to parallel light and to the sky have length FAR. Rays to other lights end at the share SHORT of the
-# distance.
+# Length of rays to parallel light and to the sky, metres; length of rays to other lights, as a share of the
+# distance to the light.
 FAR = 1.0e30
 SHORT = 0.9999
 
 
 class LightTable(NamedTuple):
-    """E emitters, P lights without area, and the sky: lights are numbered in this order.
+    """All lights that paths sample, numbered in this order: E emitters, P lights without area, the sky.
 
     Attributes
     ----------
     emitter : (E, 24) float64
-        See `emitters`.
+        Emitters. Columns: see `emitters`.
     delta : (P, 20) float64
-        Lights without area, see the column names.
+        Lights without area. Columns: `DELTA_FORM` to `DELTA_AZIMUTHS`.
     triangle : (E,) int32
-        The scene's triangle of each emitter.
+        For each emitter, the triangle of the scene that it is, or is a part of.
     code : (T,) int32
-        Code of each triangle of the scene, see `FoundEmitters`.
+        For each triangle of the scene, the code of its emitters, see `FoundEmitters`.
     node : (K, 4) int32
-        See `FoundEmitters`.
+        Codes of the parts of divided triangles, see `FoundEmitters`.
     cumulative : (E + P + 1,) float64
-        Sums of the chances; the last is 1, or 0 if nothing emits.
+        Cumulative probabilities of the lights. The last is 1, or 0 if nothing emits.
     sky : (4,) float64
-        Radiance, cd/m2, and chance.
+        Radiance of the sky, cd/m2, and its probability.
     row : (E + P + 1, 20) float32
-        All lights, see the column names.
+        All lights. Columns: `ROW_ORIGIN` to `ROW_KIND`.
     falloff : (N,) float32
-        Tables of the profiles, one after another; each has a row for each cosine, a column for each azimuth.
+        Fall-off tables of tabulated profiles, one after another. A table has one row for each cosine and one
+        column for each azimuth.
     textured : int
         1 if any emitter has a texture.
     """
@@ -128,22 +145,23 @@ def build_light_table(
     Parameters
     ----------
     scene : Scene
-        Its lights without area.
+        The scene; only its lights without area are read.
     geometry : Geometry
         The scene's triangles.
     shading : Shading
-        Their materials.
+        The materials of the triangles.
     sky : tuple of 3 float
         Radiance of the constant sky, cd/m2, linear Rec.709.
 
     Returns
     -------
     LightTable
+        All lights, with their probabilities.
 
     Raises
     ------
     InputError
-        If a light's kind has no record or no `EmissionProfile`.
+        If the kind of a light is unknown, or has no `EmissionProfile`.
     """
     found = find_emitters(geometry, shading)
     emitter, n = found.row, len(found.row)
@@ -168,11 +186,11 @@ def build_light_table(
 def _without_area(
     lights: tuple[PunctualLight, ...], disc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """Return the rows (P, 20), power (P,) and tables (N,) of lights without area; leave out black lights.
+    """Return `delta` (P, 20), power (P,), lm, and `falloff` (N,) of lights without area.
 
-    The column DELTA_CHANCE is still 0.
+    Black lights are left out. The column DELTA_CHANCE is still 0.
 
-    disc : float, m2, area of a disc as wide as the scene
+    disc : float, m2, area of a disc whose diameter is the scene's diagonal
     """
     profiles = [(light, _profile(light)) for light in lights]
     shining = [(light, profile) for light, profile in profiles if max(light.intensity) > 0]
@@ -197,7 +215,7 @@ def _without_area(
 
 
 def _profile(light: PunctualLight) -> EmissionProfile:
-    """Return the profile of a light; raise InputError if its kind has none."""
+    """Return the emission profile of a light; raise InputError if its kind has none."""
     kind = kind_of(light)
     if kind.emission is None or not kind.delta:
         message = f"the path tracer has no kernels for {kind.name} lights; leave it out"
@@ -206,7 +224,7 @@ def _profile(light: PunctualLight) -> EmissionProfile:
 
 
 def _form(profile: EmissionProfile) -> float:
-    """Return the number of the form of a profile."""
+    """Return the form of a profile, a value of DELTA_FORM."""
     if profile.position is None:
         return PARALLEL
     if profile.table is not None:
@@ -217,20 +235,21 @@ def _form(profile: EmissionProfile) -> float:
 def light_rows(
     emitter: NDArray[np.float64], delta: NDArray[np.float64], sky: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return all lights in the columns that `vertex_simd` takes.
+    """Return all lights in the layout that `vertex_simd` reads.
 
     Parameters
     ----------
     emitter : (E, 24) float64
-        See `LightTable`.
+        Emitters, see `LightTable`.
     delta : (P, 20) float64
-        See `LightTable`.
+        Lights without area, see `LightTable`.
     sky : (4,) float64
-        See `LightTable`.
+        The sky, see `LightTable`.
 
     Returns
     -------
     (E + P + 1, 20) float32
+        `LightTable.row`.
     """
     n, p = len(emitter), len(delta)
     row = np.zeros((n + p + 1, ROW_COLUMNS))
@@ -260,7 +279,11 @@ def light_rows(
 
 
 def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.float64]:
-    """Return probabilities: half by power over all, half equally among groups (inside a group by power)."""
+    """Return the probability (n,) of each of n lights with power (n,); all 0 if no light has power.
+
+    Half of the total is distributed in proportion to power. The other half is divided equally among the
+    groups that have power and, inside a group, in proportion to power.
+    """
     total = power.sum()
     if not total > 0:
         return np.zeros(len(power))
@@ -273,7 +296,7 @@ def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.floa
 
 @inner
 def pick_light(cumulative, u):  # type: ignore[no-untyped-def]
-    """Return the number of the light that the uniform number u falls on.
+    """Return the number of the light chosen by the random number u in [0, 1).
 
     cumulative : (n,) float64, see `LightTable`
     """
@@ -290,7 +313,10 @@ def pick_light(cumulative, u):  # type: ignore[no-untyped-def]
 
 @inner
 def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the point of emitter e at barycentrics; emitter : (E, 24) float64, see `emitters`."""
+    """Return the point of emitter e at barycentrics (b0, b1, b2): three floats, metres.
+
+    emitter : (E, 24) float64, see `emitters`
+    """
     return (
         b0 * emitter[e, EMITTER_CORNER]
         + b1 * emitter[e, EMITTER_CORNER + 3]
@@ -306,12 +332,12 @@ def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the vector from (x, y, z) to a uniform point of emitter e: dx, dy, dz, density, b1, b2.
+    """Sample a point uniformly on emitter e; return the vector d to it, its density and its barycentrics.
 
-    The density is per steradian and contains the emitter's probability; 0 if the side that faces the point
-    does not emit.
+    Returns dx, dy, dz in metres, from (x, y, z) to the point; density; b1, b2. The density is per steradian
+    and includes the emitter's probability. It is 0 if the side that faces (x, y, z) does not emit.
 
-    emitter : (E, 24) float64, see `emitters`; u, w : uniform numbers
+    emitter : (E, 24) float64, see `emitters`; u, w : random numbers in [0, 1)
     """
     b1, b2 = triangle_barycentric(np.float32(u), np.float32(w))
     px, py, pz = point_on_emitter(emitter, e, 1.0 - b1 - b2, b1, b2)
@@ -322,7 +348,7 @@ def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
 
 @inner
 def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
-    """Return barycentrics of the scene's triangle from those of emitter e, which may be a part of it.
+    """Convert barycentrics (b1, b2) of emitter e to those of the scene's triangle of which it is a part.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -332,9 +358,12 @@ def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the density per steradian with which the point of emitter e at the end of d is sampled.
+    """Return the density per steradian with which light sampling finds the point of emitter e at vector d.
 
-    emitter : (E, 24) float64, see `emitters`
+    The density includes the emitter's probability. It is 0 if the side that faces the origin of d does not
+    emit.
+
+    emitter : (E, 24) float64, see `emitters`; dx, dy, dz : metres, vector to the point
     """
     square = dx * dx + dy * dy + dz * dz
     if square <= 0.0:
@@ -354,12 +383,12 @@ def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @inner
 def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the direction from (x, y, z) to a light without area, its distance, irradiance per intensity.
+    """Return the unit direction (3 floats) from (x, y, z) to light e without area, ray length, irradiance.
 
-    The direction is unit; the distance, metres, is slightly shorter than that to the light; the irradiance is
-    that of a surface facing the light.
+    The ray length, metres, is slightly shorter than the distance to the light. The irradiance is that of a
+    surface that faces the light, divided by the light's intensity.
 
-    lights : `LightTable`
+    lights : `LightTable`; e : row of `LightTable.delta`
     """
     delta = lights.delta
     if delta[e, DELTA_FORM] == PARALLEL:
@@ -378,7 +407,10 @@ def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
 
 @inner
 def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
-    """Return clamp(1 - (r / range)^4, 0, 1) for r^2 and 1 / range^2 (0: no range)."""
+    """Return clamp(1 - (r / range)^4, 0, 1).
+
+    square : r^2, m2; inverse_range : 1 / range^2, 1/m2; 0 without a range
+    """
     share = square * inverse_range
     return max(1.0 - share * share, 0.0)
 
@@ -401,19 +433,20 @@ def falloff(lights, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @inner
 def tabulated(table, delta, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Interpolate the table of light e bilinearly; 0 outside its cone.
+    """Return the fall-off of the tabulated light e, interpolated bilinearly; 0 outside its cone.
 
-    table : (N,) float32, `LightTable.falloff`; delta : (P, 20) float64; d : unit direction from the light
+    table : (N,) float32, `LightTable.falloff`; delta : (P, 20) float64, see `LightTable`
+    cosine : cosine of d to the light's axis; dx, dy, dz : unit direction d from the light
     """
     low = delta[e, DELTA_MIN_COSINE]
     rows, columns = np.int64(delta[e, DELTA_COSINES]), np.int64(delta[e, DELTA_AZIMUTHS])
     if cosine < low:
         return 0.0
-    # Row: cosine to the axis.
+    # Row of the table, from the cosine to the axis.
     r = min(max((cosine - low) / max(1.0 - low, 1.0e-12), 0.0), 1.0) * (rows - 1)
     i = min(np.int64(r), rows - 2)
     r -= i
-    # Column: azimuth from the tangent towards axis x tangent.
+    # Column of the table, from the azimuth, which increases from the tangent towards axis x tangent.
     start = np.int64(delta[e, DELTA_TABLE]) + i * columns
     j = next_j = np.int64(0)
     q = 0.0

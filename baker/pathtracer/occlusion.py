@@ -1,8 +1,9 @@
 """Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
 
-Packets have the same sample of eight neighbouring points, with the same first random bits. Rays of points
-close together are then nearly parallel, and Embree traces such a packet as coherent. Loops over lanes access
-one array each, so that the compiler vectorizes them (see `path_blocks`).
+A packet holds one ray from each of eight neighbouring points, all with the same sample number. The leading
+bits of their random numbers are the same for all points (`shared`), so that the rays of points close together
+are nearly parallel. Embree traces such a packet as coherent. Each loop over lanes accesses one array, so that
+the compiler vectorizes it (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """
@@ -36,25 +37,28 @@ _f = np.float32
 _w = np.uint32
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = BLOCK_WIDTH
-# A packet is coherent if its rays start within this share of their length, or of the scene's size, which is
-# `_FAR` * min_offset_scale.
+# A packet is traced as coherent if the extent of its origins is at most `_ALIKE` times a length: the ray
+# length or, if that is smaller, `_FAR` times `Surfaces.min_offset_scale`, a tenth of the scene's diagonal.
 _ALIKE, _FAR = _f(0.125), _f(100.0)
-# Number of points that `are_dense` examines.
+# Approximate number of points that `are_dense` examines.
 _LOOK = 128
-# Numbers of ten bits with two zeros between any two bits.
+# For each number of ten bits, the number with two zeros inserted between any two of its bits.
 _SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
 
 
 def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.float32:
-    """Return the largest extent, metres, of the points of a coherent packet.
+    """Return the largest extent, metres, of the ray origins of a packet that is traced as coherent.
 
-    max_distance, min_offset_scale : float, metres, see `Surfaces`
+    max_distance : metres, length of the rays; min_offset_scale : metres, see `Surfaces`
     """
     return np.float32(_ALIKE * min(max_distance, _FAR * min_offset_scale))
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Return whether most points (n, 3) are closer than `alike` to the next one: then sorting saves time."""
+    """Return whether most of the examined points (n, 3) are closer than `alike`, metres, to their successor.
+
+    Sorting the points by `near_together` saves time only in that case.
+    """
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
     return bool(2 * np.count_nonzero(step < alike) > len(first))
@@ -66,15 +70,15 @@ def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
     side = max(float((position.max(axis=0) - low).max()), 1.0e-30)
     cell = ((position - low) * ((len(_SPREAD) - 0.5) / side)).astype(np.int64)
     key = _SPREAD[cell[:, 0]] | _SPREAD[cell[:, 1]] << 1 | _SPREAD[cell[:, 2]] << 2
-    # Sort keys that contain the index: several times faster than argsort.
+    # Each key contains the index of its point, because `np.sort` is faster than `np.argsort`.
     return np.sort(key << 32 | np.arange(len(position))) & 0xFFFFFFFF
 
 
 @inner
 def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
-    """Write the two scramble seeds of points `group` to `group` + 8.
+    """Write the two scramble seeds of points `group` to `group` + 7, to rows CHOICE and LOBE.
 
-    words : block, uint32; name : (m,) int64, see `open_rays`
+    words : block, uint32; name : (m,) int64, number, salt : see `open_rays`
     """
     for lane in range(min(BLOCK_WIDTH, len(name) - group)):
         words[KEY * _L + lane] = name[group + lane]
@@ -85,9 +89,12 @@ def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def
 
 @inner
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
-    """Write the lanes' uniform numbers, in [1, 2): shared bits of (first, second), the other bits scrambled.
+    """Write a pair of random numbers in [1, 2) for each lane, to rows U_DIRECTION and W_DIRECTION.
 
-    words : block, uint32; first, second, shared : uint32
+    The bits of `shared` are those of (first, second), the other bits are scrambled with the lane's seeds.
+
+    words : block, uint32; first, second : uint32, a bit-reversed Sobol point
+    shared : uint32, see `open_rays`
     """
     one, bits, own = _w(0x3F800000), _w(9), _w(~shared)
     for lane in range(BLOCK_WIDTH):
@@ -103,9 +110,9 @@ def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
 
 @inner
 def copy_points(s, position, normal, face_normal, group, k):  # type: ignore[no-untyped-def]
-    """Copy position k of points `group` to `group` + 8 into the lanes.
+    """Copy position k and its normals, of points `group` to `group` + 7, into the lanes.
 
-    s : block, float32; position, normal, face_normal : (m, k, 3) float64
+    s : block, float32; position, normal, face_normal : (m, n_positions, 3) float64, see `open_rays`
     """
     for lane in range(min(BLOCK_WIDTH, len(position) - group)):
         for a in range(3):
@@ -116,7 +123,10 @@ def copy_points(s, position, normal, face_normal, group, k):  # type: ignore[no-
 
 @inner
 def extent(s, lanes):  # type: ignore[no-untyped-def]
-    """Return the largest extent along an axis, metres, of the first lanes' origins; s : block, float32."""
+    """Return the largest extent, metres, along any axis, of the ray origins of the first `lanes` lanes.
+
+    s : block, float32
+    """
     most = _ZERO
     for a in range(3):
         low = high = s[(ORG_X + a) * _L]
@@ -128,7 +138,9 @@ def extent(s, lanes):  # type: ignore[no-untyped-def]
 
 @inner
 def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
-    """Write cosine-weighted directions; those below the triangle count as occluded.
+    """Write a cosine-weighted ray direction of length `max_distance` to each lane.
+
+    `ALIVE` becomes 0 for directions below the triangle, which `count_lanes` treats as occluded, else 1.
 
     s : block, float32
     """
@@ -155,7 +167,10 @@ def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
 
 @inner
 def count_lanes(s):  # type: ignore[no-untyped-def]
-    """Add 1 to `VALUE` of each lane whose ray has no hit; s : block, float32."""
+    """Add 1 to `VALUE` of each lane whose ray has no hit and points above the triangle.
+
+    s : block, float32
+    """
     for lane in range(BLOCK_WIDTH):
         s[VALUE * _L + lane] += s[ALIVE * _L + lane] if s[TFAR * _L + lane] >= _ZERO else _ZERO
 
@@ -177,16 +192,20 @@ def open_rays(  # type: ignore[no-untyped-def]
     salt,
     out,
 ):
-    """Count the rays of m points without a hit within `max_distance`.
+    """Cast n cosine-weighted rays from each of m points, and add the number without a hit to `out`.
 
-    position, normal, face_normal : (m, k, 3) float64; sample s of pass p starts at position (p n + s) modulo
-        k; rays are fastest if neighbours follow each other
-    name : (m,) int64, numbers of the points for random numbers; memory : `PathMemory`
-    arguments : (2, 5) int64, `arguments_of` of incoherent and of coherent packets
-    sobol_points : (n, 2) uint32; shared : uint32, mask of the bits that all points share
-    max_distance, alike : float32, metres, see `alike_within`
+    position, normal, face_normal : (m, k, 3) float64, k positions of each point with shading and geometric
+        normals. Sample s of pass p starts at position (p n + s) modulo k. Tracing is fastest if consecutive
+        points are close together
+    name : (m,) int64, numbers of the points, for their random numbers
+    memory : `PathMemory`
+    arguments : (2, 5) int64, `arguments_of` incoherent and coherent packets
+    sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
+    shared : uint32, mask of the bits of bit-reversed random numbers that are the same for all points
+    max_distance : float32, metres, length of the rays
+    alike : float32, metres, largest extent of a coherent packet's origins, see `alike_within`
     sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.default_size`
-    number : the pass; salt : `seed_salt`; out : (m, 1) float64, output
+    number : number of the pass; salt : `seed_salt` of the seed; out : (m, 1) float64, output
     """
     scene, occluded = memory.scene, memory.occluded
     on, s, words = memory.on, memory.s, memory.words

@@ -1,9 +1,10 @@
-"""Blocks of eight paths, in which the paths of a tile are stored between two rays.
+"""Blocks of eight paths: the memory layout of all paths of a tile.
 
-A block is a ray packet, followed by further rows of eight numbers. Rays are traced and shaded in place. All
-rows of a block are at constant offsets in one array, since the compiler vectorizes loops over lanes only if
-it can prove that rows do not overlap, and loops of eight only if they access a single array. Slots of ended
-paths are filled with paths of the last blocks, so that packets stay full.
+A block is a ray packet of width 8, followed by further rows of eight numbers. A lane is one column of a block
+and holds one path. Rays are traced and shaded in place. All rows are at constant offsets in one array, for
+two reasons. The compiler vectorizes loops over lanes only if it can prove that rows do not overlap. It
+vectorizes loops of eight only if they access a single array. Lanes of ended paths are refilled with paths
+from the last blocks, so that packets stay full.
 
 Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van
 Antwerpen, Improving SIMD efficiency for parallel Monte Carlo light transport on the GPU, 2011 (compaction).
@@ -35,27 +36,39 @@ from baker.trace.packets import (
 )
 from baker.trace.pointers import prefetch
 
-# Paths in a block, blocks of a tile.
+# Number of paths in a block, and number of blocks of a tile.
 BLOCK_WIDTH, BLOCKS = 8, 32
 _L = BLOCK_WIDTH
-# Rows after those of the packet. State of a path: throughput; density of the direction, per steradian (0: no
-# MIS weight for emission); its cosine to the shading normal; bounces (-1 before the hit of a camera ray);
-# point in the tile; 1 for a path. As uint32: point, sample, twice the number of vertices.
+# Rows after those of the packet. State of a path:
+#
+#     BETA      throughput (3)
+#     DENSITY   density, per steradian, of the ray's direction; 0 if emission at its hit gets no MIS weight
+#     COSINE    cosine of the ray's direction to the shading normal at its origin
+#     BOUNCES   number of reflections; -1 before the first hit of a camera ray
+#     POINT     row of the path's point in the tile's sums
+#     ALIVE     1 if the lane holds a path, else 0
+#     KEY       uint32: number of the point, for random numbers
+#     SAMPLE    uint32: number of the sample
+#     COUNT     uint32: twice the number of vertices so far
 BETA, DENSITY, COSINE, BOUNCES, POINT, ALIVE = (ROWS + i for i in (0, 3, 4, 5, 6, 7))
 KEY, SAMPLE, COUNT = ROWS + 8, ROWS + 9, ROWS + 10
-# At a vertex: albedo, geometric normal on the side that was hit, shading normal, tangent, bitangent.
+# At a vertex (3 rows each): albedo; unit geometric normal, on the side that was hit; unit shading normal;
+# tangent; bitangent.
 ALBEDO, NORMAL, SHADED, TANGENT, BITANGENT = (ROWS + i for i in (11, 14, 17, 20, 23))
-# Uniform numbers, in [1, 2): two pairs (light, direction), and one for Russian roulette. As uint32: those
-# that choose a light and a lobe.
+# Random numbers, float32, uniform in [1, 2): a pair for the point on a light, a pair for the next direction,
+# and one for Russian roulette. As uint32: random numbers that choose a light (CHOICE) and a lobe (LOBE).
 U_LIGHT, W_LIGHT, U_DIRECTION, W_DIRECTION, ROULETTE = (ROWS + i for i in (26, 27, 28, 29, 30))
 CHOICE, LOBE = ROWS + 31, ROWS + 32
-# Ray to a light: direction, length, contribution if unblocked, barycentrics of its end.
+# Ray to a light: unit direction (3), length in metres, contribution if nothing blocks it (3), barycentrics of
+# its end on an emitter.
 TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
-# Copies of the hit triangle's first columns and of the chosen light's row.
+# Copies of the hit triangle's columns in `Surfaces.row` up to TWO_SIDED (23), and of the chosen light's row
+# in `LightTable.row` (20).
 TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
 BLOCK = N_ROWS * _L
-# Packets of pending shadow rays, by light; after the rows of the rays: contribution, point.
+# Number of packets of pending shadow rays; rays to the same light share a packet. Rows after those of a ray:
+# contribution if nothing blocks the ray (3), `POINT` of its path.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 
@@ -65,11 +78,20 @@ _f = np.float32
 class PathMemory(NamedTuple):
     """An Embree scene and the memory of one thread for paths.
 
-    scene, intersect, occluded : RTCScene, rtcIntersect8 and rtcOccluded8
-    on (8,) int32 : lanes to trace
-    s (BLOCKS * BLOCK,) float32, words (the same as uint32) : blocks
-    bins (BINS * BIN_ROWS * 8,) float32 : packets of shadow rays
-    blend : see `PacketBuffers.blend`
+    Attributes
+    ----------
+    scene, intersect, occluded : int
+        Addresses of the RTCScene, rtcIntersect8 and rtcOccluded8.
+    on : (8,) int32
+        -1 for lanes to trace, 0 for others.
+    s : (BLOCKS * BLOCK,) float32
+        Blocks.
+    words : (BLOCKS * BLOCK,) uint32
+        The memory of `s`, viewed as uint32.
+    bins : (BINS * BIN_ROWS * 8,) float32
+        Packets of shadow rays.
+    blend : BlendBuffers or None
+        See `PacketBuffers`.
     """
 
     scene: int
@@ -83,7 +105,7 @@ class PathMemory(NamedTuple):
 
 
 def new_path_memory(rays: RayScene) -> PathMemory:
-    """Return aligned memory; rows that kernels do not change are set: time and tnear 0, the mask."""
+    """Return memory at multiples of 64 bytes, in which rays have time 0, tnear 0 and all mask bits set."""
     on, s = aligned_floats(BLOCK_WIDTH).view(np.int32), aligned_floats(BLOCKS * BLOCK)
     bins = aligned_floats(BINS * BIN_ROWS * _L)
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT
@@ -96,21 +118,24 @@ def new_path_memory(rays: RayScene) -> PathMemory:
 
 @inner
 def unsigned(index):  # type: ignore[no-untyped-def]
-    """Return an index below 2^32 as a value that the compiler can prove to be non-negative: no wraparound."""
+    """Return an index below 2^32 as an int64 that the compiler can prove to be non-negative.
+
+    The compiler then omits the code for negative indices.
+    """
     return np.int64(np.uint32(index))
 
 
 @inner
 def lane_start(lane):  # type: ignore[no-untyped-def]
-    """Return the index of a lane's first row; lanes are numbered through all blocks."""
+    """Return the index in `s` of a lane's number in row 0; lanes are numbered through all blocks."""
     return unsigned(lane // BLOCK_WIDTH * BLOCK + lane % BLOCK_WIDTH)
 
 
 @inner
 def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
-    """Multiply the lanes' throughput by the transmittance of their rays.
+    """Multiply the throughput of a block's lanes by the transmittance of `BLEND` surfaces along their rays.
 
-    s : blocks, float32; on : (8,) int32, lanes to trace
+    s : blocks, float32; base : index of the block's first number; on : (8,) int32, see `PathMemory`
     """
     if blend is None:
         return
@@ -122,11 +147,12 @@ def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
 
 @inner
 def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surface):  # type: ignore[no-untyped-def]
-    """Trace the rays of the first blocks and prefetch the rows, two cache lines each, of the hit triangles.
+    """Trace the rays of the first `blocks` blocks, and prefetch the rows of the hit triangles.
 
-    Shading starts when all blocks are traced; the rows are in the cache then.
+    Shading starts after all blocks are traced, when the rows have arrived in the cache.
 
-    s, words : blocks; on : (8,) int32, working memory; surface : (T, 32) float32, see `Surfaces`
+    s, words : blocks; on : (8,) int32, working memory
+    surface : (T, 32) float32, see `Surfaces`; a row is two cache lines
 
     Returns
     -------
@@ -154,7 +180,7 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
 
 @inner
 def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
-    """Move paths from the last blocks into the gaps of the first; return the number of blocks left.
+    """Move paths from the last blocks into free lanes of the first ones; return the number of blocks in use.
 
     s : blocks, float32
     """

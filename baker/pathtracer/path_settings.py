@@ -1,7 +1,7 @@
-"""The settings of a pass, as an argument of kernels.
+"""Settings of a pass as a tuple of integers, the argument of kernels.
 
-They are not in `estimators`, so that the command line can read the names of estimators without loading
-kernels.
+This function is not in `estimators`, so that the command line can import the names of estimators without
+loading kernels.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from baker.pathtracer.rng import seed_salt
 def path_settings(
     estimator: Estimator, strata: int | bool, options: PassOptions, number: int
 ) -> PathSettings:
-    """Return the settings of a pass for kernels.
+    """Return the settings of a pass in the form that kernels take.
 
     Parameters
     ----------
     estimator : Estimator
-        Its `strata` is replaced by the next parameter.
+        Options of its paths; `strata` of the estimator is ignored.
     strata : int or bool
         Whether the first two random pairs of a path are stratified.
     options : PassOptions
-        Number of reflections and seed.
+        The limit of reflections and the seed.
     number : int
-        The pass.
+        Number of the pass.
 
     Returns
     -------
     PathSettings
-        All numbers are int, so that kernels are compiled once.
+        All fields are int, so that Numba compiles each kernel once.
     """
     return PathSettings(
         estimator.hemisphere,

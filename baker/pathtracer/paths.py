@@ -1,12 +1,12 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Path tracing in blocks of eight paths; paths that end are replaced, so that ray packets stay full.
+"""Path tracing in blocks of eight paths. New paths replace ended ones, so that ray packets stay full.
 
     L = L_e + integral f L cos        one estimate for each path; Russian roulette ends paths without bias
 
-Lambertian vertices are shaded in float32 by vector code (`vertex_simd`), others one at a time in float64
-(`vertex`); light is summed in float64. The random numbers of a path depend on (seed, pass, point, sample)
-only, and its light is added to the sum of its point in a fixed order inside a tile, so that results do not
-depend on the number of threads. `tests/path_tracer.py` has a plain path tracer that computes the same.
+Lambertian vertices are shaded in float32, eight at a time (`vertex_simd`). Other vertices are shaded in
+float64, one at a time (`vertex`). Light is summed in float64. Results do not depend on the number of threads:
+the random numbers of a path depend on (seed, pass, point, sample) only, and the light of a tile's paths is
+added in a fixed order. `tests/path_tracer.py` is an independent path tracer for Lambertian surfaces.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 9 and 10.
@@ -97,10 +97,10 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_H
 
 _f = np.float32
 _L = BLOCK_WIDTH
-# Up to this number of lights, a light is chosen by comparing with all; beyond, by binary search.
+# Number of cumulative probabilities up to which a light is chosen by linear search; above it, binary search.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
-# Working memory of a tile.
+# Stack arrays of `trace_paths`.
 _new_path, _new_row = (
     scratch((N_ROWS, BLOCK_WIDTH), np.float64),
     scratch((N_PARAMETERS, BLOCK_WIDTH), np.float64),
@@ -111,11 +111,12 @@ _new_light, _new_filled = scratch((BLOCK_WIDTH,), np.int64), scratch((BINS,), np
 
 @inner
 def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
-    """Write to `value` (3,) the light of the emissive triangle that a path hit, with its MIS weight.
+    """Write the MIS-weighted light of the emissive triangle `prim`, which the lane's path hit, to `value`.
 
-    The caller multiplies by the texture.
+    The caller multiplies `value` by the emission texture.
 
-    s : blocks; surface : (T, 32) float32; lights : `LightTable`; value : (3,) float64, output
+    s : blocks, float32; base : index of the block's first number
+    surface : (T, 32) float32, see `Surfaces`; lights : `LightTable`; value : (3,) float64, output
     mode, power : `Estimator.aim` and `.power`
     """
     value[0] = value[1] = value[2] = 0.0
@@ -145,9 +146,9 @@ def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
 
 @inner
 def see_sky(s, base, lane, sky, mode, power, value):
-    """Write to `value` (3,) the light of the sky for a path that leaves the scene, with its MIS weight.
+    """Write the MIS-weighted light of the sky to `value`, for a lane whose path left the scene.
 
-    s : blocks; sky : (4,) float64, see `LightTable`; value : (3,) float64, output
+    s : blocks, float32; sky : (4,) float64, see `LightTable`; value : (3,) float64, output
     """
     value[0] = value[1] = value[2] = 0.0
     weight = 1.0
@@ -162,10 +163,11 @@ def see_sky(s, base, lane, sky, mode, power, value):
 
 @inner
 def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):
-    """Start eight paths at white Lambertian points, whose radiance is E / pi, or as rays.
+    """Start paths `following` to `following` + 7 in a block, at surface points or as camera rays.
 
-    s, words : blocks; where, toward, normal : (m, k, 3) float64, see `trace_paths`
-    following : number of the first path; first : number of the first sample of the pass
+    s, words : blocks, float32 and uint32; base : index of the block's first number
+    where, toward, normal : (m, k, 3) float64; begin, at_surface : see `trace_paths`
+    samples : number of samples per point in a pass; first : number of the pass's first sample
     """
     base = unsigned(base)
     m, n_positions = len(toward), toward.shape[1]
@@ -173,7 +175,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
         if following + lane >= m * samples:
             s[base + ALIVE * _L + lane] = _f(0.0)
             continue
-        # Lanes hold neighbouring points with the same sample.
+        # Neighbouring lanes hold the same sample of neighbouring points.
         sample = (following + lane) // m
         i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % n_positions)
         here = i if len(where) == m else 0
@@ -193,7 +195,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
 
 @inner
 def fetch_lanes(s, words, base, surface, material):
-    """Copy the hit triangles' rows and base colours into the lanes.
+    """Copy the rows and base colours of the triangles that the lanes' rays hit into the block.
 
     s, words : blocks; surface : (T, 32), material : (M, 8) float32, see `Surfaces`
     """
@@ -220,7 +222,7 @@ def choose_lights(s, words, base, lights, light):
         if len(cumulative) > _FEW:
             e = pick_light(cumulative, choice)
         else:
-            # The same without unpredictable branches.
+            # Linear search without unpredictable branches.
             for k in range(len(cumulative) - 1):
                 e += 1 if cumulative[k] <= choice else 0
         light[lane] = e
@@ -232,9 +234,10 @@ def choose_lights(s, words, base, lights, light):
 
 @inner
 def turn_alone(path, row, lane, s, words, base, hemisphere, value):
-    """Sample the next direction of one lane's path, or end the path.
+    """Sample the next direction of one lane's path, or end the path; apply Russian roulette.
 
     path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; value : (3,) float64, working memory
+    hemisphere : `Estimator.hemisphere`
     """
     choice = np.float64(words[base + LOBE * _L + lane]) * _INV_2_32
     u, w = (
@@ -259,9 +262,12 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):
 
 @inner
 def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
-    """Sample a ray to one light from one lane's vertex; return the light's index, or -1 without light.
+    """Choose a light and sample a ray to it from one lane's vertex, by `vertex.aim`; write it to the block.
+
+    Returns the light's number, or -1 if the contribution is 0.
 
     path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; lights : `LightTable`
+    mode, power : `Estimator.aim` and `.power`
     value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
     """
     choice = np.float64(words[base + CHOICE * _L + lane]) * _INV_2_32
@@ -290,21 +296,22 @@ def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
 def trace_paths(
     where, toward, normal, begin, at_surface, surfaces, lights, shading, memory, sobol_points, settings, out
 ):
-    """Add the light of all paths to the sums of m points; return the numbers of rays.
+    """Trace n paths for each of m points, add their light to `out`, and return the numbers of rays.
 
-    where, toward, normal : (m, k, 3) float64; position, shading normal and geometric normal, or ray origin
-        and direction (`normal` unused) if not `at_surface`; sample s of pass p uses number (p n + s) modulo
-        k; `where` may be (1, 1, 3)
-    begin : number of the first point
+    where, toward, normal : (m, k, 3) float64, k starts for each point. If `at_surface`: position, shading
+        normal and geometric normal. Else: origin and direction of a ray, `normal` unused. Sample s of pass p
+        takes start (p n + s) modulo k. `where` may be (1, 1, 3), one origin for all rays
+    begin : number of the first point, for its random numbers
     surfaces : `Surfaces`; lights : `LightTable`; shading : `Shading`; memory : `PathMemory`
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     settings : `PathSettings`
-    out : (m, 3) float64, sums of radiance; at a surface of the radiance E / pi of a white one
+    out : (m, 3) float64, sums of radiance along the rays. At a surface point, radiance is E / pi, that of a
+        white Lambertian surface
 
     Returns
     -------
     tuple of int
-        Closest-hit and shadow rays cast.
+        Number of closest-hit rays and number of shadow rays.
     """
     scene, intersect, occluded, blend = memory.scene, memory.intersect, memory.occluded, memory.blend
     on, s, words, bins = memory.on, memory.s, memory.words, memory.bins
@@ -315,7 +322,7 @@ def trace_paths(
         surfaces.lambertian,
     )
     emitter, triangle, sky, n_lights = lights.emitter, lights.triangle, lights.sky, len(lights.cumulative)
-    # Look textures up only if there are any: of emitters, of surfaces.
+    # Whether emitters need texture or alpha lookups; whether surfaces need texture or vertex colour lookups.
     textured = len(shading.alpha.slot) > 0 or lights.textured != 0
     painted = surfaces.painted != 0
     hemisphere, mode, strata, power = settings.hemisphere, settings.aim, settings.strata, settings.power
@@ -326,11 +333,12 @@ def trace_paths(
     samples, m, n_positions = len(sobol_points), toward.shape[0], toward.shape[1]
     total = m * samples
     following = rays = shadows = 0
-    # Number of blocks in use; the next block to shade. A round of shading starts when all blocks are traced.
+    # Number of blocks in use, and index of the next block to shade. Shading starts after all blocks are
+    # traced.
     blocks = block = 0
     traced = False
     while True:
-        # Take the next traced block; without one, trace all blocks or start paths in a new block
+        # Take the next traced block. If none is left, trace all blocks or start paths in a new block
         met = block < blocks
         if met:
             base = unsigned(block * BLOCK)
@@ -425,7 +433,7 @@ def trace_paths(
                     paint(row, lane, shading, prim, u, v, material, rgba)
                     for c in range(3):
                         s[base + (ALBEDO + c) * _L + lane] = row[c, lane]
-        # Make vertices, and aim at one light from each
+        # Set up vertices, and sample a ray to one light from each
         if vectorized:
             if met:
                 arrive_lanes(s, base, _f(min_offset_scale))

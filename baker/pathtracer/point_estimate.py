@@ -1,4 +1,4 @@
-"""Means over passes with their standard errors, for points that take different numbers of passes."""
+"""Means over passes and their standard errors, for points whose numbers of passes differ."""
 
 from __future__ import annotations
 
@@ -12,20 +12,27 @@ SAMPLES_PER_PASS = 16
 
 @dataclass
 class PointEstimate:
-    """Means over passes; points may have different numbers of passes, and passes may be added.
+    """Means over passes of C values at n points. Points may have different numbers of passes.
+
+    A pass estimates the mean of `samples` samples at some of the points. Index 0 of the first axis below
+    holds even passes, index 1 odd passes.
 
     Attributes
     ----------
-    total, squares : (2, n, C) float64
-        Sums of the passes' means and of their squares, of even and of odd passes.
+    total : (2, n, C) float64
+        Sum of the passes' means.
+    squares : (2, n, C) float64
+        Sum of the squares of the passes' means.
     count : (2, n) int64
-        Even and odd passes of each point.
+        Number of passes of each point.
     samples : int
-        Samples of a point in each pass.
+        Number of samples of a point in each pass.
     rounds : int
         Number of the next pass.
-    rays, segments : int
-        All rays cast, and the closest-hit rays of paths alone.
+    rays : int
+        Number of all rays cast.
+    segments : int
+        Number of closest-hit rays of paths.
     """
 
     total: NDArray[np.float64]
@@ -44,14 +51,14 @@ class PointEstimate:
 
     @property
     def standard_error(self) -> NDArray[np.float64]:
-        """Return the standard error (n, C) of the estimate; inf after less than two passes."""
+        """Return the standard error (n, C) of the estimate; inf with fewer than two passes."""
         n = self.count.sum(axis=0)[:, None].astype(np.float64)
         variance = (self.squares.sum(axis=0) / np.maximum(n, 1) - self.mean**2) / np.maximum(n - 1, 1)
         error: NDArray[np.float64] = np.where(n > 1, np.sqrt(np.maximum(variance, 0.0)), np.inf)
         return error
 
     def half(self, which: int) -> NDArray[np.float64]:
-        """Return the mean (n, C) of the even (0) or odd (1) passes: two independent references."""
+        """Return the mean (n, C) of the even (`which` = 0) or odd (1) passes, which are independent."""
         mean: NDArray[np.float64] = self.total[which] / np.maximum(self.count[which], 1)[:, None]
         return mean
 
@@ -62,11 +69,11 @@ def new_estimate(n: int, channels: int, samples: int = SAMPLES_PER_PASS) -> Poin
     Parameters
     ----------
     n : int
-        Points.
+        Number of points.
     channels : int
-        C, numbers for each point.
+        C, number of values at each point.
     samples : int
-        Samples of a point in each pass.
+        Number of samples of a point in each pass.
 
     Returns
     -------
@@ -78,16 +85,18 @@ def new_estimate(n: int, channels: int, samples: int = SAMPLES_PER_PASS) -> Poin
 
 
 def add_pass(estimate: PointEstimate, rows: NDArray[np.int64] | slice, mean: NDArray[np.float64]) -> None:
-    """Add the means of a pass to an estimate; the caller increments `rounds` after all points.
+    """Add the means of a pass at some points to an estimate.
+
+    The caller increments `estimate.rounds` after it has added all points of the pass.
 
     Parameters
     ----------
     estimate : PointEstimate
         Changed in place.
     rows : (m,) int64 or slice
-        The points.
+        Indices of the points.
     mean : (m, C) float64
-        Their means over this pass.
+        Means of the points' samples in this pass.
     """
     half = estimate.rounds % 2
     estimate.total[half, rows] += mean

@@ -17,6 +17,7 @@ from baker.pathtracer.paths import trace_paths
 from baker.pathtracer.point_estimate import PointEstimate, add_pass
 from baker.pathtracer.scene import Reference
 
+# Number of pixels of a tile.
 _TILE = 512
 
 
@@ -37,7 +38,7 @@ def radiance_pass(
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Of (height * width, 3) values, cd/m2, row 0 on top; changed in place.
+        Estimate of height * width pixels, 3 channels; row 0 of the picture is on top. Changed in place.
     camera : Camera
         The camera, in world space.
     width : int
@@ -45,14 +46,14 @@ def radiance_pass(
     height : int
         Height of the picture, pixels.
     options : PassOptions
-        Estimator, number of reflections beyond the first, and seed.
+        Estimator, limit of reflections between a light and the first surface that the camera sees, and seed.
     progress : Progress
         Called with stage, fraction and detail.
 
     Raises
     ------
     SettingsError
-        If there is no such estimator.
+        If no estimator has the name `options.estimator`.
     Cancelled
         If `progress` returned a truthy value.
     """
@@ -61,7 +62,7 @@ def radiance_pass(
     sobol_points = sobol_reversed(samples, options.seed, 1 + number)
     settings = path_settings(estimator, estimator.strata, options, number)
     if estimator.both:
-        # Import here, so that other estimators do not load its kernels.
+        # Import here, so that other estimators do not load these kernels.
         from baker.pathtracer.bidirectional_pass import picture_pass
 
         picture_pass(reference, estimate, camera, (width, height), sobol_points, settings, progress)

@@ -1,7 +1,8 @@
-"""Random numbers of a path, which depend on (seed, pass, point, sample) and on the vertex only.
+"""Random numbers of paths. They depend on seed, pass, point, sample and number of the vertex only.
 
-`draw`: SplitMix64 from a state made of these. `random_lanes`: a hash of them and of the number of the vertex,
-for eight paths at once; it multiplies 32-bit numbers only, which SIMD instructions do eight at a time.
+`draw` returns the next number of a SplitMix64 generator, whose state `path_state` computes from (seed, pass,
+point, sample). `random_lanes` hashes (seed, pass, point, sample, vertex) for eight paths at once. It
+multiplies 32-bit integers only, because SIMD instructions multiply eight of them at a time.
 
 Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014; Jarzynski and Olano,
 Hash functions for GPU rendering, 2020 (pcg4d).
@@ -37,7 +38,7 @@ _INV_2_53 = 1.0 / 9007199254740992.0
 
 @inner
 def mix64(x):  # type: ignore[no-untyped-def]
-    """Return a well-mixed uint64 of a uint64."""
+    """Return a hash (uint64) of a uint64: the output function of SplitMix64."""
     x = _u(x ^ (x >> _u(30)))
     x = _u(x * _u(0xBF58476D1CE4E5B9))
     x = _u(x ^ (x >> _u(27)))
@@ -47,7 +48,7 @@ def mix64(x):  # type: ignore[no-untyped-def]
 
 @inner
 def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
-    """Return the state (uint64) of sample `sample` of point `point` in pass `number`."""
+    """Return the initial generator state (uint64) of sample `sample` of point `point` in pass `number`."""
     x = mix64(_u(_u(seed) + _STEP))
     x = mix64(_u(x ^ _u(_u(number) + _u(1)) * _u(0xD1342543DE82EF95)))
     x = mix64(_u(x ^ _u(_u(point) + _u(1)) * _u(0x2545F4914F6CDD1D)))
@@ -56,16 +57,22 @@ def path_state(seed, number, point, sample):  # type: ignore[no-untyped-def]
 
 @inner
 def draw(state, lane):  # type: ignore[no-untyped-def]
-    """Advance `state` (16,) uint64 of a lane and return a float64 in [0, 1)."""
+    """Advance the generator `state[lane]` and return its next number, float64 in [0, 1).
+
+    state : (16,) uint64
+    """
     state[lane] = _u(state[lane] + _STEP)
     return np.float64(mix64(state[lane]) >> _u(11)) * _INV_2_53
 
 
 @inner
 def stratum(sobol_points, sample, point, seed, number_of_pass, pair):  # type: ignore[no-untyped-def]
-    """Return a pair of a (0,2)-sequence that is scrambled independently for each point, pass and pair.
+    """Return point `sample` of a (0,2)-sequence: two float64 in [0, 1).
 
-    sobol_points : (n, 2) uint32
+    The sequence is scrambled independently for each point, pass and `pair`.
+
+    sobol_points : (n, 2) uint32, bit-reversed Sobol points
+    pair : 0 for the pair that samples a light, 1 for the pair that samples a direction
     """
     bits = path_state(seed, number_of_pass, point, _u(1) << _u(40 + pair))
     first = np.uint32(bits & _u(0xFFFFFFFF))
@@ -79,7 +86,7 @@ def stratum(sobol_points, sample, point, seed, number_of_pass, pair):  # type: i
 
 @inner
 def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
-    """Return four well-mixed uint32 of four (pcg4d)."""
+    """Return a hash of four uint32, as four uint32 (pcg4d)."""
     x, y = _w(x * _w(1664525) + _w(1013904223)), _w(y * _w(1664525) + _w(1013904223))
     z, w = _w(z * _w(1664525) + _w(1013904223)), _w(w * _w(1664525) + _w(1013904223))
     x = _w(x + _w(y * w))
@@ -96,17 +103,17 @@ def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
 
 
 def seed_salt(seed: int) -> int:
-    """Return a salt for the random numbers of a seed."""
-    # An array: arithmetic on single numbers warns of overflow.
+    """Return the hash of a seed, below 2^32, that `random_lanes` adds to the number of the vertex."""
+    # Hash an array, because NumPy scalars warn of overflow.
     return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
 
 
 @inner
 def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
-    """Write the lanes' random numbers for their vertices, and increase `COUNT`.
+    """Write the seven random numbers of each lane's next vertex, and add 2 to `COUNT`.
 
-    words : blocks, uint32
-    number : the pass; salt : `seed_salt`
+    words : blocks, uint32, see `path_blocks`
+    base : index of the block's first number; number : number of the pass; salt : `seed_salt` of the seed
     """
     base = unsigned(base)
     number, salt, one, bits = _w(number), _w(salt), _w(0x3F800000), _w(9)
@@ -127,10 +134,13 @@ def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
 
 @inner
 def spread_lanes(words, base, sobol_points, number, salt):  # type: ignore[no-untyped-def]
-    """Replace the pairs of lanes at their path's first vertex by those of scrambled (0,2)-sequences.
+    """Stratify the light pair and the direction pair of paths that are at their first vertex.
 
-    words : blocks, uint32; sobol_points : (n, 2) uint32, scrambled independently for each point, pass and
-        pair
+    Each pair is replaced by a point of a (0,2)-sequence that is scrambled independently for each point, pass
+    and pair.
+
+    words : blocks, uint32, see `path_blocks`; base : index of the block's first number
+    sobol_points : (n, 2) uint32, bit-reversed Sobol points; number, salt : see `random_lanes`
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
@@ -146,5 +156,5 @@ def spread_lanes(words, base, sobol_points, number, salt):  # type: ignore[no-un
 
 @inner
 def scrambled(number, seed):  # type: ignore[no-untyped-def]
-    """Return a scrambled number of a (0,2)-sequence as the bits of a float32 in [1, 2)."""
+    """Scramble a bit-reversed Sobol number with `seed`; return the bits (uint32) of a float32 in [1, 2)."""
     return _w((reverse_bits(scramble_reversed(number, seed)) >> _w(9)) | _w(0x3F800000))

@@ -1,4 +1,4 @@
-"""A scene prepared for path tracing: triangles, materials, lights, a ray tree; no atlas and no lightmap."""
+"""A scene prepared for path tracing: triangles, materials, lights and the Embree scene, without an atlas."""
 
 from __future__ import annotations
 
@@ -22,9 +22,17 @@ from baker.shading.scene_solids import hide_backs
 from baker.trace.embree import RayScene
 from baker.trace.packets import aligned_floats
 
-# Columns of a surface row: three corners, their three shading normals, face normal, material, 1 if two-sided,
-# code of its emitters (`LightTable.code`), 1 if it has a texture or vertex colours, radiance without texture,
-# and whether it emits: 0 no, 1 yes, 2 with a texture.
+# Columns of a triangle in `Surfaces.row`:
+#
+#     CORNER      positions of the three corners, metres (9)
+#     SHADING     shading normals of the three corners (9)
+#     FACE        unit face normal (3)
+#     MATERIAL    row of `Surfaces.material`
+#     TWO_SIDED   1 if two-sided, else 0
+#     EMITTER     code of its emitters, see `LightTable.code`
+#     TEXTURED    1 if a texture or vertex colours change its base colour, metalness or roughness, else 0
+#     EMISSION    radiance without texture, cd/m2 (3)
+#     SHINES      0: it emits nothing; 1: it emits without a texture; 2: it emits with a texture
 CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES = (
     0,
     9,
@@ -36,31 +44,33 @@ CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES 
     25,
     28,
 )
-# Two cache lines.
+# Columns of `Surfaces.row`: 32 float32 fill two cache lines of 64 bytes.
 ROW_LENGTH = 32
-# Columns of a material: base colour, metallic, roughness, 1 if a texture scales the last two.
+# Columns of a material in `Surfaces.material`: base colour (3), metallic, roughness, 1 if a texture scales
+# metallic and roughness. Each row has MATERIAL_LENGTH numbers.
 BASE_COLOUR, MATERIAL_METALLIC, MATERIAL_ROUGHNESS, MATERIAL_TEXTURED, MATERIAL_LENGTH = 0, 3, 4, 5, 8
-# Quantile of triangle sizes that is half of `Surfaces.default_size`.
+# Quantile of the triangle sizes; `Surfaces.default_size` is twice the size at this quantile.
 _SMALL = 0.1
 
 
 class Surfaces(NamedTuple):
-    """Triangles and materials as paths read them at hits.
+    """The T triangles and M materials of a scene, in the layout that kernels read at hits.
 
     Attributes
     ----------
     row : (T, 32) float32
-        See the column names.
+        Triangles. Columns: `CORNER` to `SHINES` of this module.
     material : (M, 8) float32
-        See the column names.
+        Materials. Columns: `BASE_COLOUR` to `MATERIAL_TEXTURED` of this module.
     min_offset_scale : float
-        Metres; coordinates below count as this when origins of rays are offset.
+        Metres: coordinates smaller than this value are replaced by it when the offset of a ray origin is
+        computed, see `vertex.offset_origin`.
     default_size : float
-        Metres; the size of a triangle where it is not known.
+        Metres: triangle size assumed for a ray origin whose triangle is unknown.
     lambertian : int
         1 if all surfaces are Lambertian.
     painted : int
-        1 if any triangle has a texture or vertex colours.
+        1 if `TEXTURED` is 1 for any triangle.
     """
 
     row: NDArray[np.float32]
@@ -73,21 +83,27 @@ class Surfaces(NamedTuple):
 
 @dataclass(frozen=True)
 class Reference:
-    """A scene ready to be path-traced. Close it, or use it as a context manager.
+    """A scene ready to be path-traced. Call `close` after use, or use it as a context manager.
 
     Attributes
     ----------
     geometry : Geometry
-        All that is traced is relative to its `origin`.
+        World-space triangles. All positions in this class are relative to `geometry.origin`.
     shading : Shading
+        Resolved materials and textures.
     surfaces : Surfaces
+        The triangles and materials, in the layout that kernels read.
     lights : LightTable
+        All lights that paths sample.
     rays : RayScene
+        The Embree scene.
     sphere : (4,) float64
-        Centre and radius, metres, of a sphere around everything.
+        Centre and radius, metres, of a sphere that encloses all vertices.
     threads : int
+        Number of threads of a pass.
     hit_kind : (T,) uint8
-        Class of each triangle, see `kernels.probe`; 0 if built without `find_solids`.
+        What a hit on each triangle says about the ray's origin, see `kernels.probe`. All 0 if built without
+        `find_solids`.
     """
 
     geometry: Geometry
@@ -100,13 +116,13 @@ class Reference:
     hit_kind: NDArray[np.uint8]
 
     def __enter__(self) -> Reference:
-        """Return itself."""
+        """Return this object."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Release the ray tree."""
+        """Release the Embree scene."""
         self.close()
 
     def local(self, position: Sequence[float]) -> NDArray[np.float64]:
@@ -114,7 +130,7 @@ class Reference:
         return np.asarray(position, np.float64) - self.geometry.origin
 
     def close(self) -> None:
-        """Release the ray tree; nothing can be traced any more."""
+        """Release the Embree scene. No ray can be traced afterwards."""
         self.rays.close()
 
 
@@ -135,16 +151,16 @@ def build_reference(
     sky : (3,) tuple
         Radiance of the constant sky, cd/m2, linear Rec.709.
     lambertian : bool
-        Every surface is Lambertian with its base colour, as in bakes.
+        Whether all surfaces are treated as Lambertian with their base colour, as in bakes.
     threads : int, optional
-        All cores by default.
+        Number of threads; by default one per core.
     find_solids : bool
-        Classify triangles of solids, for `pathtracer.inside_geometry`.
+        Whether `Reference.hit_kind` is computed, which `pathtracer.inside_geometry` needs.
 
     Returns
     -------
     Reference
-        To be closed after use.
+        The prepared scene; call its `close` after use.
 
     Raises
     ------
@@ -159,13 +175,13 @@ def build_reference(
     surfaces = _surfaces(geometry, shading, lights, lambertian)
     hit_kind = np.zeros(len(geometry.triangle), np.uint8)
     if find_solids:
-        # For `inside_geometry` only: paths take sides of surfaces from the materials.
+        # Only `inside_geometry` reads `hit_kind`; paths take the sides of surfaces from the materials.
         hit_kind = hide_backs(scene, geometry, shading)[1]
     return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, hit_kind)
 
 
 def _no_atlas(scene: Scene) -> Atlas:
-    """Return an atlas without uv: meshes keep their own vertices."""
+    """Return an atlas whose uv are 0 and whose layouts keep the vertices of the meshes."""
     layouts = []
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
@@ -186,16 +202,18 @@ def _no_atlas(scene: Scene) -> Atlas:
 
 
 def _sphere(geometry: Geometry) -> NDArray[np.float64]:
+    """Return `Reference.sphere`: centre and radius (4,), metres, of a sphere that encloses all vertices."""
     if not len(geometry.position):
         return np.array([0.0, 0.0, 0.0, 1.0])
     low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
-    # A little more than half the diagonal, so that discs from which parallel light starts do not touch the
-    # scene.
+    # Slightly more than half the diagonal: parallel light starts on discs of this radius, which must not
+    # touch the scene.
     radius = max(0.501 * float(np.linalg.norm(high - low)), 1e-9)
     return np.array([*(0.5 * (low + high)), radius])
 
 
 def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lambertian: bool) -> Surfaces:
+    """Return triangles and materials in the layout of `Surfaces`."""
     n, material = len(geometry.triangle), geometry.material
     row = aligned_floats(n * ROW_LENGTH).reshape(n, ROW_LENGTH)
     row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
@@ -205,8 +223,8 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
     row[:, TWO_SIDED] = geometry.double_sided
     row[:, EMITTER] = lights.code
     row[:, EMISSION : EMISSION + 3] = shading.emission[material]
-    # From the materials, not from the light table: an emitter missing there is still found by rays that hit
-    # it.
+    # Read emission from the materials, not from the light table: rays that hit an emitter then add its light
+    # even if the light table lacks it.
     emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
     row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
     painted = shading.base_texture >= 0
@@ -227,7 +245,11 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
 
 
 def _small_size(geometry: Geometry) -> float:
-    """Return twice the size, metres, of small triangles: a quantile, to ignore large ones such as a sky."""
+    """Return `Surfaces.default_size`, metres: twice the `_SMALL` quantile of the triangles' sizes.
+
+    The size of a triangle is the largest component of its two edges at corner 0. The quantile ignores large
+    triangles, such as those of a sky dome.
+    """
     if not len(geometry.triangle):
         return 1.0
     corner = geometry.position[geometry.triangle]

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays, collected until they fill a packet: rays to the same light together, from any paths."""
+"""Shadow rays, collected in packets by light. A packet is traced when eight rays of any paths fill it."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _L = BLOCK_WIDTH
 
 @inner
 def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
-    """Trace packet k, add the light of unblocked rays to their points, and empty the packet.
+    """Trace packet k, add the light of its unblocked rays to their points' sums, and empty the packet.
 
-    bins : packets, float32; filled : (BINS,) int64, rays in each; on : (8,) int32, working memory
-
-    blend : of the path memory; out : (m, 3) float64
+    bins : packets, float32, see `PathMemory`; filled : (BINS,) int64, number of rays in each packet
+    occluded, scene, blend : see `PathMemory`; on : (8,) int32, working memory
+    out : (m, 3) float64, sums of m points
     """
     n, start = filled[k], unsigned(k * BIN_ROWS * _L)
     for lane in range(BLOCK_WIDTH):
@@ -49,15 +49,16 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
 @inner
 def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
-    """Append the lanes' rays to lights to packets, grouped by light; trace full packets.
+    """Append the light rays of a block's lanes to the packets of their lights; trace packets that are full.
 
-    s : blocks, float32; bins : packets, float32; on : (8,) int32, working memory; out : (m, 3) float64
-    light : (8,) int64, -1 for none; filled : (BINS,) int64, rays in each packet
+    s : blocks, float32; base : index of the block's first number
+    light : (8,) int64, number of each lane's light, -1 without a ray; n_lights : number of all lights
+    bins, filled, occluded, scene, blend, on, out : see `cast_packet`
 
     Returns
     -------
     int
-        Number of rays, pending ones included.
+        Number of rays appended, whether or not they have been traced.
     """
     base = unsigned(base)
     n = 0

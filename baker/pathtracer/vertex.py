@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Functions for one vertex of a path: set it up at a hit, sample a light, sample the next direction.
 
-Column `lane` of `path` holds the state of a path (see the row names), column `lane` of `row` the BSDF
-parameters of its surface (see `bsdf`). Directions in `path` are in world space, except `TO`, the direction
-back along the path, which is in the frame of the normal.
+Column `lane` of `path` is the state of one path, with the rows below. Column `lane` of `row` is the BSDF
+parameters of the surface at its vertex (see `bsdf`). Directions in `path` are in world space, except `TO`,
+which is in the frame of the shading normal.
 """
 
 from __future__ import annotations
@@ -50,9 +50,19 @@ from baker.pathtracer.scene import (
 )
 from baker.trace.jit import inner
 
-# Rows of a path: position, next direction, throughput, collected light, density of the last direction (0: no
-# MIS weight for emission), geometric normal, frame (tangent, bitangent, shading normal), direction back along
-# the path, bounces, interpolated normal on the side of the geometric one.
+# Rows of `path`:
+#
+#     POSITION    origin of the next ray, metres (3)
+#     GO          unit direction of the next ray (3)
+#     BETA        throughput (3)
+#     COLLECTED   light found so far (3)
+#     DENSITY     density, per steradian, with which GO was sampled; 0 if emission at the next hit gets no MIS
+#                 weight
+#     NORMAL      unit geometric normal, on the side that was hit (3)
+#     FRAME       tangent, bitangent and shading normal (9)
+#     TO          unit direction to the previous vertex, in FRAME (3)
+#     BOUNCES     number of reflections; -1 before the first hit of a camera ray
+#     SHADED      interpolated normal, on the side that was hit (3)
 POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
     0,
     3,
@@ -66,20 +76,26 @@ POSITION, GO, BETA, COLLECTED, DENSITY, NORMAL, FRAME, TO, BOUNCES, SHADED = (
     29,
 )
 N_ROWS = 32
-# A ray to a light: unit direction, length, barycentrics of the point on an emitter.
+# Columns of `ray`, a ray to a light: unit direction (3), length in metres, barycentrics of its end on an
+# emitter.
 RAY_LENGTH, RAY_B1, RAY_B2 = 3, 4, 5
-# Least cosine between interpolated normal and view direction at which glossy lobes use that normal.
+# Cosine between the interpolated normal and the view direction. At smaller cosines, glossy surfaces use the
+# geometric normal instead.
 GRAZE = 1.0e-3
-# Ray origins are offset from the surface by this share of the largest coordinate or of the triangle's size,
-# whichever is less, but at least by sixteen float32 steps of either (as in `kernels.surface`).
+# The offset of a ray origin from its surface is OFFSET times the smaller of two lengths: the largest
+# coordinate, and the size of the triangle. It is at least ROUNDING, sixteen float32 epsilons, times the
+# larger of the two lengths (as in `kernels.surface`).
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# Bounces before Russian roulette starts, and the largest chance to survive.
+# Number of bounces before Russian roulette starts, and upper limit of the survival probability.
 SURE, MOST = 3, 0.98
 
 
 @inner
 def set_frame(path, lane, nx, ny, nz):
-    """Write the frame around a unit shading normal to path (N_ROWS, n) float64."""
+    """Write the tangent frame of the unit shading normal (nx, ny, nz) to `FRAME` of a path.
+
+    path : (N_ROWS, n) float64
+    """
     tx, ty, tz, bx, by, bz = tangent_frame(np.float32(nx), np.float32(ny), np.float32(nz))
     path[FRAME, lane], path[FRAME + 1, lane], path[FRAME + 2, lane] = tx, ty, tz
     path[FRAME + 3, lane], path[FRAME + 4, lane], path[FRAME + 5, lane] = bx, by, bz
@@ -88,7 +104,10 @@ def set_frame(path, lane, nx, ny, nz):
 
 @inner
 def local(path, lane, dx, dy, dz):
-    """Return a world direction in the frame of the vertex in path (N_ROWS, n) float64."""
+    """Return world direction d in the tangent frame of the vertex: three floats.
+
+    path : (N_ROWS, n) float64
+    """
     return (
         dx * path[FRAME, lane] + dy * path[FRAME + 1, lane] + dz * path[FRAME + 2, lane],
         dx * path[FRAME + 3, lane] + dy * path[FRAME + 4, lane] + dz * path[FRAME + 5, lane],
@@ -98,10 +117,11 @@ def local(path, lane, dx, dy, dz):
 
 @inner
 def offset_origin(path, lane, x, y, z, min_offset_scale, size):
-    """Write a ray origin just above the surface point (x, y, z), whose normal is in `path`.
+    """Write the surface point (x, y, z), offset along its geometric normal, to `POSITION` of path.
 
-    path : (N_ROWS, n) float64; min_offset_scale : metres, see `Surfaces`
-    size : metres, of the triangle, or `Surfaces.default_size`
+    path : (N_ROWS, n) float64, with `NORMAL`
+    min_offset_scale : metres, lower limit of the largest coordinate, see `Surfaces`
+    size : metres, size of the triangle, or `Surfaces.default_size` if the triangle is unknown
     """
     far = max(abs(x), abs(y), abs(z))
     off = max(ROUNDING * max(far, size), OFFSET * min(max(far, min_offset_scale), size))
@@ -112,9 +132,9 @@ def offset_origin(path, lane, x, y, z, min_offset_scale, size):
 
 @inner
 def size_of(corner, t):
-    """Return the largest absolute component of the two edges at corner 0 of a triangle, metres.
+    """Return the size of triangle t, metres: the largest absolute component of its two edges at corner 0.
 
-    corner : (T, 9 or more) float32, row t begins with the three corners
+    corner : (T, 9 or more) float32; row t begins with the positions of its three corners
     """
     size = 0.0
     for a in range(3):
@@ -124,11 +144,13 @@ def size_of(corner, t):
 
 @inner
 def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
-    """Start a path at a white Lambertian surface point, whose radiance is E / pi, or with a camera ray.
+    """Start a path at a surface point (`at_surface`), or start a camera ray.
+
+    The surface point is treated as white and Lambertian, so its radiance is E / pi.
 
     path : (N_ROWS, n) float64; row : (5, n) float64
-    where, toward, normal : (3,) float64, position, shading normal, geometric normal; or ray origin,
-        direction, unused
+    where, toward, normal : (3,) float64. At a surface: position, shading normal, geometric normal. For a
+        camera ray: origin, direction, unused
     sizes : `Surfaces.min_offset_scale` and `.default_size`
     """
     for c in range(3):
@@ -153,10 +175,11 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
 
 @inner
 def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lambertian):
-    """Set up the vertex at a hit; return False at the back of a one-sided surface, which is black.
+    """Set up the vertex at a hit on triangle `prim`; return False at the black back of a one-sided surface.
 
-    path : (N_ROWS, n) float64; row : (5, n) float64; surface : (T, 32), material : (M, 8) float32, see
-        `Surfaces`
+    path : (N_ROWS, n) float64, whose `GO` is the direction of the ray; row : (5, n) float64
+    surface : (T, 32), material : (M, 8) float32, see `Surfaces`
+    u, v : barycentrics of the hit; min_offset_scale, lambertian : see `Surfaces`
     """
     b0 = 1.0 - u - v
     dx, dy, dz = path[GO, lane], path[GO + 1, lane], path[GO + 2, lane]
@@ -181,11 +204,12 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
     path[SHADED, lane], path[SHADED + 1, lane], path[SHADED + 2, lane] = nx, ny, nz
     glossy = lambertian == 0
     if glossy and nx * dx + ny * dy + nz * dz >= -GRAZE:
-        # The interpolated normal faces away from the viewer: use the geometric one for glossy lobes.
+        # The interpolated normal does not face the viewer: use the geometric normal.
         nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
     set_frame(path, lane, nx, ny, nz)
     tx, ty, tz = local(path, lane, -dx, -dy, -dz)
-    # A Lambertian surface has the same radiance in all directions, also below the interpolated horizon.
+    # Lambertian radiance is the same in all directions, so a view direction below the horizon of the shading
+    # normal is clamped to the horizon.
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
     m = np.int64(surface[prim, MATERIAL])
     for c in range(3):
@@ -198,7 +222,7 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
 
 @inner
 def paint(row, lane, shading, prim, u, v, material, rgba):
-    """Apply textures and vertex colours at barycentrics (u, v) of a triangle.
+    """Multiply the BSDF parameters by textures and vertex colours at barycentrics (u, v) of triangle `prim`.
 
     row : (5, n) float64; material : (M, 8) float32, see `Surfaces`; rgba : (4,) float64, working memory
     """
@@ -215,7 +239,10 @@ def paint(row, lane, shading, prim, u, v, material, rgba):
 
 @inner
 def base_colour(shading, prim, m, u, v, out):
-    """Write the product of base colour texture and vertex colour to `out` (4,)."""
+    """Write base colour texture times vertex colour at barycentrics (u, v) of triangle `prim` to `out` (4,).
+
+    m : number of the triangle's material
+    """
     out[0] = out[1] = out[2] = 1.0
     if shading.base_texture[m] >= 0:
         s, t = uv_at(shading.base_uv, shading.triangle, prim, u, v)
@@ -230,7 +257,10 @@ def base_colour(shading, prim, m, u, v, out):
 
 @inner
 def heuristic(own, other, power):
-    """Return the MIS weight of a technique of density `own` against one of density `other`."""
+    """Return the MIS weight of the technique with density `own`, if the other technique has density `other`.
+
+    power : 1 for the power heuristic with exponent 2, 0 for the balance heuristic
+    """
     if power:
         own, other = own * own, other * other
     return own / (own + other) if own > 0.0 else 0.0
@@ -238,12 +268,13 @@ def heuristic(own, other, power):
 
 @inner
 def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
-    """Sample a ray to one light; return the light's index, or -1 if it contributes nothing.
+    """Choose a light and sample a ray to it; return the light's number, or -1 if the contribution is 0.
 
     path : (N_ROWS, n) float64; row : (5, n) float64; lights : `LightTable`
-    mode, power : `Estimator.aim` and `.power`; choice, u, w : uniform numbers
-    value : (3,) float64, output, contribution if unblocked, without the emitter's texture
-    ray : (6,) float64, output, see the column names
+    mode, power : `Estimator.aim` and `.power`
+    choice, u, w : random numbers in [0, 1), for the light and for the point on it
+    value : (3,) float64, output, contribution if nothing blocks the ray, without the emitter's texture
+    ray : (6,) float64, output: unit direction, length in metres, barycentrics of its end
     """
     emitter, delta, sky = lights.emitter, lights.delta, lights.sky
     n, p = len(emitter), len(delta)
@@ -303,11 +334,11 @@ def aim(path, row, lane, lights, mode, power, choice, u, w, value, ray):
 
 @inner
 def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
-    """Multiply `value` (3,) by the emission texture of triangle prim.
+    """Multiply `value` (3,) by the emission texture of triangle `prim` at barycentrics (u, v).
 
     rgba : (4,) float64, working memory
-    aimed : whether to multiply by alpha, too; false for rays that hit the triangle, whose hit filter applies
-        it
+    aimed : whether the ray was sampled towards the triangle. If so, `value` is multiplied by alpha as well.
+        Rays that hit the triangle by chance have passed the hit filter, which applies alpha
     """
     m = shading.material[prim]
     there = opacity_at(shading, prim, u, v) if aimed else 1.0
@@ -322,15 +353,16 @@ def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
 
 @inner
 def scatter(path, row, lane, hemisphere, choice, u, w, weight):
-    """Sample the next direction of a path; return False where it ends.
+    """Sample the next direction of a path, and multiply its throughput; return False if the path ends.
 
     path : (N_ROWS, n) float64; row : (5, n) float64; weight : (3,) float64, working memory
-    hemisphere : `Estimator.hemisphere`; choice, u, w : uniform numbers
+    hemisphere : `Estimator.hemisphere`
+    choice, u, w : random numbers in [0, 1), for the lobe and for the direction
     """
     vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
     mirror = 0.0
     if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
-        # The direction of a mirror must be sampled with the BSDF.
+        # Only BSDF sampling finds the direction of a mirror reflection.
         mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < SMOOTH else 0.0
     if hemisphere == 0 or choice < mirror:
         lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)

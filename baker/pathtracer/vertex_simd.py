@@ -1,11 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One vertex of eight paths at once on Lambertian surfaces, in loops that the compiler vectorizes.
+"""Shading of Lambertian vertices, eight paths at a time, in loops that the compiler vectorizes.
 
-The same computations as in `vertex`, for eight lanes in float32: vertices from hits, light samples, sampling
-of the next direction. There are no branches; terms that do not apply are replaced by 0 with selections.
+These functions compute in float32 what `vertex` computes for one path in float64: vertices from hits, light
+samples, and the next directions. They use selections instead of branches.
 
-    aiming: beta albedo / pi cos L w / density       w = density / (density + cos / pi)   (balance heuristic)
-    next direction: density cos / pi, beta becomes beta albedo
+    contribution of a light sample    beta albedo / pi cos L w / density
+    its MIS weight w                  density / (density + cos / pi)        (balance heuristic)
+    next direction                    density cos / pi; beta is multiplied by albedo
+
+beta is the throughput, cos is the cosine of the sampled direction to the shading normal, and L is the
+radiance that arrives from the light.
 """
 
 from __future__ import annotations
@@ -68,12 +72,13 @@ from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
 
 _f = np.float32
-# A float64 constant would widen the whole expression.
+# Constants in float32: a float64 constant would convert whole expressions to float64.
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
 _OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
 _SURE, _MOST = _f(SURE), _f(MOST)
 _EMITTER, _CONE, _PARALLEL, _SKY = _f(KIND_EMITTER), _f(KIND_CONE), _f(KIND_PARALLEL), _f(KIND_SKY)
+# Offsets, in numbers, of the triangle's copy and of the light's copy in a block.
 _T = TRIANGLE * BLOCK_WIDTH
 _M = LIGHT_ROW * BLOCK_WIDTH
 _L = BLOCK_WIDTH
@@ -81,9 +86,10 @@ _L = BLOCK_WIDTH
 
 @inner
 def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
-    """Write a ray origin just above (x, y, z), and the frame of the normals that are in the lane.
+    """Write a lane's ray origin, (x, y, z) offset along `NORMAL`, and the tangent frame of its `SHADED`.
 
-    s : blocks, float32
+    s : blocks, float32, with `NORMAL` and `SHADED` of the lane
+    base : index of the block's first number
     min_offset_scale, size : float32, metres, see `vertex.offset_origin`
     """
     far = max(max(abs(x), abs(y)), abs(z))
@@ -104,9 +110,10 @@ def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
 
 @inner
 def start_vertices(s, base, min_offset_scale, default_size):
-    """Make vertices of the lanes' surface points.
+    """Set up the first vertex of each lane at its surface point: ray origin and tangent frame.
 
-    s : blocks, float32; min_offset_scale, default_size : float32, metres, see `Surfaces`
+    s : blocks, float32, with the points in the rows of the ray origin
+    min_offset_scale, default_size : float32, metres, see `Surfaces`
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
@@ -116,14 +123,20 @@ def start_vertices(s, base, min_offset_scale, default_size):
 
 @inner
 def edge_lane(s, base, lane, a):
-    """Return the larger extent along axis a of the two edges from corner 0 of a lane's triangle."""
+    """Return the larger absolute component along axis a of the two edges at corner 0 of a lane's triangle.
+
+    s : blocks, float32
+    """
     at = base + _T + (CORNER + a) * _L + lane
     return max(abs(s[at + 3 * _L] - s[at]), abs(s[at + 6 * _L] - s[at]))
 
 
 @inner
 def weighted(s, base, column, lane, b, u, v):
-    """Interpolate a column of three corners of a lane's triangle at barycentrics (b, u, v)."""
+    """Interpolate a vector of the three corners of a lane's triangle at barycentrics (b, u, v).
+
+    s : blocks, float32; column : `CORNER` for positions, `SHADING` for shading normals
+    """
     at = base + _T + column * _L + lane
     return (
         b * s[at] + u * s[at + 3 * _L] + v * s[at + 6 * _L],
@@ -134,9 +147,9 @@ def weighted(s, base, column, lane, b, u, v):
 
 @inner
 def arrive_lanes(s, base, min_offset_scale):
-    """Set up vertices at the lanes' hits, whose triangles have been copied; paths end at black backs.
+    """Set up the vertices at the lanes' hits; end paths at black backs.
 
-    s : blocks, float32
+    s : blocks, float32, with copies of the hit triangles
     min_offset_scale : float32, metres, see `Surfaces`
     """
     base = unsigned(base)
@@ -173,9 +186,10 @@ def arrive_lanes(s, base, min_offset_scale):
 
 @inner
 def look_up_falloff(s, base, lights, light):
-    """Multiply the gain of the lanes' tabulated lights by their fall-off; for `aim_lanes` they are even then.
+    """Multiply the gain of each lane's tabulated light by its tabulated fall-off, and set its kind to even.
 
-    s : blocks; lights : `LightTable`; light : (8,) int64, numbers of the lanes' lights
+    s : blocks, with copies of the lights; lights : `LightTable`
+    light : (8,) int64, numbers of the lanes' lights
     """
     base = unsigned(base)
     n = len(lights.emitter)
@@ -199,18 +213,21 @@ def look_up_falloff(s, base, lights, light):
 
 @inner
 def aim_lanes(s, base, mode, power):
-    """Sample rays to the lanes' lights, whose rows have been copied: direction, distance, unoccluded light.
+    """Sample a ray from each lane's vertex to the lane's light.
 
-    s : blocks, float32; mode, power : `Estimator.aim` and `.power`. The light is 0 below the horizon.
+    Writes its unit direction, its length in metres, and the contribution if nothing blocks it. The
+    contribution is 0 if the ray points below the surface.
+
+    s : blocks, float32, with copies of the lights; mode, power : `Estimator.aim` and `.power`
     """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
-        # Vector to the light
         u, w = s[base + U_LIGHT * _L + lane] - _ONE, s[base + W_LIGHT * _L + lane] - _ONE
         kind = s[base + _M + ROW_KIND * _L + lane]
         sky = kind == _SKY
         b1, b2 = triangle_barycentric(u, w)
-        # Vector to a point on the light: edges are 0 for lights without area, `near` is 0 for parallel light.
+        # Vector to a point on the light. For lights without area, the edges are 0. For parallel light and the
+        # sky, `near` is 0.
         near = _ONE if kind < _PARALLEL else _ZERO
         dx = (
             s[base + _M + ROW_ORIGIN * _L + lane]
@@ -265,7 +282,8 @@ def aim_lanes(s, base, mode, power):
             base + _M + ROW_CONE_SCALE * _L + lane
         ]
         inside = min(max(inside, _ZERO), _ONE)
-        # Gain: 1 / density per steradian, or irradiance per intensity and chance for lights without area.
+        # Gain: for emitters and the sky, 1 / density per steradian. For lights without area, irradiance of a
+        # surface that faces the light, per unit intensity, divided by the light's probability.
         here = dx * nx + dy * ny + dz * nz
         gain = s[base + _M + ROW_GAIN * _L + lane]
         area = kind == _EMITTER
@@ -304,7 +322,10 @@ def aim_lanes(s, base, mode, power):
 
 @inner
 def scatter_lanes(s, base):
-    """Sample the next directions of the lanes' paths, with Russian roulette; s : blocks, float32."""
+    """Sample the next direction of each lane's path, and apply Russian roulette.
+
+    s : blocks, float32
+    """
     base = unsigned(base)
     for lane in range(BLOCK_WIDTH):
         u, w = s[base + U_DIRECTION * _L + lane] - _ONE, s[base + W_DIRECTION * _L + lane] - _ONE
