@@ -37,7 +37,7 @@ def surface_tile(
     settings: PathSettings,
     out: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Add E / pi of each sample of m points to `out` (m, 3); return two numbers of rays, as `trace_paths` does.
+    """Add E / pi of each sample of m points to `out` (m, 3); return numbers of rays as `trace_paths`.
 
     points : position, normal and face normal, each (m, k, 3), see `irradiance_pass`
     begin : number of the first point, for its random numbers

@@ -48,7 +48,7 @@ N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 
 @inner
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
-    """Evaluate the BSDF at the vertex in column k for light from direction l that is reflected to direction e.
+    """Evaluate the BSDF at the vertex in column k, for light from direction l reflected in direction e.
 
     e and l are unit world directions away from the vertex; e is on the side of the eye, l on that of the
     light.

@@ -202,7 +202,6 @@ def _no_atlas(scene: Scene) -> Atlas:
 
 
 def _sphere(geometry: Geometry) -> NDArray[np.float64]:
-    """Return `Reference.sphere`: centre and radius (4,), metres, of a sphere that encloses all vertices."""
     if not len(geometry.position):
         return np.array([0.0, 0.0, 0.0, 1.0])
     low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
@@ -213,7 +212,6 @@ def _sphere(geometry: Geometry) -> NDArray[np.float64]:
 
 
 def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lambertian: bool) -> Surfaces:
-    """Return triangles and materials in the layout of `Surfaces`."""
     n, material = len(geometry.triangle), geometry.material
     row = aligned_floats(n * ROW_LENGTH).reshape(n, ROW_LENGTH)
     row[:, CORNER : CORNER + 9] = geometry.position[geometry.triangle].reshape(n, 9)
