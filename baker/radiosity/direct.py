@@ -1,8 +1,10 @@
 """Direct light of every texel: emissive triangles, then lights without area.
 
-There are two estimates. `weighted` is the share of the light that MIS assigns to shadow rays; the final
-gather adds the rest, from its rays that hit emitters. `complete` is all direct light. The final gather does
-not use it; it is the light that surfaces reflect in later bounces.
+There are two estimates of the direct irradiance:
+
+- `weighted` is the part that MIS assigns to shadow rays. The final gather adds the other part, from its rays
+  that hit emitters. The sum is stored in the lightmap.
+- `complete` is all direct light. Surfaces reflect this light in later bounces.
 """
 
 from __future__ import annotations
@@ -29,27 +31,33 @@ from baker.radiosity.kernels.side_table import nothing_seen
 from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
-# Texel entries of a tile. The final gather has the same tiles, so that both choose the same emitters.
+# Texel entries (rows of `TexelBuffer`) per tile. The final gather uses the same tiles, so that both stages
+# sample the same emitters.
 TILE = 512
-# Columns of the light of a tile: RGB of both estimates.
+# Columns of `_Tile.light`: RGB of both estimates.
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
-# Close to emitters, `complete` combines shadow rays with N_HEMISPHERE hemisphere rays. A texel is close if
-# the radius of a visible cluster, divided by its distance, is above CLOSE.
+# Number of hemisphere rays per texel that `complete` combines with shadow rays close to emitters.
 N_HEMISPHERE = 4
+# Radius / distance of a visible emitter cluster above which texels are close to it.
 CLOSE = 0.5
 
 
 @dataclass(frozen=True)
 class DirectLight:
-    """Direct irradiance of all texel entries.
+    """Direct irradiance of all n texel entries.
 
     Attributes
     ----------
-    weighted : (n, 3) float32, lx, without the weighted emitter hits of gather rays
+    weighted : (n, 3) float32, lx
+        RGB, without the part that gather rays add when they hit emitters.
     complete : (n, 3) float32, lx
-    variance : (n,) float32, lx2, of the mean of `weighted`'s RGB
-    analytic : (n,) uint8, 1 where `weighted` is complete, too
-    rays : int, rays that were cast for emitters, plus the largest possible number for lights without area
+        RGB of all direct light.
+    variance : (n,) float32, lx2
+        Variance of (R + G + B) / 3 of `weighted`.
+    analytic : (n,) uint8
+        1 where `weighted` already contains all light of the visible emitters.
+    rays : int
+        Rays cast for emitters, plus 16 per entry and light without area, which is an upper bound.
     """
 
     weighted: NDArray[np.float32]
@@ -60,16 +68,16 @@ class DirectLight:
 
 
 def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: EmitterSampling) -> DirectLight:
-    """Light every texel entry directly.
+    """Compute the direct irradiance of every texel entry.
 
     Parameters
     ----------
     job : TraceJob
-        Gives the ray origins. Its cache keeps them for later stages with the same tiles.
+        Ray origins, scene and tile runner.
     lights : tuple of PunctualLight
         Lights without area.
     sampling : EmitterSampling
-        Emitters, and the numbers of shadow rays and hemisphere rays, from which MIS weights follow.
+        Emitters, and the numbers of shadow rays and hemisphere rays that the MIS weights contain.
 
     Returns
     -------
@@ -106,10 +114,10 @@ def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: Emi
 
 
 class _Tile(NamedTuple):
-    """Results of the m entries of a tile, or of a part of it.
+    """Results of m consecutive entries: a tile or a part of a tile.
 
     light : (m, 6) float32, lx, columns `WEIGHTED` and `COMPLETE`
-    variance : (m,) float32, lx2; analytic : (m,) uint8, see `DirectLight`
+    variance : (m,) float32, lx2, and analytic : (m,) uint8, see `DirectLight`
     """
 
     light: NDArray[np.float32]
@@ -118,25 +126,29 @@ class _Tile(NamedTuple):
 
     @classmethod
     def zeros(cls, m: int) -> _Tile:
-        """Return a tile of m entries without light."""
+        """Return zeros for m entries."""
         return cls(np.zeros((m, 6), np.float32), np.zeros(m, np.float32), np.zeros(m, np.uint8))
 
     def part(self, own: slice) -> _Tile:
-        """Return views of some entries."""
+        """Return views of the entries in the slice `own`."""
         return _Tile(self.light[own], self.variance[own], self.analytic[own])
 
 
 @dataclass(frozen=True)
 class _EmitterLight:
-    """Light of emissive triangles, tile by tile.
+    """Computes the light of emissive triangles, tile by tile.
 
     Attributes
     ----------
     lookup : TriangleLookup
     chooser : EmitterChooser
     shading : Shading or None, from `emitters.needed_shading`
-    sobol_points : (n_light, 2) uint32, hidden_points : (n_hidden, 2) uint32, of shadow rays
-    near_points : (N_HEMISPHERE, 2) uint32, of hemisphere rays close to emitters
+    sobol_points : (n_light, 2) uint32
+        Sobol points of shadow rays to visible clusters.
+    hidden_points : (n_hidden, 2) uint32
+        Sobol points of shadow rays to hidden clusters, see `emitter_choice`.
+    near_points : (N_HEMISPHERE, 2) uint32
+        Sobol points of hemisphere rays close to emitters.
     n_gather, n_light : int, see `EmitterSampling`
     """
 
@@ -172,9 +184,10 @@ class _EmitterLight:
         buffers: PacketBuffers,
         tile: _Tile,
     ) -> int:
-        """Add the light of emitters to the tile that begins at an entry; return the number of rays cast.
+        """Add the light of emitters to `tile`; return the number of rays cast.
 
-        origin, normal : (m, 16, 3) float32, world
+        begin : int, first entry of the tile
+        origin, normal : (m, 16, 3) float32, world; origins in metres, unit normals
         """
         n_cast = 0
         for choice in self.chooser.choose(begin, origin, normal, buffers):
@@ -193,10 +206,10 @@ class _EmitterLight:
         buffers: PacketBuffers,
         out: _Tile,
     ) -> int:
-        """Add light found by shadow rays; return their number."""
+        """Add the light that shadow rays find to `out`; return the number of these rays."""
         n_cast = 0
-        # Numbers of hemisphere rays in the MIS weights: for `weighted` those of the final gather, for
-        # `complete` those of `_gather`.
+        # Set the numbers of hemisphere rays in the MIS weights. `weighted` is combined with the rays of the
+        # final gather, `complete` with the rays of `_gather`.
         hemisphere = np.array([self.n_gather, N_HEMISPHERE * (choice.view > CLOSE)], np.float64)
         for emitters, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
             if emitters is None or not emitters.chance.any():
@@ -219,7 +232,10 @@ class _EmitterLight:
         buffers: PacketBuffers,
         out: _Tile,
     ) -> int:
-        """Add emitters that hemisphere rays hit to `complete`; return the number of these rays."""
+        """Cast hemisphere rays, and add the light of emitters that they hit to `complete`.
+
+        Returns the number of rays.
+        """
         found = np.zeros((len(out.light), N_COLUMNS), np.float32)
         limits, black = np.array([0.0, self.n_light], np.float64), np.zeros(3, np.float32)
         gather(
@@ -231,14 +247,14 @@ class _EmitterLight:
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the variance of (R + G + B) / 3, where each channel is the sum of 16 batches.
+    """Return (m,) float32: the variance of (R + G + B) / 3, where R, G and B are sums of 16 batches.
 
     Parameters
     ----------
     total : (m,) float32
-        Sum of R, G and B over all batches.
+        R + G + B, summed over the batches.
     squares : (m,) float32
-        Sum of (R + G + B)^2 of each batch over all batches.
+        (R + G + B)^2 of each batch, summed over the batches.
     """
     spread = np.maximum(squares - total * total / N_POINTS, 0) * (N_POINTS / (N_POINTS - 1.0)) / 9.0
     return spread.astype(np.float32)

@@ -1,12 +1,15 @@
-"""Chooses the emitters that the texels of a tile sample, and the numbers of samples.
+"""Chooses the emitter clusters that the texels of a tile sample, and the numbers of samples.
 
-`emitters.cluster_chances` estimates the unoccluded irradiance of each cluster of emitters. It ignores
-occlusion: nearly all samples would go to an emitter behind a wall that is ten thousand times as bright.
-Therefore a few shadow rays from the tile to each cluster estimate its visibility, and the samples are
-distributed over visible clusters. Clusters that no ray reached are a separate stratum with few samples,
-combined with gather rays that hit them (MIS), so that their light is not lost where they are visible through
-a small opening. If a bright cluster is visible from a part of the tile only, clusters are chosen for each
-block of sixteen neighbours.
+`emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters causes. With these
+estimates alone, a very bright emitter behind a wall would get nearly all samples. Therefore a few probe rays
+from the tile to each cluster estimate the cluster's visibility.
+
+- The samples are distributed over the visible clusters.
+- Clusters that no probe ray reached are hidden. They are a separate stratum with few samples. MIS combines
+  these samples with gather rays that hit hidden clusters, so a cluster that is visible through a small
+  opening still contributes.
+- If a bright cluster is visible from only a part of the tile, clusters are chosen for each block of up to
+  sixteen consecutive texels.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -36,27 +39,29 @@ from baker.kernels.shading import Shading
 from baker.radiosity.kernels.emitter_probe import probe_clusters
 from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
-# Probe rays to each cluster from a tile, and their total as a share of the tile's shadow rays.
+# Largest and smallest number of probe rays from a tile to each cluster.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
+# Number of all probe rays of a tile, as a share of the tile's shadow rays.
 _COST = 0.06
-# With at most _FEW clusters, all hidden ones are in the separate stratum. With more, the dimmest hidden ones
-# are sampled with the visible ones, up to this share of the weight of the visible ones.
+# Number of clusters up to which all hidden clusters are in the separate stratum.
 _FEW = 32
+# Share of the visible clusters' total weight (power / distance^2). With more than _FEW clusters, the dimmest
+# hidden clusters, up to this total, are sampled together with the visible clusters.
 _HARMLESS = 0.25
-# Clusters are chosen for each block if one that is visible from a part of the tile is this many times as
-# bright as another visible one. Blocks end where a chart ends or the cosine of neighbouring normals is below
-# _TURN.
+# Ratio of the weights of two visible clusters above which the choice is made for each block, if the brighter
+# cluster is visible from only a part of the tile.
 _OUTSHINES = 4.0
+# Cosine between the normals of consecutive texels below which a new block begins.
 _TURN = 0.5
-# Touching emitters whose power per area differs by at most this factor are one light: no choice is needed.
+# Ratio of power per area up to which touching emitters are treated as one light, without a choice.
 _ALIKE = 4.0
-# Samples of hidden clusters, as a share of those of visible ones.
+# Shadow rays to hidden clusters, as a share of the shadow rays to visible clusters.
 _HIDDEN_SHARE = 1.0 / 8.0
 
 
 @dataclass(frozen=True)
 class EmitterSampling:
-    """Emitters, and the sample numbers of light and hemisphere sampling, combined by the balance heuristic.
+    """Emitters, and the numbers of shadow rays and hemisphere rays that the balance heuristic combines.
 
     Attributes
     ----------
@@ -80,18 +85,18 @@ class EmitterSampling:
         return needed_shading(self.emitters, self.shading)
 
     def chooser(self, chart: NDArray[np.int32] | None) -> EmitterChooser:
-        """Return the chooser of emitters for tiles; `chart` (n,) int32 is that of each texel entry."""
+        """Return the chooser of emitters for tiles; `chart` (n,) int32 is the chart of each texel entry."""
         return EmitterChooser.build(self.emitters, self.n_light, chart)
 
 
 class Choice(NamedTuple):
-    """Emitters that some neighbouring texels sample.
+    """Emitter clusters that consecutive texels of a tile sample.
 
-    part : slice of the tile's texels
-    seen : visible clusters, which share the samples; the others are left out
-    hidden : clusters that no probe ray of the tile reached, None if there are none
-    found : all clusters with the density of both strategies, for gather rays that find them
-    view : largest radius / distance of a cluster of `seen`, see `emitters.widest_view`
+    part : slice, the texels within the tile
+    seen : visible clusters, which get the shadow rays
+    hidden : clusters that no probe ray reached, in the separate stratum; None if there are none
+    found : all clusters with the sampling densities of both strata, for MIS weights of gather rays
+    view : largest radius / distance of a cluster in `seen`, see `emitters.widest_view`
     """
 
     part: slice
@@ -103,16 +108,16 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True)
 class EmitterChooser:
-    """Chooses emitters for tiles; stages with the same points get the same choices.
+    """Chooses emitters for tiles. Stages that pass the same points get the same choices.
 
     Attributes
     ----------
     emitters : Emitters
         All emitters of the scene.
     n_light, n_hidden : int
-        Samples of a texel, and those of clusters hidden from its tile.
+        Shadow rays of a texel to visible clusters, and to hidden clusters.
     single : bool
-        Whether all emitters are treated as one light, without a choice.
+        True if all emitters are treated as one light: every tile samples all of them.
     chart : (n,) int32 or None
         Chart of each texel entry.
     """
@@ -127,19 +132,22 @@ class EmitterChooser:
     def build(
         cls, emitters: Emitters, n_light: int, chart: NDArray[np.int32] | None = None
     ) -> EmitterChooser:
-        """Return the chooser for `n_light` samples a texel; `chart` (n,) int32 of each texel entry."""
+        """Return the chooser for `n_light` shadow rays per texel.
+
+        chart : (n,) int32, chart of each texel entry, or None
+        """
         n_hidden = max(int(n_light * _HIDDEN_SHARE), 1)
         return cls(emitters, n_light, n_hidden, _one_light(emitters), chart)
 
     def choose(
         self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], buffers: PacketBuffers
     ) -> list[Choice]:
-        """Return the choices of a tile's parts, which cover it in order.
+        """Split a tile into parts, and return the emitters that each part samples, in order.
 
         Parameters
         ----------
         begin : int, the tile's first texel entry
-        origin, normal : (m, 16, 3) float32, points of the tile's texels, world
+        origin, normal : (m, 16, 3) float32, metres and unit, world; the 16 points of each texel
         """
         whole = slice(0, len(origin))
         all_emitters = tile_emitters(self.emitters, origin)
@@ -162,7 +170,10 @@ class EmitterChooser:
         normal: NDArray[np.float32],
         buffers: PacketBuffers,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the bounds of the parts of a tile, (P + 1,), and the clusters (P, C) hidden from each."""
+        """Return the parts of a tile, and (P, C) bool: the clusters that are hidden from each part.
+
+        Part p contains the texels `bounds[p] : bounds[p + 1]` of the tile; `bounds` (P + 1,) comes first.
+        """
         weight = self._weights(all_emitters, origin)
         blocks, broken = self._blocks(begin, origin, normal)
         bounds = np.array([0, len(origin)])
@@ -184,9 +195,10 @@ class EmitterChooser:
     def _blocks(
         self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32]
     ) -> tuple[NDArray[np.int64], bool]:
-        """Return the bounds (B + 1,) of blocks of up to sixteen neighbours on one surface.
+        """Split a tile into blocks of up to sixteen consecutive texels of one chart with similar normals.
 
-        Also return whether the texels lie on several surfaces.
+        Returns (B + 1,) int64, where block b contains the texels `bounds[b] : bounds[b + 1]` of the tile, and
+        whether the chart or the normal changes within the tile.
         """
         facing = normal[:, 0]
         apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
@@ -205,7 +217,10 @@ class EmitterChooser:
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return `asked` and `seen` of `probe_clusters` (B, C) for the chosen clusters (C,) bool."""
+        """Return (B, C) int32: the probe rays from each block to each cluster, and the unblocked probe rays.
+
+        bounds : (B + 1,) int64, see `_blocks`; chosen : (C,) bool, clusters to probe
+        """
         shape = (len(bounds) - 1, len(chosen))
         share = _COST * self.n_light * len(origin) / (shape[0] * np.count_nonzero(chosen))
         n_rays = int(np.clip(share, _FEWEST_RAYS, _MOST_RAYS if shape[0] == 1 else PACKET_WIDTH))
@@ -215,7 +230,10 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) power / distance^2 of clusters at points (m, w, 3); 0 if they face away."""
+        """Return (C,) float64: power / distance^2 of each cluster; 0 if it faces away from all points.
+
+        origin : (m, w, 3) float32, metres, world; the distance is from the centre of their bounding box
+        """
         points = origin.reshape(-1, 3)
         low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
         square = ((self.emitters.centre - 0.5 * (low + high)) ** 2).sum(axis=1)
@@ -224,7 +242,10 @@ class EmitterChooser:
         return np.where(all_emitters.chance > 0, weight, 0.0)
 
     def _hidden(self, weight: NDArray[np.float64], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return the clusters of the separate stratum, (C,) bool; none if no cluster is visible."""
+        """Return (C,) bool: the clusters of the separate stratum; all False if no cluster is visible.
+
+        weight : (C,) float64, from `_weights`; seen : (C,) int32, unblocked probe rays to each cluster
+        """
         hidden: NDArray[np.bool_] = (seen == 0) & (weight > 0)
         if not (seen > 0).any():
             return np.zeros_like(hidden)
@@ -237,13 +258,16 @@ class EmitterChooser:
     def _choice(
         self, part: slice, origin: NDArray[np.float32], all_emitters: TileEmitters, hidden: NDArray[np.bool_]
     ) -> Choice:
-        """Return the choice for points (m, w, 3) from which the clusters `hidden` (C,) are not visible."""
+        """Return the choice for one part of a tile.
+
+        origin : (m, w, 3) float32, metres, world; hidden : (C,) bool, clusters not visible from these points
+        """
         hidden = hidden & (all_emitters.chance > 0)
         if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():
             return Choice(part, all_emitters, None, all_emitters, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # Never evaluate hidden emitters analytically: too few shadow rays would decide that they are
-        # unoccluded.
+        # Do not use the closed form for hidden emitters. It requires that no shadow ray is blocked, and
+        # too few rays test this.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
         chance = np.zeros_like(all_emitters.chance)
@@ -256,7 +280,7 @@ class EmitterChooser:
 
 
 def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
-    """Return the emitters of the clusters that `which` (C,) selects."""
+    """Return the emitters of the selected clusters, renumbered from 0; `which` : (C,) bool."""
     length = np.diff(emitters.first)
     own = np.repeat(which, length)
     row = np.ascontiguousarray(emitters.row[own])
@@ -275,7 +299,10 @@ def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
 
 
 def _one_light(emitters: Emitters) -> bool:
-    """Return whether all clusters touch and have similar radiosity, so that walls hardly separate them."""
+    """Return whether all clusters form one connected group of similar radiosity.
+
+    Two clusters are connected if their bounding spheres overlap. Walls rarely separate such clusters.
+    """
     n = len(emitters.power)
     if n < 2:
         return True

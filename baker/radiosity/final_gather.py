@@ -1,4 +1,7 @@
-"""The final gather of all texels: sharp first bounce, smooth further bounces, AO from the same rays."""
+"""The final gather: irradiance and ambient occlusion of front texels from hemisphere rays.
+
+Each ray reads the light that the hit texel reflects. Ambient occlusion uses the same rays.
+"""
 
 from __future__ import annotations
 
@@ -28,18 +31,18 @@ from baker.radiosity.trace_job import TraceJob
 
 @dataclass(frozen=True)
 class Gathered:
-    """Light and ambient occlusion that the gather rays of front texels found.
+    """Irradiance and ambient occlusion of the front texels, from their gather rays.
 
     Attributes
     ----------
     indirect : (n_front, 3) float32, lx
-        Light that surfaces reflect.
+        RGB of the light that surfaces reflect.
     direct : (n_front, 3) float32, lx
-        Light of the sky, and of emitters with the weight that gather rays have in MIS.
+        RGB of the sky's light, and of the emitters' light times the MIS weight of gather rays.
     open : (n_front,) float32
-        Ambient occlusion within the distance, 1: unoccluded.
+        Ambient occlusion within `ao_distance`; 1 is unoccluded.
     variance : (n_front,) float32, lx2
-        Of the mean of RGB of indirect + direct.
+        Variance of (R + G + B) / 3 of indirect + direct.
     rays : int
         Number of rays cast.
     """
@@ -52,7 +55,7 @@ class Gathered:
 
     @classmethod
     def zeros(cls, n_front: int, rays_per_texel: int) -> Gathered:
-        """Return the result before any ray is cast."""
+        """Return zeros for `n_front` texels."""
         indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
         opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
         return cls(indirect, direct, opened, variance, n_front * rays_per_texel)
@@ -73,15 +76,15 @@ def final_gather(
     Parameters
     ----------
     job : TraceJob
-        Where rays start; its tiles are those of `direct_light`.
+        Ray origins, scene and tile runner, as passed to `direct_light`.
     n_front : int
-        Number of front texels, the first entries of the job.
+        Number of front texels, which are the first entries of the job.
     seen : SeenLight
         Light that texels reflect (`Sides.seen_light`).
     analytic : (n,) uint8
-        1 for entries whose direct light from emitters is complete already.
+        `DirectLight.analytic`: 1 for entries to which hits of visible emitters add nothing.
     sampling : EmitterSampling
-        Emitters that rays find, and the shadow rays that these are weighted against.
+        Emitters that rays may hit, and the numbers of rays for their MIS weights.
     sky : tuple of float
         Radiance of the sky, RGB, cd/m2.
     ao_distance : float
@@ -99,7 +102,7 @@ def final_gather(
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
 
     def work(begin: int, end: int) -> Part:
-        # Emitters are chosen for the tile of `direct_light`, which may end in backs.
+        # Choose emitters for the same entries as `direct_light`: its last tile of fronts may contain backs.
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)
@@ -121,7 +124,7 @@ def final_gather(
 
 
 def _fronts(choices: list[Choice], m: int) -> Iterator[tuple[Choice, slice]]:
-    """Yield the choices that concern the first m entries of a tile, with the part of these."""
+    """Yield each choice of a tile that contains some of the first m entries, with the slice of these."""
     for choice in choices:
         if choice.part.start < m:
             yield choice, slice(choice.part.start, min(choice.part.stop, m))
@@ -133,18 +136,18 @@ def ambient_occlusion(job: TraceJob, n_front: int, *, n_samples: int, distance: 
     Parameters
     ----------
     job : TraceJob
-        Where rays start.
+        Ray origins, scene and tile runner.
     n_front : int
-        Number of front texels, the first entries of the job.
+        Number of front texels, which are the first entries of the job.
     n_samples : int
         Rays from each texel.
     distance : float
-        Distance in metres up to which hits count; may be inf.
+        Distance in metres up to which hits count as occlusion; may be inf.
 
     Returns
     -------
     (n_front,) float32
-        Share of the hemisphere without a hit within `distance`, weighted by the cosine.
+        Cosine-weighted share of the hemisphere without a hit within `distance`.
     """
     out = np.zeros(n_front, np.float32)
     sobol_points, shared = sobol_reversed(n_samples, job.seed, 6), shared_bits_mask(n_samples)

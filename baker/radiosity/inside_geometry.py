@@ -1,10 +1,14 @@
 """Finds the points of texels that lie inside geometry.
 
-A point is inside if it lies in a solid (`topology.solids`), or if all its rays hit black backs of one-sided
-surfaces. The first hit of a ray from inside a solid is the back of the solid or an object inside it; the
-first hit of a ray from outside is never the back of a closed surface. So two rays that hit such backs prove a
-point to be inside. A few rays from every texel find candidates. All points of candidates and of their
-neighbours are then tested, so a texel half under a box keeps its points in the other half.
+Each texel has 16 points. A point is inside geometry if it lies in a solid (`topology.solids`), or if all its
+rays hit black backs of one-sided surfaces.
+
+A ray from inside a solid first hits the solid's back or an object in the solid. A ray from outside never hits
+a back of a closed surface first. Therefore two rays that hit backs of solids prove that a point is inside.
+
+A first pass casts a few rays from every texel to find candidates. A second pass tests all points of the
+candidates and of their neighbours separately. So a texel half under a box keeps the valid points of its other
+half.
 """
 
 from __future__ import annotations
@@ -22,25 +26,27 @@ from baker.kernels.surface import N_POINTS
 from baker.radiosity.point_cache import points_of
 from baker.radiosity.trace_job import TraceJob
 
+# Texels per tile.
 _TILE = 2048
-# First pass: every 4th of the 16 points, one ray each. Second pass: every point.
+# First pass: step between the tested points of the 16 points of a texel, with one ray from each tested point.
 _STRIDE = 4
+# Second pass: rays from each of the 16 points.
 _RAYS_PER_POINT = 8
 
 
 def find_inside_geometry(
     texels: TexelBuffer, job: TraceJob, hit_kind: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint16], int]:
-    """Find the valid points of texels: those that do not lie inside geometry.
+    """Find the valid points of texels: the points that do not lie inside geometry.
 
     Parameters
     ----------
     texels : TexelBuffer
         The n entries of the job.
     job : TraceJob
-        Its `valid_points` are not read: all points are tested.
+        Ray origins and scene. Its `valid_points` are not read, because all points are tested.
     hit_kind : (T,) uint8
-        Meaning of a first hit on each triangle, see `kernels.probe`.
+        For each triangle, what a first hit on it says about the origin, see `kernels.probe`.
 
     Returns
     -------
@@ -54,7 +60,7 @@ def find_inside_geometry(
     if not n or not hit_kind.any():
         return valid, 0
 
-    # Without solids a point is invalid only if all its rays meet black backs.
+    # Without solids, a point is invalid only if all its rays hit black backs.
     proof = PROOF if (hit_kind > BLACK_BACK).any() else ELSEWHERE
     first, rays = _test_points(job, hit_kind, np.arange(n), _Pass(1, _STRIDE, 3, 1))
     suspect: NDArray[np.bool_] = np.any(first, axis=1)
@@ -66,12 +72,12 @@ def find_inside_geometry(
 
 
 class _Pass(NamedTuple):
-    """One of the two passes.
+    """Parameters of the first or second pass.
 
     rays_per_point : int, rays from each tested point
-    stride : int, every how many of the 16 points are tested
+    stride : int, step between tested points of the 16 points
     pair : int, pair of dimensions of the Sobol sequence
-    proof : int, rays from the inside of solids that prove a point to be inside
+    proof : int, number of hits on backs of solids that prove a point to be inside
     """
 
     rays_per_point: int
@@ -83,7 +89,10 @@ class _Pass(NamedTuple):
 def _test_points(
     job: TraceJob, hit_kind: NDArray[np.uint8], chosen: NDArray[np.int64], test: _Pass
 ) -> tuple[NDArray[np.bool_], int]:
-    """Return (m, w) bool, whether points of the chosen entries (m,) lie inside, and the rays cast."""
+    """Return (m, w) bool, whether the w tested points of each chosen entry lie inside, and the rays cast.
+
+    hit_kind : (T,) uint8, see `find_inside_geometry`; chosen : (m,) int64, texel entries
+    """
     every = np.full(job.n, 0xFFFF, np.uint16)
     wanted = np.arange(0, N_POINTS, test.stride, dtype=np.uint8)[None]
     hits = np.zeros((len(chosen), wanted.size), np.uint8)
@@ -104,7 +113,10 @@ def _test_points(
 
 
 def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Add the neighbours in the page to the candidates, separately for fronts and backs."""
+    """Return (n,) bool: the candidates and their eight neighbours in the page, fronts and backs separately.
+
+    suspect : (n,) bool, the candidates
+    """
     out = suspect.copy()
     for back in (False, True):
         side = np.flatnonzero(texels.back == back)

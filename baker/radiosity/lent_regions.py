@@ -1,9 +1,13 @@
-"""Assigns regions to invalid texels, which are filled from their neighbours later.
+"""Assigns regions to invalid texels, which are later filled from neighbours of the same region.
 
-The strip of a ceiling above a wall lies between a dark room and a bright outside. Engines interpolate between
-texel centres, so lookups in the room read these texels: filled with light from outside, they would appear as
-a bright line along the ceiling. So each invalid texel belongs to the region whose visible points have the
-largest bilinear weight at it, or to the nearest region if no region has any.
+Regions are the parts of a chart that other surfaces separate (`radiosity.sides`). For example, a ceiling
+continues over a wall between a dark room and a bright outside, and its texels above the wall are invalid.
+Engines interpolate between texel centres, so bilinear lookups in the room read these texels. Filled with light
+from outside, they would appear as a bright line along the ceiling.
+
+Therefore an invalid texel gets the region whose points use it most: for each region, its bilinear weight is
+summed over the valid points of its neighbours in that region, and the largest sum decides. If all sums are 0,
+the texel gets the region of the nearest texel of its chart.
 """
 
 from __future__ import annotations
@@ -27,11 +31,11 @@ def lend_regions(
     Parameters
     ----------
     texels : TexelBuffer
-        Fronts and backs.
+        All entries; only the front texels are read.
     surface : Surface
-        The same entries.
+        Kernel data of the same entries.
     region : (n_front,) int32
-        Region of each texel; changed in row_of where `valid_points` is 0.
+        Region of each front texel; changed in place where `valid_points` is 0.
     valid_points : (n_front,) uint16
         Bit k is set where point k of the texel is valid.
     """
@@ -54,7 +58,10 @@ def lend_regions(
 
 
 def _ring_of(invalid: NDArray[np.int64], turn: tuple[int, int], size: int) -> tuple[NDArray[np.int64], ...]:
-    """Return row and column of a neighbour of each texel, clipped to the page."""
+    """Return the rows (b,) and columns (b,) of one neighbour of each texel, clipped to the page.
+
+    invalid : (b, 2) int64, row and column of texels; turn : row and column offset of the neighbour
+    """
     row, column = (np.clip(invalid[:, k] + turn[k], 0, size - 1) for k in (0, 1))
     return row, column
 
@@ -66,13 +73,16 @@ def _visible_points(
     invalid: NDArray[np.int64],
     number: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the points of the m valid neighbours of invalid texels.
+    """Return the points of the m valid texels that are neighbours of invalid texels.
+
+    invalid : (b, 2) int64, row and column of the invalid texels of one page
+    number : (H, W) int64, front entry of each pixel of the page, -1 for none
 
     Returns
     -------
-    row_of : (H, W) int64, row of a texel in the other arrays, -1 for others
-    point : (m, 16, 2) float64, column and row of its points relative to its centre, texels
-    seen : (m, 16) bool, whether a point is valid
+    row_of : (H, W) int64, row of `point` and `seen` for each pixel, -1 for pixels that are not among the m
+    point : (m, 16, 2) float64, column and row of the points relative to their texel's centre, texels
+    seen : (m, 16) bool, whether each point is valid
     """
     near = [number[_ring_of(invalid, turn, texels.resolution)] for turn in _RING]
     chosen = np.unique(np.concatenate(near))
@@ -99,7 +109,17 @@ def _lookups(
     image: NDArray[np.int32],
     visible: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return pairs (invalid texel, region) (k, 2), and bilinear weights (k,) of texels at their points."""
+    """Return pairs of an invalid texel and a region, and the summed bilinear weight of each pair.
+
+    invalid : (b, 2) int64, row and column; chart, image : (H, W) int32, chart and region of each pixel
+    visible : from `_visible_points`
+
+    Returns
+    -------
+    pair : (k, 2) int64, row of `invalid`, and region
+    weight : (k,) float64, bilinear weight of the invalid texel, summed over the valid points of its neighbours
+        in that region
+    """
     row_of, point, seen = visible
     n_regions = int(image.max(initial=0)) + 1
     keys, weights = [np.zeros(0, np.int64)], [np.zeros(0)]
@@ -109,7 +129,7 @@ def _lookups(
         same = chart[row, column] == chart[invalid[:, 0], invalid[:, 1]]
         use = np.flatnonzero((beside >= 0) & same)
         away = np.abs(point[beside[use]] + np.array([turn[1], turn[0]]))
-        # Bilinear weight of a texel at this distance from its centre.
+        # Compute the bilinear weight of the invalid texel at each point.
         tent = np.maximum(1.0 - away, 0.0).prod(axis=2) * seen[beside[use]]
         keys.append(use * n_regions + image[row[use], column[use]])
         weights.append(tent.sum(axis=1))
@@ -125,7 +145,11 @@ def _choose(
     pair: NDArray[np.int64],
     weight: NDArray[np.float64],
 ) -> None:
-    """Assign to each invalid texel (b, 2) of `image` (H, W) the region of largest weight."""
+    """Write the region with the largest positive weight of each invalid texel to `image`.
+
+    invalid : (b, 2) int64, row and column; image : (H, W) int32, region of each pixel
+    pair (k, 2), weight (k,) : from `_lookups`
+    """
     order = np.lexsort((pair[:, 1], -weight, pair[:, 0]))
     order = order[weight[order] > 0]
     first = np.unique(pair[order, 0], return_index=True)[1]

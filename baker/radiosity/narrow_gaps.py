@@ -1,8 +1,8 @@
 """Finds texels in narrow gaps: under a rug, between books, between a cupboard and the wall.
 
-Inside a gap, light falls off over a distance of about the gap's width. A patch that extends from the lit
-floor to below a rug would have the floor's radiosity there, so texels in gaps share no patch with texels
-outside.
+Inside a gap, light falls off over a distance of about the gap's width. A patch has a single radiosity. If a
+patch extended from the lit floor to below a rug, the floor under the rug would have the radiosity of the lit
+floor. Therefore texels inside gaps and texels outside gaps belong to different patches.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from baker.radiosity.direct import TILE
 from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.trace_job import TraceJob
 
-# Sixteen neighbouring texels are outside gaps if at most one of the first _EARLY_OUT rays of each is blocked.
+# Rays per texel, and the number of rays after which sixteen consecutive texels are classified as outside gaps
+# if at most one ray of each texel is blocked.
 _RAYS, _EARLY_OUT = 16, 4
-# A texel lies in a gap if less than the share _OPEN of its rays is unblocked up to a distance in texel sides:
-# _NEAR for gaps about as wide as a texel, _FAR for gaps about as wide as a patch.
-_OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
+# Share of unblocked rays below which a texel lies in a gap.
+_OPEN = 0.25
+# Lengths of the rays, texel sides: for gaps about as wide as a texel, and for gaps about as wide as a patch.
+_NEAR, _FAR = 2.0, 8.0
 
 
 def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], int]:
@@ -32,12 +34,12 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     texels : TexelBuffer
         The n entries of the job.
     job : TraceJob
-        Points and ray buffers of these entries.
+        Ray origins of these entries, and the scene.
 
     Returns
     -------
     level : (n,) uint8
-        Of each entry: 0 outside gaps, 1 in a gap some texels wide, 2 in one about a texel wide.
+        Of each entry: 0 outside gaps, 1 in a gap several texels wide, 2 in a gap about a texel wide.
     rays : int
         Number of rays cast.
     """
@@ -47,7 +49,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     cast = np.zeros(-(-n // TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
-        # Use the median side for all texels of a tile, which are neighbours.
+        # Use the median texel side of the tile, whose texels are neighbours.
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = job.tile_points(begin, end)
         for share, sides in ((far, _FAR), (near, _NEAR)):
@@ -55,7 +57,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
             cast[begin // TILE] += estimate_occlusion(
                 *points, job.occlusion_buffers(), begin, sobol_points, shared, max_distance, _EARLY_OUT, share
             )
-            # A narrow gap is part of a wide one: without wide gaps there are no narrow ones.
+            # Skip the shorter rays if no texel of the tile lies in a gap several texels wide.
             if (share[begin:end] >= _OPEN).all():
                 break
 
