@@ -1,8 +1,8 @@
 """Chooses the emitter clusters that the texels of a tile sample, and the numbers of samples.
 
-`emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters causes. With these
-estimates alone, a very bright emitter behind a wall would get nearly all samples. Therefore a few probe rays
-from the tile to each cluster estimate the cluster's visibility.
+`emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters causes. With
+these estimates alone, a very bright emitter behind a wall would get nearly all samples. Therefore a few probe
+rays from the tile to each cluster estimate the cluster's visibility.
 
 - The samples are distributed over the visible clusters.
 - Clusters that no probe ray reached are hidden. They are a separate stratum with few samples. MIS combines

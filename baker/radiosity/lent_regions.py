@@ -2,8 +2,8 @@
 
 Regions are the parts of a chart that other surfaces separate (`radiosity.sides`). For example, a ceiling
 continues over a wall between a dark room and a bright outside, and its texels above the wall are invalid.
-Engines interpolate between texel centres, so bilinear lookups in the room read these texels. Filled with light
-from outside, they would appear as a bright line along the ceiling.
+Engines interpolate between texel centres, so bilinear lookups in the room read these texels. Filled with
+light from outside, they would appear as a bright line along the ceiling.
 
 Therefore an invalid texel gets the region whose points use it most: for each region, its bilinear weight is
 summed over the valid points of its neighbours in that region, and the largest sum decides. If all sums are 0,
@@ -117,8 +117,8 @@ def _lookups(
     Returns
     -------
     pair : (k, 2) int64, row of `invalid`, and region
-    weight : (k,) float64, bilinear weight of the invalid texel, summed over the valid points of its neighbours
-        in that region
+    weight : (k,) float64, bilinear weight of the invalid texel, summed over the valid points of its
+        neighbours in that region
     """
     row_of, point, seen = visible
     n_regions = int(image.max(initial=0)) + 1

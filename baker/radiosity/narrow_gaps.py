@@ -20,10 +20,9 @@ from baker.radiosity.trace_job import TraceJob
 # Rays per texel, and the number of rays after which sixteen consecutive texels are classified as outside gaps
 # if at most one ray of each texel is blocked.
 _RAYS, _EARLY_OUT = 16, 4
-# Share of unblocked rays below which a texel lies in a gap.
-_OPEN = 0.25
-# Lengths of the rays, texel sides: for gaps about as wide as a texel, and for gaps about as wide as a patch.
-_NEAR, _FAR = 2.0, 8.0
+# _OPEN: share of unblocked rays below which a texel lies in a gap.
+# _NEAR, _FAR: lengths of the rays, in texel sides, for gaps about as wide as a texel, and as a patch.
+_OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 
 def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], int]:

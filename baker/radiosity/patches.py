@@ -1,12 +1,12 @@
-"""Patches: blocks of texels of one chart with similar normals, the unknowns of the solve.
+"""Patches: blocks of texels of one chart with similar normals, the surface elements of the radiosity solve.
 
-Texels in narrow gaps and texels outside share no patch. Where a gap is about a texel wide, each texel is a
-patch if there are not too many: light enters such a gap by a few times its width only, but a larger patch
-would have the same radiosity throughout.
+Texels inside narrow gaps and texels outside gaps belong to different patches. In gaps about a texel wide,
+light reaches only a few gap widths deep, and a patch has a single radiosity. Therefore each texel in such a
+gap is a patch, unless these would be more than `max_patches`.
 
-Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (the idea that
-far transport needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity
-in complex environments, 1994.
+Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (distant transport
+needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity in complex
+environments, 1994.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from baker.core.budget import MAX_PATCHES
 from baker.core.texels import TexelBuffer
 from baker.radiosity.kernels.regions import join_linked
 
-# Gap level (`narrow_gaps`) from which blocks are as small as possible.
+# Smallest gap level (0 to 2, see `narrow_gaps`) whose texels get smaller blocks.
 NARROW = 2
 
 
 @dataclass(frozen=True)
 class PatchSet:
-    """Patches over all texel entries (fronts and backs).
+    """The division of the n texel entries (rows of `TexelBuffer`) into P patches.
 
     Attributes
     ----------
@@ -35,10 +35,11 @@ class PatchSet:
     first : (P + 1,) int64
         Patch p has the entries `member[first[p] : first[p + 1]]`.
     member : (n,) int32
-        Entries of all patches, in rising order within a patch.
+        Entries of all patches, ascending within a patch.
     cumulative : (n,) float32
-        Running share of the patch's area along `member`.
+        Share of its patch's area that each entry of `member` and the entries before it cover together.
     area : (P,) float64, m2
+        Area of each patch.
     block : int
         Side of a block outside narrow gaps, texels.
     """
@@ -56,7 +57,10 @@ class PatchSet:
         return len(self.area)
 
     def mean(self, value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return the weighted mean over each patch of per-entry values (n, C), as (P, C) float64."""
+        """Return (P, C) float64: the weighted mean of the entries' values over each patch.
+
+        value : (n, C) float32; weight : (n,) float32
+        """
         total = np.bincount(self.patch, weight, self.n)
         columns = [
             np.bincount(self.patch, weight * value[:, c].astype(np.float64), self.n)
@@ -72,27 +76,28 @@ def build_patches(
     max_patches: int = MAX_PATCHES,
     link: NDArray[np.int32] | None = None,
 ) -> PatchSet:
-    """Group texels into blocks: the smallest power of two with at most `max_patches` of them.
+    """Group texel entries into patches: square blocks whose side is a power of two.
 
-    A chart smaller than a block still is a patch, so a page of very many charts may have more.
+    The side is the smallest that gives at most `max_patches` patches, but at most 256 texels. A chart smaller
+    than a block is still a separate patch, so an atlas of very many charts may have more patches.
 
     Parameters
     ----------
     texels : TexelBuffer
         The n entries.
     level : (n,) uint8, optional
-        Gap level 0 to 2 (`narrow_gaps`); entries of different level share no patch. Those of level 2 form
-        smaller blocks, again at most `max_patches`.
+        Gap level 0 to 2 (`narrow_gaps`). Entries of different levels belong to different patches. Entries of
+        level 2 form smaller blocks, at most `max_patches` in addition.
     max_patches : int
         Largest number of patches outside narrow gaps.
     link : (m, 2) int32, optional
-        Neighbouring entries that see each other (`sides.Sides.link`): in the charts of these entries, parts
-        of a block that are not linked within it are separate patches.
+        Pairs of neighbouring entries between which no surface lies (`sides.Sides.link`). In the charts of
+        these entries, a block is split into its connected parts.
 
     Returns
     -------
     PatchSet
-        In Morton order of their first entries.
+        Patches in the order of their first entries.
     """
     level = np.zeros(len(texels.pixel), np.uint8) if level is None else level
     block = _smallest_block(texels, level, np.arange(len(level)), max_patches)
@@ -103,7 +108,7 @@ def build_patches(
     order = np.argsort(number, kind="stable").astype(np.int32)
     first = np.zeros(n_patches + 1, np.int64)
     np.cumsum(np.bincount(number, minlength=n_patches), out=first[1:])
-    # A texel without area (a sliver) gets a small share, so that its patch has an area.
+    # Give a texel without area (on a sliver) a small area, so that no patch has area 0.
     weight = np.maximum(texels.area, 1e-12).astype(np.float64)
     area = np.bincount(number, weight, n_patches).astype(np.float64)
     running = np.cumsum(weight[order])
@@ -116,8 +121,11 @@ def build_patches(
 def _smallest_block(
     texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
-    """Return the side of the smallest blocks that cut the chosen entries into at most `max_patches`."""
-    # Entries of one side of a page lie in pixels of their own: blocks of one texel are as many as they.
+    """Return the smallest side of blocks, texels, for which the chosen entries form at most `max_patches`.
+
+    chosen : (m,) int64, entries
+    """
+    # With blocks of one texel, each entry is a patch.
     if len(chosen) <= max_patches:
         return 1
     block = 2
@@ -130,11 +138,15 @@ def _smallest_block(
 
 
 def _keys(texels: TexelBuffer, level: NDArray[np.uint8], side: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n,) int64, equal for entries of one block; `side` (n,) is the side of blocks at each entry."""
+    """Return (n,) int64: a key for each entry, equal for the entries of one block.
+
+    level : (n,) uint8, gap level; side : (n,) int64, side of the block at each entry, texels
+    """
     size = texels.resolution
     page, rest = np.divmod(texels.pixel, size * size)
     row, column = np.divmod(rest, size)
-    # 26 directions: an axis-aligned or diagonal surface is never split by rounding.
+    # Quantise normals to 26 directions, the axes and diagonals. Rounding then splits no axis-aligned or
+    # diagonal surface.
     facing = np.rint(texels.normal.astype(np.float64) * 1.2).astype(np.int64) + 1
     direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
     key = (page * size + row // side) * size + column // side
@@ -148,7 +160,10 @@ def _blocks(
     side: NDArray[np.int64],
     link: NDArray[np.int32] | None,
 ) -> tuple[NDArray[np.int32], int]:
-    """Return the number (n,) of the block, or linked part of one, of each entry, and their count."""
+    """Return the patch number of each entry, (n,) int32, and the number of patches.
+
+    level, side : see `_keys`; link : see `build_patches`
+    """
     _, first, inverse = np.unique(_keys(texels, level, side), return_index=True, return_inverse=True)
     block = inverse.reshape(-1)
     if link is not None and len(link):
@@ -157,7 +172,7 @@ def _blocks(
         join_linked(within, root)
         linked = np.zeros(int(texels.chart.max()) + 1, bool)
         linked[texels.chart[link[:, 0]]] = True
-        # Blocks of charts without a cut stay whole.
+        # Do not split blocks of charts without links, which no surface cuts.
         root = np.where(linked[texels.chart], root, first[block].astype(np.int32))
         _, first, inverse = np.unique(root, return_index=True, return_inverse=True)
         block = inverse.reshape(-1)

@@ -1,7 +1,7 @@
-"""Points of texels for the ray kernels, computed tile by tile so that memory stays small.
+"""The 16 sample points of each texel, from which rays start.
 
-In small scenes the points are stored from one stage to the next, since computing them takes a tenth of the
-time of tracing the rays.
+Points are computed tile by tile to save memory. In small scenes they are also stored for the following
+stages, because computing the points takes about a tenth of the time of tracing their rays.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from baker.core.budget import MAX_CACHED_TEXELS
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
-# Empty outputs of `place_points` for triangles and barycentrics, which are not needed.
+# Empty arrays: `place_points` then does not write triangles and barycentrics.
 _NO_TRIANGLE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
@@ -30,19 +30,19 @@ def points_of(
     Parameters
     ----------
     surface : Surface
-        Triangles and texel entries.
+        Triangles and the n texel entries.
     valid_points : (n,) uint16
-        Bit k is set where point k of an entry is valid; invalid points are replaced by valid ones of the
+        Bit k is set where point k of an entry is valid. An invalid point is replaced by a valid point of the
         same entry.
     chosen : (m,) int64
         Texel entries.
-    wanted : (m or 1, w) uint8
-        Numbers of points, 0 to 15, of each chosen entry; all 16 by default.
+    wanted : (m, w) or (1, w) uint8
+        Numbers 0 to 15 of the points of each chosen entry, or of all of them; all 16 by default.
 
     Returns
     -------
     origin, normal : (m, w, 3) float32
-        World space.
+        Metres and unit vectors, world space.
     """
     shape = (len(chosen), wanted.shape[1])
     origin, normal = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 3), np.float32)
@@ -52,14 +52,14 @@ def points_of(
 
 @dataclass(frozen=True)
 class PointCache:
-    """The points of all n entries, filled tile by tile by the first stage that needs them.
+    """The points of all n texel entries. The first stage that uses a tile's points stores them.
 
     Attributes
     ----------
     origin, normal : (n, 16, 3) float32
-        World space.
+        Ray origins in metres, and unit shading normals; world space.
     filled : set of (int, int)
-        Spans of entries whose points are stored.
+        First entry and end of each tile whose points are stored.
     """
 
     origin: NDArray[np.float32]
@@ -78,7 +78,7 @@ def new_point_cache(n: int) -> PointCache | None:
     Returns
     -------
     PointCache or None
-        None for more than `core.budget.MAX_CACHED_TEXELS` entries.
+        Empty cache; None for more than `core.budget.MAX_CACHED_TEXELS` entries.
     """
     if n > MAX_CACHED_TEXELS:
         return None
@@ -89,7 +89,10 @@ def new_point_cache(n: int) -> PointCache | None:
 def tile_points(
     surface: Surface, valid_points: NDArray[np.uint16], begin: int, end: int, cache: PointCache | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return all points of entries begin to end, see `points_of`; they are stored in `cache`, if any."""
+    """Return `origin` and `normal` (m, 16, 3) of entries begin to end, see `points_of`.
+
+    Reads them from `cache`, or stores them there.
+    """
     if cache is None:
         return points_of(surface, valid_points, np.arange(begin, end))
     origin, normal = cache.origin[begin:end], cache.normal[begin:end]
@@ -108,9 +111,10 @@ def some_points(
     wanted: NDArray[np.uint8],
     cache: PointCache | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return one point of each chosen entry, (m, 1, 3), see `points_of`; from `cache` if it is complete.
+    """Return `origin` and `normal` (m, 1, 3) of one point of each chosen entry, see `points_of`.
 
-    chosen : (m,) int64, entries; wanted : (m,) uint8, number of the point of each, 0 to 15
+    chosen : (m,) int64, entries; wanted : (m,) uint8, number of one point of each, 0 to 15
+    cache : read if it holds the points of all entries
     """
     if cache is None or sum(end - begin for begin, end in cache.filled) < len(cache.origin):
         return points_of(surface, valid_points, chosen, wanted[:, None])

@@ -1,15 +1,17 @@
-"""Splits texels that lie on both sides of a surface passing through them, and groups texels into regions.
+"""Splits texels that another surface passes through, and groups texels into regions.
 
-A floor that continues under a wall, a ceiling above walls, a beam through a wall: a texel there has points on
-both sides of the other surface. A single value would be the mean of the light on both sides and would be
-visible on both. Its points are grouped by mutual visibility (`radiosity.kernels.sides`), and each group
-becomes an entry. The texel's own entry is the side with most points, and is stored in the page; the entries
-of the other sides come after fronts and backs, take part in light transport, and are stored in no page.
+Examples are a floor that continues under a wall, a ceiling above walls, and a beam through a wall. A texel
+there has points on both sides of the wall. A single value per texel would mix the light of both sides and
+show it on both.
+
+Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
+called a side, becomes a texel entry (a row of `TexelBuffer`). The side with most points becomes the texel's
+first entry and is stored in the page. The entries of the other sides come after fronts and backs. They take
+part in light transport but are stored in no page.
 
 Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
-are its regions: finishing mixes no values across their borders. Texels of a block that are not linked within
-it
-belong to different patches.
+are its regions. Later filters do not mix values of different regions. Texels of a block that are not
+connected by links within the block belong to different patches.
 """
 
 from __future__ import annotations
@@ -40,12 +42,13 @@ from baker.radiosity.point_cache import points_of
 from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
+# Items per tile: texels, texels whose points are grouped, and pairs of neighbouring entries.
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Pairs of neighbours are tested with one point of each, then with all.
+# Point 0: the first test of a pair of neighbours uses this point of both, the second test all points.
 _ONE = np.zeros((1, 1), np.uint8)
-# A side is outside of one-sided geometry if more than the share _MANY_BACKS of its rays hit backs; its points
-# then have the weight _OUTSIDE.
+# Share of rays that hit backs of one-sided surfaces above which a side lies outside a model, and the weight
+# of its points then (1 otherwise).
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -58,19 +61,19 @@ class Sides:
     Attributes
     ----------
     texels : TexelBuffer
-        All n entries; `region` of each front texel.
+        All n entries, with the new regions.
     surface : Surface
-        The same entries.
+        Kernel data of the same entries.
     valid_points : (n,) uint16
-        Bit k is set where point k of an entry is outside geometry and on the entry's side.
+        Bit k is set where point k of an entry is not inside geometry and lies on the entry's side.
     owner : (S,) int32
-        Entries of fronts and backs that were split, rising.
+        Entries of fronts and backs that were split, ascending.
     member : (K,) int32
-        Entries of all sides of these, in the order that `SideTable.member` counts.
+        Entries of all sides of the split texels; `SideTable.member` contains indices of this array.
     table : SideTable
-        Points of split texels, which choose the side of a hit.
+        Points of the split texels, from which the side of a hit is found.
     link : (m, 2) int32
-        Neighbouring entries that see each other, in all charts with a border between regions.
+        Pairs of neighbouring entries with mutually visible points, in all charts of several regions.
     rays : int
         Number of rays cast.
     """
@@ -85,26 +88,33 @@ class Sides:
     rays: int
 
     def seen_light(self, exitance: NDArray[np.float32]) -> SeenLight:
-        """Return the light that gather rays find.
+        """Return the table from which gather rays read the light that a hit texel reflects.
 
         Parameters
         ----------
         exitance : (n, 4) float32, lx
-            Light that entries reflect; SIDE_ROW is set in place: the number of a split texel from 1, else 0.
+            RGB that each entry reflects. Column SIDE_ROW is set in place: 1 + row of the split texel in
+            `owner`, or 0.
         """
         exitance[:, SIDE_ROW] = 0
         exitance[self.owner, SIDE_ROW] = np.arange(1, len(self.owner) + 1)
         return SeenLight(self.texels.hit_image(exitance), exitance[self.member], self.table)
 
     def seen_patches(self, patch: NDArray[np.int32]) -> SeenPatch:
-        """Return the patches that form-factor rays find; `patch` (n,) int32 is that of each entry."""
+        """Return the table from which form-factor rays read the patch of a hit texel.
+
+        patch : (n,) int32, patch of each entry
+        """
         marked = np.array(patch)
         marked[self.owner] = SPLIT - np.arange(len(self.owner), dtype=np.int32)
         return SeenPatch(self.texels.hit_image(marked, fill=-1), patch[self.member], self.table)
 
 
 class _Entries(NamedTuple):
-    """All entries after the split; side (n,) float32, metres, of the whole texel."""
+    """All entries after the split; see `Sides`.
+
+    side : (n,) float32, metres, side length of each entry's whole texel
+    """
 
     texels: TexelBuffer
     surface: Surface
@@ -114,14 +124,15 @@ class _Entries(NamedTuple):
 
 @dataclass(frozen=True)
 class _Groups:
-    """Entries whose points form several groups, or do not see all corners of their surface.
+    """The S entries whose points form several groups, or with a corner that no point sees.
 
     Attributes
     ----------
-    owner : (S,) int32, the entries, rising
-    label : (S, 16) int8, group of each point, from 0; -1 inside geometry
-    point, normal : (S, 16, 3) float32; height : (S, 16) float32, see `SideTable`
-    n : int, entries before the split
+    owner : (S,) int32, the entries, ascending
+    label : (S, 16) int8, group of each point, from 0; -1 for points inside geometry
+    point, normal : (S, 16, 3) float32, see `SideTable`
+    height : (S, 16) float32, see `SideTable`
+    n : int, number of entries before the split
     """
 
     owner: NDArray[np.int32]
@@ -133,26 +144,26 @@ class _Groups:
 
     @property
     def count(self) -> NDArray[np.int64]:
-        """Return the number of groups of each entry (S,)."""
+        """Return (S,) int64: the number of groups of each entry in `owner`."""
         count: NDArray[np.int64] = self.label.max(axis=1, initial=0).astype(np.int64) + 1
         return count
 
     def entry(self, row: NDArray[np.int64], group: NDArray[np.int64] | np.int64) -> NDArray[np.int64]:
-        """Return the entry of each group of the texel in a row: group 0 keeps the texel's own entry."""
+        """Return the new entry of a group of the texel in a row of `owner`; group 0 keeps the old entry."""
         before = np.concatenate([[0], np.cumsum(self.count - 1)])[:-1]
         entry = np.where(group == 0, self.owner[row], self.n + before[row] + group - 1)
         return np.asarray(entry, np.int64)
 
 
 def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
-    """Split the texels that some surface passes through.
+    """Split the texels that another surface passes through.
 
     Parameters
     ----------
     texels : TexelBuffer
         Fronts and backs, the entries of the job.
     job : TraceJob
-        Its `valid_points` are those outside geometry.
+        Ray origins and scene. Its `valid_points` exclude points inside geometry.
 
     Returns
     -------
@@ -174,7 +185,8 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
     rays += int(cast.sum())
     entries = _cut(texels, surface, valid, side, groups)
     pair = _of_sides(neighbours(texels, crossed != 0), groups)
-    # A surface between two whole texels crosses both.
+    # Test the pairs with a split texel, and the pairs of two crossed texels: a surface exactly between two
+    # texels crosses both.
     doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
     doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
     connected: NDArray[np.bool_] = np.logical_not(doubtful)
@@ -191,9 +203,9 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
 
 
 def _group(job: TraceJob, chosen: NDArray[np.int64], side: NDArray[np.float32]) -> tuple[_Groups, int]:
-    """Group the points of the chosen entries (m,); return those to split, and the number of rays cast.
+    """Group the points of the chosen entries; return the entries to split, and the number of rays cast.
 
-    side : (n,) float32, metres, of each entry's texel
+    chosen : (m,) int64, entries; side : (n,) float32, metres, side length of each entry's texel
     """
     surface, valid, n = job.surface, job.valid_points, job.n
     parts: dict[int, tuple[_Groups, int]] = {}
@@ -236,7 +248,10 @@ def _group(job: TraceJob, chosen: NDArray[np.int64], side: NDArray[np.float32]) 
 def _with_heights(
     point: NDArray[np.float32], normal: NDArray[np.float32], side: NDArray[np.float32], buffers: PacketBuffers
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Return points and normals (m * w, 3), from (m, w, 3), and the heights (m * w,) of their segments."""
+    """Return points and normals, flattened to (m * w, 3), and the heights (m * w,) of segments from them.
+
+    point, normal : (m, w, 3) float32; side : (m,) float32, metres; see `point_heights`
+    """
     height = np.zeros(point.shape[0] * point.shape[1], np.float32)
     flat, up = point.reshape(-1, 3), normal.reshape(-1, 3)
     point_heights(flat, up, np.repeat(side, point.shape[1]), buffers, height)
@@ -250,7 +265,10 @@ def _cut(
     side: NDArray[np.float32],
     groups: _Groups,
 ) -> _Entries:
-    """Give each group of points an entry: group 0 that of its texel, the others new ones at the end."""
+    """Return the entries after the split: group 0 keeps its texel's entry, other groups get new entries.
+
+    side : (n,) float32, metres, side length of each entry's texel
+    """
     extra = np.repeat(groups.owner, groups.count - 1)
     row, label = np.nonzero(groups.label >= 0)
     entry = groups.entry(row, groups.label[row, label].astype(np.int64))
@@ -264,16 +282,16 @@ def _cut(
 
 
 def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = False) -> NDArray[np.int32]:
-    """Return pairs of neighbouring entries of one chart and side.
+    """Return pairs of entries of one chart whose texels share an edge: two fronts, or two backs.
 
     Parameters
     ----------
     texels : TexelBuffer
         Fronts and backs.
     chosen : (n,) bool
-        Entries of which a pair holds at least one.
+        At least one entry of each pair is chosen.
     both : bool
-        Whether it must hold two.
+        If true, both entries of each pair are chosen.
 
     Returns
     -------
@@ -289,7 +307,10 @@ def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = F
 
 
 def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
-    """Return pairs (q, 2) after the split: each side of one texel with each side of the other."""
+    """Return (q, 2) int32: each side of one texel with each side of the other, for all pairs of texels.
+
+    pair : (p, 2) int32, entries before the split
+    """
     if not len(groups.owner):
         return pair
     row = np.searchsorted(groups.owner, pair)
@@ -309,7 +330,10 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool, mutual visibility of points of a pair of entries, and the number of rays cast."""
+    """Return (m,) bool, whether some points of the two entries see each other, and the number of rays cast.
+
+    pair : (m, 2) int32, entries
+    """
     connected = np.zeros(len(pair), np.uint8)
 
     def examine(chosen: NDArray[np.int64], wanted: NDArray[np.uint8]) -> None:
@@ -340,15 +364,16 @@ def _keep_largest(
     backs: NDArray[np.float64],
     rays: int,
 ) -> Sides:
-    """Give the own entry of each split texel its largest side, and number the regions.
+    """Store the largest side of each split texel in the texel's first entry, and number the regions.
 
-    link : (m, 2) int32, neighbouring entries that see each other, in the charts `cut`
-    backs : (S, groups) float64, see `_back_share`
+    link : (m, 2) int32, pairs of neighbouring entries with mutually visible points, in the charts `cut`
+    cut : (c,) int32, charts of several regions or with split texels
+    backs : (S, groups) float64, from `_back_share`
     """
     root = np.arange(len(entries.valid_points), dtype=np.int32)
     join_linked(link, root)
     member, table, order = _order_sides(entries, groups, root, backs)
-    # Entry k was entry order[k] before.
+    # Renumber: new entry k is old entry order[k].
     texels, surface, valid_points, _ = entries
     rank = np.zeros_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
@@ -366,7 +391,7 @@ def _keep_largest(
 
 
 def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDArray[np.float64], int]:
-    """Return the share (S, groups) of rays of each side that hit black backs, and the number of rays."""
+    """Return (S, groups) float64, the share of each side's rays that hit black backs, and the rays cast."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
     sobol_points = sobol_reversed(N_POINTS, job.seed, 9)
     cast = 0
@@ -388,18 +413,21 @@ def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDAr
 def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
-    """Choose the side that is stored in a split texel's own entry: the one with most points.
+    """Choose the side that is stored in a split texel's first entry: the side with most points.
 
-    Points of a side whose rays hit backs of one-sided surfaces have a smaller weight: it is the outside of a
-    room whose walls have no outside, or the underside of a floor that has none. A side whose region contains
-    no whole texel is not chosen: for example the strip of a wall below the floor that is narrower than a
-    texel.
+    If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side is
+    the outside of a room with one-sided walls, or the underside of a one-sided floor. A side whose region
+    contains no unsplit texel is chosen only if all sides are like this. An example is the part of a wall
+    below the floor, if it is narrower than a texel.
+
+    root : (n,) int32, smallest linked entry of each entry, from `join_linked`
+    backs : (S, groups) float64, from `_back_share`
 
     Returns
     -------
-    member : (K,) int32, entries of all sides in their new order
+    member : (K,) int32, entries of all sides in the new numbering
     table : SideTable
-    order : (n,) int32, old number of each entry
+    order : (n,) int32, old number of each new entry
     """
     order = np.arange(len(root), dtype=np.int32)
     if not len(groups.owner):
@@ -418,7 +446,7 @@ def _order_sides(
     best = groups.entry(np.arange(len(groups.owner)), score.argmax(axis=1))
     order[groups.owner], order[best] = best, groups.owner
     number = np.unique(entry).astype(np.int32)
-    # Swapping two entries of one texel is its own inverse.
+    # `order` swaps two entries of a texel, so it also maps old numbers to new ones.
     member = np.full(groups.label.shape, -1, np.int32)
     member[row, k] = np.searchsorted(number, order[entry])
     table = SideTable(groups.point, groups.normal, groups.height, member, entries.side[groups.owner])
@@ -428,7 +456,10 @@ def _order_sides(
 def _measure(
     texels: TexelBuffer, surface: Surface, valid_points: NDArray[np.uint16], member: NDArray[np.int32]
 ) -> TexelBuffer:
-    """Return the texels with area, position, normal and centroid of each side of split texels."""
+    """Return the texels with area, position, normal and centroid computed from each side's valid points.
+
+    member : (K,) int32, entries of all sides of split texels
+    """
     area, position, normal = (np.array(v) for v in (texels.area, texels.position, texels.normal))
     centroid = np.array(texels.centroid)
     shape = (len(member), N_POINTS)

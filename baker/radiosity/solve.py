@@ -1,16 +1,19 @@
-"""The radiosity solve: the irradiance of each patch from light reflected once or more.
+"""The radiosity solve: the irradiance E of each patch from light reflected at least once, for R, G and B.
 
-    E = F (s + rho E)        s: exitance of the first reflection, rho: albedo, for three colours at once
+    E = F (s + rho E)        F: form factors, s: direct light that patches reflect, rho: albedo
 
-With M = s + rho E this is (A / rho - A F) M = A s / rho, symmetric by reciprocity and positive definite
-for rho < 1: conjugate gradients, preconditioned by A / rho, need a few dozen products even where
-simple sweeps need thousands (a closed room of albedo 0.99). N bounces are N products instead.
+With M = s + rho E, the radiosity without emission, and the patch areas A, this becomes
 
-The norms of conjugate gradients are sums over all patches: a dim room beside a sunlit street contributes
-nothing to them, and the iteration converges for the street only. So the residual of every patch and colour is
-compared with the light of that patch, and the solve is repeated for the residual of the patches that have not
-converged. A row of the residual contains the light of its own patch only, so its rounding error is relative
-to that light.
+    (A / rho - A F) M = A s / rho
+
+The matrix is symmetric by reciprocity and positive definite for rho < 1. Conjugate gradients, preconditioned
+by A / rho, need a few dozen products with F. Jacobi sweeps would need thousands in a closed room of albedo
+0.99. A fixed number of bounces is computed with one product for each bounce after the first.
+
+The norms of conjugate gradients are sums over all patches. A dim room beside a sunlit street contributes
+almost nothing to these sums, so the iteration could stop before the room has converged. Therefore the
+residual of each patch and colour is compared with the light of that patch. The solve is repeated for the
+residual of the patches that have not converged.
 
 Based on: Goral et al., Modeling the interaction of light between diffuse surfaces, 1984; Neumann,
 New efficient algorithms with positive definite radiosity matrix, 1994; Saad, Iterative methods for
@@ -35,37 +38,39 @@ from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.kernels.conjugate_gradients import conjugate_step
 from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
-# Largest error of a patch's light, as a share of that light, at which the solve stops.
+# Estimated relative error of a patch's light at which the solve stops.
 TOLERANCE = 3e-5
+# Largest number of iterations of conjugate gradients.
 MAX_ITERATIONS = 1000
-# Entries of the matrix for each thread, at least.
+# Smallest number of nonzero matrix elements per thread.
 _PART = 250_000
-# Exitance below this share of the brightest patch, by colour, need not converge.
+# Share of the largest source exitance, per colour. The residual of a patch darker than that is compared with
+# this exitance, so that nearly black patches do not delay the solve.
 _DARK = 1e-15
-# Restart conjugate gradients after this reduction of the residual: search directions lose orthogonality, and
-# the error of the updated residual grows.
+# Reduction of the residual norm after which conjugate gradients are restarted. By then the search directions
+# have lost orthogonality, and the updated residual differs from the true residual.
 _REDUCTION = 1e-12
-# A closed room of albedo 1 has no solution.
+# Upper limit of albedo. A closed room of albedo 1 has no solution.
 MAX_ALBEDO = 0.999
-# Least albedo in the symmetric form, which divides by it.
+# Lower limit of albedo, because the symmetric form divides by albedo.
 MIN_ALBEDO = 1e-4
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Light of all bounces at patches.
+    """Indirect irradiance of P patches, and the error of the solve.
 
     Attributes
     ----------
     irradiance : (P, 3) float64, lx
-        Light that was reflected at least once.
+        RGB of light that was reflected at least once.
     iterations : int
-        Products with the matrix inside conjugate gradients, or bounces.
+        Iterations of conjugate gradients; for a fixed number of bounces, the products with the matrix.
     residual : float
-        |s + rho F M - M| / |s|, the largest of the three colours.
+        Norm over patches |s + rho F M - M| / |s|, the largest of the three colours.
     patch_error : float
-        The largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour: an estimate of the largest
-        relative error of a patch's light (a bound in a closed room of uniform light and albedo).
+        Largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour. It estimates the largest relative
+        error of a patch's light. It is a bound in a closed room of uniform light and albedo.
     """
 
     irradiance: NDArray[np.float64]
@@ -74,7 +79,7 @@ class Solution:
     patch_error: float
 
     def figures(self) -> dict[str, float]:
-        """Return the figures for the manifest."""
+        """Return iterations and errors by name, for `bake.json`."""
         return {
             "iterations": self.iterations,
             "residual": self.residual,
@@ -101,21 +106,21 @@ def solve_radiosity(
     source : (P, 3) float64, lx
         Direct light that patches reflect.
     albedo : (P, 3) float64
-        0 to 1; limited to `MIN_ALBEDO` to `MAX_ALBEDO`.
+        0 to 1; clipped to `MIN_ALBEDO` and `MAX_ALBEDO`.
     area : (P,) float64, m2
         Areas of the patches.
     bounces : int or None
-        Number of reflections; None means until converged. The final gather adds one more bounce from
-        these values, so N bounces need N - 1 products here.
+        Number of reflections; None means until converged. The final gather adds one more bounce, so N bounces
+        need N - 1 products here.
     progress : Progress
-        Called after each product.
+        Called for each product.
     threads : int
-        Work on the products; each row is one thread's, so the result does not depend on their number.
+        Number of threads for products. One thread sums each matrix row, so the result does not depend on it.
 
     Returns
     -------
     Solution
-        Converged, unless `patch_error` is above `TOLERANCE`.
+        Not converged if `patch_error` is above `TOLERANCE`.
     """
     report(progress, Stage.SOLVE, 0.0)
     albedo = np.clip(albedo, MIN_ALBEDO, MAX_ALBEDO)
@@ -138,7 +143,10 @@ def _converge(
     area: NDArray[np.float64],
     progress: Progress,
 ) -> Solution:
-    """Repeat conjugate gradients until every patch has converged; see `solve_radiosity`."""
+    """Repeat conjugate gradients until every patch has converged; see `solve_radiosity`.
+
+    source, albedo : (P, 3) float64; area : (P, 1) float64, m2
+    """
     exitance = source.copy()
     goal = _Goal(TOLERANCE * (1.0 - albedo), _DARK * source.max(axis=0, initial=0.0))
     iterations = 0
@@ -148,7 +156,8 @@ def _converge(
         share = goal.share(rest, exitance)
         if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
             break
-        # Leave out converged patches: rounding errors of a bright room are large against a dim one.
+        # Leave out converged patches, because the rounding errors of a bright room exceed the residual of a
+        # dim room.
         rest[share <= goal.MARGIN] = 0.0
         before = iterations
         iterations = _conjugate_gradients(product, exitance, rest, albedo, area, goal, progress, before)
@@ -173,19 +182,20 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
 
 
 def apply(matrix: FormFactorMatrix, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return F exitance, (P, 3) float64: the irradiance of patches from patches of that exitance."""
+    """Return the product of F and `exitance`, (P, 3) float64: the irradiance that the exitance causes."""
     with _Product(matrix, 1) as product:
         return product(exitance)
 
 
 class _Product:
-    """Multiplies by F on a pool of threads.
+    """Multiplies the form-factor matrix F by vectors, on a pool of threads.
 
     Parameters
     ----------
     matrix : FormFactorMatrix
+        F of P patches.
     threads : int
-        Each row is one thread's, so the result does not depend on their number.
+        Largest number of threads. One thread sums each matrix row, so the result does not depend on it.
     """
 
     def __init__(self, matrix: FormFactorMatrix, threads: int) -> None:
@@ -203,7 +213,7 @@ class _Product:
             self._pool.shutdown()
 
     def __call__(self, exitance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return F exitance, both (P, 3) float64."""
+        """Return the product of F and `exitance`; both are (P, 3) float64."""
         matrix, irradiance = self._matrix, np.zeros_like(exitance)
         exitance = np.ascontiguousarray(exitance)
 
@@ -227,17 +237,17 @@ class _Goal:
 
     Attributes
     ----------
-    tolerance : (P, 3) float64, as a share of the patch's exitance
-    dark : (3,) float64, lx, least exitance that the residual is compared with
+    tolerance : (P, 3) float64, allowed residual as a share of the patch's exitance
+    dark : (3,) float64, lx, lower bound of the exitance that `tolerance` is multiplied by
     """
 
-    # Conjugate gradients stop at this share of the allowed residual.
+    # Share of the allowed residual at which conjugate gradients stop.
     MARGIN: ClassVar[float] = 0.5
     tolerance: NDArray[np.float64]
     dark: NDArray[np.float64]
 
     def share(self, rest: NDArray[np.float64], exitance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the residual (P, 3) divided by the allowed one; 0 where there is no light."""
+        """Return (P, 3) float64: the residual `rest` divided by the allowed residual; 0 where `rest` is 0."""
         allowed = self.tolerance * np.maximum(exitance, self.dark)
         return np.divide(np.abs(rest), allowed, out=np.zeros_like(rest), where=rest != 0.0)
 
@@ -252,10 +262,14 @@ def _conjugate_gradients(
     progress: Progress,
     iteration: int,
 ) -> int:
-    """Add the solution of (I - rho F) x = rest to `exitance`, both (P, 3), changed in place.
+    """Add the solution x of (I - rho F) x = rest to `exitance`; return the new number of iterations.
 
-    `product` multiplies by F. In the scalar product weighted by A / rho the matrix is symmetric. `iteration`
-    is the number of iterations before, returned is the number after.
+    I - rho F is symmetric in the scalar product weighted by A / rho.
+
+    product : multiplies F by a (P, 3) array
+    exitance, rest : (P, 3) float64, lx, M and its residual; changed in place
+    albedo : (P, 3) float64; area : (P, 1) float64, m2
+    iteration : int, number of iterations so far
     """
     weight = area / albedo
     direction = rest.copy()
@@ -284,7 +298,7 @@ def energy_audit(
     indirect: NDArray[np.float64],
     albedo: NDArray[np.float64],
 ) -> dict[str, float]:
-    """Return the luminous flux that lights bring to surfaces, and where it ends.
+    """Return the luminous flux that arrives at surfaces from lights, and how much is absorbed or escapes.
 
     Parameters
     ----------
@@ -293,27 +307,27 @@ def energy_audit(
     area : (P,) float64, m2
         Areas of the patches.
     direct : (P, 3) float64, lx
-        Direct irradiance of patches.
+        Direct irradiance of the patches.
     reflected : (P, 3) float64, lx
-        The part of it that patches reflect.
+        Part of the direct irradiance that the patches reflect.
     indirect : (P, 3) float64, lx
-        Irradiance by light that was reflected at least once.
+        Irradiance of the patches by light that was reflected at least once.
     albedo : (P, 3) float64
         0 to 1.
 
     Returns
     -------
     dict of str to float
-        In lm, mean of R, G and B. emitted: arrives at surfaces straight from lights; absorbed: by surfaces,
-        black backs and BLEND surfaces included; escaped: leaves the scene after a reflection. emitted =
-        absorbed + escaped, up to the residual of the solve and the balance of the matrix rows.
+        Fluxes in lm, means of R, G and B. `emitted` arrives at surfaces directly from lights. `absorbed` ends
+        at surfaces, including black backs and BLEND surfaces. `escaped` leaves the scene after a reflection.
+        emitted = absorbed + escaped, up to the residual of the solve and the error of the matrix row sums.
     """
     flux = area[:, None] / 3.0
     leaving = reflected + albedo * indirect
     escaped = float((flux * leaving * matrix.open).sum())
     lost = matrix.lost[:, None] + (matrix.sky[:, None] - matrix.open)
     if matrix.transmittance is not None:
-        # Light that coloured surfaces absorb on the way reaches no patch.
+        # Add the light that coloured surfaces between patches absorb.
         lost = lost + matrix.row_sums()[:, None] - apply(matrix, np.ones_like(leaving))
     backs = float((flux * leaving * lost).sum())
     absorbed = float((flux * (direct + indirect - leaving)).sum()) + backs

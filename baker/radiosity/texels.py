@@ -1,4 +1,4 @@
-"""Texels of the atlas: coverage, points, area, normal and albedo of each."""
+"""Texels of the atlas: the triangles in each texel, and its mean position, normal and albedo."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TILE = 4096
 def build_texels(
     geometry: Geometry, shading: Shading, atlas: Atlas, *, seed: int, threads: int, progress: Progress
 ) -> tuple[TexelBuffer, Surface]:
-    """Find the texels of all pages: coverage, and the mean attributes of the covering triangles.
+    """Find the texels of all pages, and the mean attributes of the triangles that cover each texel.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def build_texels(
     atlas : Atlas
         Number and size of pages.
     seed : int
-        Start of the random sequence of points in texels.
+        Seed of the sample points in texels.
     threads : int
         Threads of this process.
     progress : Progress
@@ -47,7 +47,7 @@ def build_texels(
     TexelBuffer
         Fronts first, then the backs of texels on double-sided surfaces.
     Surface
-        The same entries, for kernels that start rays.
+        Kernel data of the same entries, from which ray origins are computed.
     """
     found = _overlaps(geometry, atlas.resolution, atlas.n_pages)
     n_front = len(found.pixel)
@@ -82,12 +82,13 @@ def build_texels(
 
 
 class _Overlaps(NamedTuple):
-    """Triangles that cover texels, in Morton order of the n texels.
+    """The n covered texels in Morton order, and the triangles that cover each texel.
 
-    pixel : (n,) int64, flat pixel of each texel in all pages
-    first : (n + 1,) int64, texel i has the rows first[i] to first[i + 1] of `entry` and `area`
-    entry : (m,) int32, triangle; area : (m,) float32, of the texel's square that it covers
-    chart : (n,) int32, the chart that covers most of a texel
+    pixel : (n,) int64, (page * resolution + row) * resolution + column of each texel
+    first : (n + 1,) int64, texel i is covered by the triangles `entry[first[i] : first[i + 1]]`
+    entry : (m,) int32, triangles
+    area : (m,) float32, area of the texel that each of these triangles covers, texels
+    chart : (n,) int32, chart that covers the largest area of each texel
     """
 
     pixel: NDArray[np.int64]
@@ -100,7 +101,7 @@ class _Overlaps(NamedTuple):
 class _Means(NamedTuple):
     """Area-weighted means over each of the n_front texels; all float32.
 
-    area : (n_front,), m2; centroid : (n_front, 2), texels from the texel centre
+    area : (n_front,), m2 of surface inside the texel; centroid : (n_front, 2), texels from the texel centre
     position, normal : (n_front, 3), world; albedo : (n_front, 3)
     """
 
@@ -114,7 +115,7 @@ class _Means(NamedTuple):
 def _surface(
     geometry: Geometry, atlas: Atlas, found: _Overlaps, front: NDArray[np.int32], seed: int
 ) -> Surface:
-    """Return the data of the entries for kernels; `front` (n,) is the front entry of each."""
+    """Return the kernel data of the n entries; `front` (n,) int32 is the front entry of each."""
     return Surface(
         position=geometry.position,
         normal=geometry.normal,
@@ -134,7 +135,7 @@ def _surface(
 
 
 def _two_sided(geometry: Geometry, found: _Overlaps) -> NDArray[np.int64]:
-    """Return the texels that a double-sided triangle covers, rising."""
+    """Return the texels that a double-sided triangle covers, (k,) int64, ascending."""
     two_sided = np.zeros(len(found.pixel), bool)
     if geometry.double_sided.any():
         owner = np.repeat(np.arange(len(found.pixel)), np.diff(found.first))
@@ -166,7 +167,7 @@ def _means(
 
 
 def _overlaps(geometry: Geometry, size: int, n_pages: int) -> _Overlaps:
-    """List the texels that triangles cover in pages of `size` x `size` texels."""
+    """Return the texels of all pages that triangles cover; a page has `size` x `size` texels."""
     at = np.zeros(n_pages * size * size, np.int64)
     nothing = np.zeros(0, np.int32), np.zeros(0, np.float32)
     list_overlaps(geometry.uv, geometry.triangle, geometry.page, size, at, *nothing)
@@ -189,7 +190,10 @@ def _overlaps(geometry: Geometry, size: int, n_pages: int) -> _Overlaps:
 def _untextured_albedo(
     shading: Shading, first: NDArray[np.int64], entry: NDArray[np.int32], entry_area: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return (n_front, 3) float32: area-weighted base colours of materials without textures."""
+    """Return (n_front, 3) float32: the area-weighted mean base colour of each texel, if nothing is textured.
+
+    first, entry, entry_area : see `TexelBuffer`
+    """
     owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
     weight = np.maximum(entry_area, 1e-9)
     total = np.bincount(owner, weight, len(first) - 1)
@@ -201,14 +205,22 @@ def _untextured_albedo(
 def _with_backs(
     value: NDArray[np.float32], front: NDArray[np.int32], back: NDArray[np.bool_], factor: float = 1.0
 ) -> NDArray[np.float32]:
-    """Append the values of backs, times `factor`, to those of fronts; returns `value` without backs."""
+    """Append the values of backs, which are `factor` times the values of their fronts.
+
+    value : (n_front, ...) float32; front (n,) int32, back (n,) bool : see `Surface`
+    Returns (n, ...) float32.
+    """
     if not back.any():
         return value
     return np.concatenate([value, np.float32(factor) * value[front[back]]])
 
 
 def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
-    """Return the entry of each pixel, dilated by one texel: edge neighbours before corners; -1 for none."""
+    """Return (P * H * W,) int32: the front entry of each pixel, -1 for none.
+
+    A pixel without an entry gets the entry of a neighbour: of one that shares an edge, else of one that
+    shares a corner.
+    """
     pages = np.full((n_pages, size + 2, size + 2), -1, np.int32)
     inner = pages[:, 1:-1, 1:-1]
     page, rest = np.divmod(pixel, size * size)
@@ -221,7 +233,7 @@ def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int
 
 
 def _metres2_per_texel(geometry: Geometry, size: int) -> NDArray[np.float32]:
-    """Return (T,) float32: world area over uv area in texels, 0 where a triangle has no uv area."""
+    """Return (T,) float32: m2 per texel of each triangle, 0 for triangles without uv area."""
     corner = geometry.uv[geometry.triangle].astype(np.float64) * size
     a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     texels = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

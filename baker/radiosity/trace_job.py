@@ -20,30 +20,31 @@ from baker.trace.packets import PacketBuffers, new_packet_buffers
 
 @dataclass(frozen=True)
 class TraceJob:
-    """Origins of rays, the scene that they are traced in, and the runner of the tiles of a stage.
+    """Ray origins, the scene in which rays are traced, and the runner of tiles.
 
     Attributes
     ----------
     surface : Surface
-        Triangles and the n texel entries from which rays start.
+        Triangles, and the n texel entries (rows of `TexelBuffer`) from which rays start.
     valid_points : (n,) uint16
-        Bit k is set where point k of an entry is valid: not inside geometry, and on the entry's side.
+        Bit k is set where point k of an entry is not inside geometry and lies on the entry's side
+        (`radiosity.sides`).
     lookup : TriangleLookup
         Maps hits to texels.
     tracer : Tracer
-        Embree scene that rays are traced against.
+        Embree scene.
     seed : int
         Seed of all random numbers.
     threads : int
-        Threads of this process that work on tiles.
+        Number of threads of this process that compute tiles.
     progress : Progress
         Called between tiles.
     chart : (n,) int32, optional
-        Chart of each entry. None treats all entries as one chart when emitters are chosen.
+        Chart of each entry. With None, emitters are chosen as if all entries were in one chart.
     point_cache : PointCache, optional
-        Points shared by stages with tiles of the same size; None computes them for each tile.
+        Points that several stages share. With None, each stage computes the points of its tiles.
     runner : TileRunner
-        Works on the tiles of a stage, in this process or in others.
+        Runs the tiles of a stage in this process or in others.
     """
 
     surface: Surface
@@ -71,12 +72,12 @@ class TraceJob:
         return new_packet_buffers(self.tracer)
 
     def occlusion_buffers(self, *, solid: bool = False) -> PacketBuffers:
-        """Return packet buffers for rays of which only the end counts, not the transmittance.
+        """Return packet buffers for rays without transmittance: a ray is blocked or not.
 
         Parameters
         ----------
         solid : bool
-            Whether rays end at BLEND surfaces wherever alpha is above 0, see `new_packet_buffers`.
+            If true, rays end at BLEND surfaces where alpha is above 0, see `new_packet_buffers`.
         """
         return new_packet_buffers(self.tracer.without_transmittance(), solid=solid)
 
@@ -87,7 +88,10 @@ class TraceJob:
     def some_points(
         self, entry: NDArray[np.int64], point: NDArray[np.uint8]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return origins and normals (m, 1, 3) float32 of one `point` (m,) of each `entry` (m,)."""
+        """Return origins and normals (m, 1, 3) float32 of one point of each entry.
+
+        entry : (m,) int64; point : (m,) uint8, number of the point, 0 to 15
+        """
         return some_points(self.surface, self.valid_points, entry, point, self.point_cache)
 
     def run(

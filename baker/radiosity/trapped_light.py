@@ -1,7 +1,8 @@
-"""Warns of light that is hardly absorbed: nearly white surfaces whose rays mostly hit each other.
+"""Warns about nearly white surfaces that mostly face each other, so that little light is absorbed.
 
-The share of light left after n reflections is s_n = (rho F) s_{n-1}, s_0 = 1. In a closed room of albedo rho
-it is rho^n, and all bounces together are 1 / (1 - rho) times the direct light.
+The share of a patch's light that remains after n reflections is s_n = (rho F) s_{n-1} with s_0 = 1, albedo
+rho and form factors F. In a closed room of albedo rho, s_n = rho^n, and all bounces together are 1 / (1 -
+rho) times the direct light.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from baker.core.scene import SceneWarning
 from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.solve import MAX_ALBEDO, Solution, apply, solve_warnings
 
-# Scenes without a patch of at least this albedo are not examined.
+# Albedo above which patches are tested.
 NEARLY_WHITE = 0.98
+# Number n of reflections in the test.
 REFLECTIONS = 20
-# No warning below this ratio of all light to direct light, that of a closed room of albedo 0.95.
+# Ratio of all light to direct light above which there is a warning. A closed room of albedo 0.95 has this
+# ratio.
 MOST_GAIN = 20.0
 
 
@@ -27,7 +30,7 @@ def light_warnings(
     area: NDArray[np.float64],
     bounces: int | None,
 ) -> list[SceneWarning]:
-    """Return warnings of bounced light: the solve ended early, or light is hardly absorbed.
+    """Return warnings about reflected light: the solve did not converge, or little light is absorbed.
 
     Parameters
     ----------
@@ -45,7 +48,7 @@ def light_warnings(
     Returns
     -------
     list of SceneWarning
-        Empty if there is nothing to warn of.
+        At most one of each kind.
     """
     return [*solve_warnings(solution), *trapped_light(matrix, albedo, area, bounces)]
 
@@ -61,10 +64,14 @@ def trapped_light(
     Parameters
     ----------
     matrix : FormFactorMatrix
+        F of P patches.
     albedo : (P, 3) float64
+        0 to 1.
     area : (P,) float64, m2
+        Areas of the patches.
     bounces : int or None
-        As in the solve; few bounces cannot multiply light by much.
+        Number of reflections of the solve; None means until converged. There is no warning below `MOST_GAIN`
+        bounces, because N bounces multiply light by at most N + 1.
     """
     white = albedo.max(axis=1) > NEARLY_WHITE
     if not white.any() or (bounces is not None and bounces < MOST_GAIN):
@@ -79,7 +86,7 @@ def trapped_light(
         return []
     share = 100.0 * float(area[trapped].sum() / area.sum())
     each = float(np.average(left[trapped], weights=area[trapped])) ** (1.0 / REFLECTIONS)
-    # Row sums are measured by rays: those of a closed room may be a little above 1.
+    # Limit the mean albedo, because row sums of F are estimated with rays and may slightly exceed 1.
     most = 1.0 / (1.0 - min(each, MAX_ALBEDO))
     message = (
         f"surfaces that reflect over {100 * NEARLY_WHITE:g} % see little but each other "

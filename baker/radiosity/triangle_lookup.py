@@ -1,4 +1,4 @@
-"""Builds the triangle table of a bake: one cache line a triangle."""
+"""Builds the triangle table of a bake, with one cache line (64 bytes) per triangle."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from baker.kernels.triangle_lookup import (
 
 
 def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emitters) -> TriangleLookup:
-    """Build the triangle table of a bake.
+    """Build the table from which kernels read the data of a hit triangle.
 
     Parameters
     ----------
     geometry : Geometry
-        Triangles.
+        The T triangles.
     texels : TexelBuffer
-        Their texels.
+        Texels of these triangles.
     emitters : Emitters
-        Made from the same triangles.
+        Emitters of these triangles.
 
     Returns
     -------
     TriangleLookup
-        One row a triangle.
+        One row per triangle.
     """
     row = np.zeros((len(geometry.triangle), ROW_LENGTH), np.float32)
     uv = geometry.uv[geometry.triangle]
@@ -45,7 +45,7 @@ def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emi
     row[:, UV_EDGE_1 : UV_EDGE_1 + 2] = uv[:, 1] - uv[:, 0]
     row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, PAGE] = geometry.page
-    # If only slivers without texels are double-sided there are no back entries: treat them as one-sided.
+    # Treat double-sided triangles as one-sided if there are no back entries, because none covers a texel.
     row[:, DOUBLE_SIDED] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, FACE_NORMAL : FACE_NORMAL + 3] = geometry.face_normal
     row[:, FACE_AREA] = geometry.area

@@ -3,8 +3,9 @@
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
-These are the light samples of the balance heuristic; hemisphere rays that hit the same emitters are the other
-ones (`emitter_hit`). Where no shadow ray is blocked, the closed form replaces both (`polygon_light`).
+n is the number of shadow rays, and p are probability densities per steradian. The balance heuristic combines
+these light samples with n_hemisphere rays that hit the same emitters (`emitter_hit`). Where no shadow ray is
+blocked, the closed form of `polygon_light` replaces both.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
 """
@@ -40,15 +41,15 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, ORG_Y, ORG_Z, PACKET
 
 _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
-# Shadow rays end at this share of their length, just before the light.
+# TFAR of shadow rays, as a share of the distance to the emitter, so that they do not hit it.
 _SHORT = np.float32(0.9999)
-# The closed form is used for at most one emitter for each of these samples of a texel.
+# Smallest number of samples per texel and emitter for which the closed form is used.
 _SAMPLES_PER_EMITTER = 8
-# Early out: sixteen texels are unoccluded if none of their first rays is blocked, and there are at least
-# this many of them a texel.
+# Early out: sixteen texels are treated as unoccluded if they have at least this many test rays per texel and
+# no test ray is blocked.
 _MIN_TESTS = 8
-# Rows of `sampled`, the emitters that lanes chose: corner 0, edges 1 and 2, normal (3 each), density per m2,
-# 1 if two-sided, radiance (3).
+# Rows of `sampled`, the data of the emitter that each lane samples: corner 0, edges 1 and 2, normal (3 each),
+# probability density per m2, 1 if two-sided, radiance (3).
 _CORNER, _EDGE_1, _EDGE_2, _NORMAL, _DENSITY, _TWO_SIDED, _RADIANCE = 0, 3, 6, 9, 12, 13, 14
 _SAMPLED_ROWS = 17
 # Working memory of `light_samples`.
@@ -60,15 +61,19 @@ _parts = scratch((N_POINTS, 6 * PACKET_WIDTH), _f)
 
 @inner
 def mis_weighted(cosine, density, n_light, n_hemisphere):
-    """Return cosine / (n_light p_light + n_hemisphere p_cosine), densities per steradian."""
+    """Return cosine / (n_light p_light + n_hemisphere p_cosine).
+
+    density : p_light, per steradian; p_cosine is cosine / pi
+    """
     return cosine / (n_light * density + n_hemisphere * cosine * _INV_PI)
 
 
 @inner
 def load_points(rays, facing, origin, normal, group, lanes, k):
-    """Write origins of point k of texels `group` to `group + lanes` to `rays`, normals to `facing`.
+    """Copy origin and normal of point k of `lanes` texels from texel `group` on, by lane.
 
-    rays : (21 * 16,) float32 output, a packet; facing : (3 * 16,) float32 output
+    rays : (21 * 16,) float32 output, a packet whose origins are set
+    facing : (3 * 16,) float32 output, normals
     origin, normal : (m, 16, 3) float32, metres, world, and unit
     """
     for lane in range(lanes):
@@ -79,12 +84,12 @@ def load_points(rays, facing, origin, normal, group, lanes, k):
 
 @inner
 def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, sampled):
-    """Choose an emitter for every lane and copy its data.
+    """Sample an emitter for every lane, and copy its data to `sampled`.
 
     row (M, 24), starts (C + 1,), chance, cumulative (C,) : see `emitters.TileEmitters`
-    first, second : uint32, the sample's bit-reversed Sobol numbers
+    first, second : uint32, bit-reversed Sobol numbers of the sample
     seeds : (2 * 16,) uint32, see `lane_seeds`; shared : uint32, see `sampling`
-    uv : (2 * 16,) float32 output, uniform numbers for the point on the emitter
+    uv : (2 * 16,) float32 output, uniform numbers from which the point on the emitter is sampled
     chosen : (16,) int64 output, emitters; sampled : (17 * 16,) float32 output, see the row names
     """
     for lane in range(PACKET_WIDTH):
@@ -98,7 +103,8 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
         sampled[_DENSITY * PACKET_WIDTH + lane] = density
         same = same and m == chosen[0]
     if same:
-        # The usual case, since neighbouring texels share the first bits of their numbers: vector code.
+        # All lanes sample one emitter, the usual case because neighbouring texels share the first bits of
+        # their random numbers. These loops are vectorised.
         m = chosen[0]
         for a in range(3):
             for lane in range(PACKET_WIDTH):
@@ -123,15 +129,15 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
 
 @inner
 def aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weight):
-    """Write the shadow ray of every lane and its MIS weights for both estimates.
+    """Write the shadow ray of every lane, and the factors from its radiance to both irradiance estimates.
 
     rays : (21 * 16,) float32, a packet with origins; directions and TFAR are set
     facing : (3 * 16,) float32, unit normals of the points
     uv : (2 * 16,) float32, uniform numbers; replaced by the barycentrics b1 and b2 on the emitter
     sampled : (17 * 16,) float32, see the row names
-    n_light, first_n, second_n : float32, numbers of light samples, and of hemisphere samples that each
-        estimate is weighted against
-    weight : (2 * 16,) float32 output, 0 for lanes whose point cannot see the emitter's front
+    n_light : float32, number of light samples
+    first_n, second_n : float32, numbers of hemisphere samples in the MIS weights of both estimates
+    weight : (2 * 16,) float32 output, factors, see `mis_weighted`; 0 if a cosine is not positive
     """
     for lane in range(PACKET_WIDTH):
         # Sample a point on the emitter.
@@ -154,7 +160,7 @@ def aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weigh
         dx -= rays[ORG_X * PACKET_WIDTH + lane]
         dy -= rays[ORG_Y * PACKET_WIDTH + lane]
         dz -= rays[ORG_Z * PACKET_WIDTH + lane]
-        # Cosines at the texel and at the emitter.
+        # Compute the cosines at the texel and at the emitter.
         square = larger(dx * dx + dy * dy + dz * dz, _f(1.0e-30))
         length = math.sqrt(square)
         cosine = (
@@ -168,7 +174,7 @@ def aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weigh
         light = -light / length
         light = abs(light) if sampled[_TWO_SIDED * PACKET_WIDTH + lane] > _f(0.0) else light
         seen = cosine > _f(0.0) and light > _f(1.0e-6)
-        # Density per steradian, and the balance heuristic.
+        # Convert the density to steradians, and apply the balance heuristic.
         steradian = sampled[_DENSITY * PACKET_WIDTH + lane] * square / larger(light, _f(1.0e-6))
         cosine = cosine if seen else _f(0.0)
         share = n_light * steradian
@@ -188,20 +194,21 @@ def light_samples(
 ):
     """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
-    Early out: sixteen neighbouring texels first trace one ray from each of their points. If none of these up
-    to 256 rays is blocked, their other rays are not traced and are treated as unblocked. Where a share p of
-    the light is hidden, the expected error is p (1 - p)^256 of it, at most 0.15 %. If there are few emitters
-    and none is textured, the closed form replaces the samples of such texels, and hemisphere rays add
-    nothing.
+    Early out: first, one test ray is traced from each point of sixteen neighbouring texels. If none of these
+    up to 256 rays is blocked, the other rays are not traced and are treated as unblocked. If the share p of
+    the light is blocked, the expected error is p (1 - p)^256 of the light, at most 0.15 %. If there are few
+    emitters and none is textured, the closed form replaces the samples of such texels. Hemisphere rays then
+    add nothing.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
     emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
-    buffers : PacketBuffers; begin : number of the first texel, for its random numbers
-    sobol_points : (n, 2) uint32, one row a shadow ray; shared : uint32, see `sampling`
-    hemisphere : (2,) float64, hemisphere samples that each estimate is weighted against
-    analytic : (m,) uint8, set to 1 for texels whose light is complete in both estimates
-    out : (m, 6) float32, lx, added to: two estimates of RGB, which differ in their MIS weights
-    second : (m,) float32 output, sum over 16 batches of the square of the first estimate's share
+    buffers : PacketBuffers; begin : number of the first texel, which seeds its random numbers
+    sobol_points : (n, 2) uint32, one row per shadow ray; shared : uint32, see `sampling`
+    hemisphere : (2,) float64, numbers of hemisphere rays in the MIS weights of both estimates
+    analytic : (m,) uint8, set to 1 for texels for which the closed form is used
+    out : (m, 6) float32, lx, added to: two RGB estimates, which differ in their MIS weights
+    second : (m,) float32 output, sum of squares of the 16 points' contributions R + G + B to the first
+        estimate
     """
     n_samples = len(sobol_points)
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
@@ -213,8 +220,8 @@ def light_samples(
     any_alpha = False
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
-    # Allow the closed form if emitters are few (one at all points costs as much as some samples), untextured
-    # and opaque. Alpha of other triangles is found by the early-out tests.
+    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque. The
+    # early- out tests find occluders with alpha.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)
@@ -222,7 +229,7 @@ def light_samples(
             untextured = untextured and (not any_alpha or shading.alpha.slot[triangle[m]] < 0)
     found = _vectors()
     radiance = _rgba()
-    # Sums over the few samples of one point are float32, those over all points float64.
+    # Sum over the samples of one point in float32, and over all points in float64.
     part = _parts()
     uv, weight = _pairs(), _pairs()
     chosen, sampled = _numbers(), _sampled()
@@ -238,7 +245,7 @@ def light_samples(
             for j in range(6 * PACKET_WIDTH):
                 part[k, j] = _f(0.0)
         tested = blocked = 0
-        # Compute the closed form; without any light of it the texels are complete.
+        # Compute the closed form. If it is 0, emitters do not light these texels.
         if untextured:
             unoccluded_irradiance(origin, normal, group, lanes, row, found)
             lit = False
@@ -248,7 +255,7 @@ def light_samples(
                 for lane in range(lanes):
                     analytic[group + lane] = 1
                 continue
-        # Round 0 traces one early-out test for each point, round 1 the other samples.
+        # Trace one early-out test for each point in round 0, and the other samples in round 1.
         for turn in range(rounds):
             clear = turn == 1 and blocked == 0 and tested >= _MIN_TESTS * lanes
             if clear and untextured:
@@ -257,8 +264,8 @@ def light_samples(
                 start, end = -(-k * n_samples // N_POINTS), -(-(k + 1) * n_samples // N_POINTS)
                 if start == end:
                     continue
-                # Use a different sample of each point as the early-out test, so that these tests are
-                # stratified.
+                # Use a sample with a different number for each point as its early-out test, so that the tests
+                # are stratified.
                 early_out = start + k % (end - start)
                 load_points(rays, facing, origin, normal, group, lanes, k)
                 for s in range(start, end):
@@ -275,7 +282,8 @@ def light_samples(
                         on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
                         asked -= on[lane]
                     if shading is not None:
-                        # Weight by alpha: cut-out parts emit nothing. Gather rays already pass through them.
+                        # Multiply by alpha, because cut-out parts emit nothing. Gather rays pass through
+                        # these parts.
                         for lane in range(lanes if any_alpha else 0):
                             m = chosen[lane]
                             b1, b2 = on_triangle(row, m, uv[lane], uv[PACKET_WIDTH + lane])
@@ -295,9 +303,8 @@ def light_samples(
                             hidden = on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                        # Treat a BLEND surface on the way as a blocker, since each ray has its own
-                        # transmittance. Without any, all are 1, and remain so for the rays that are not
-                        # traced.
+                        # Count rays through BLEND surfaces as blocked, so that all other rays are traced and
+                        # get their own transmittance. Otherwise the transmittance of all lanes is 1.
                         blocked += count_coloured(buffers.blend)
                     # Look up the radiance of textured emitters.
                     if shading is not None:
@@ -315,7 +322,7 @@ def light_samples(
                             light *= transmittance(buffers.blend, c, lane)
                             part[k, c * PACKET_WIDTH + lane] += light * weight[lane]
                             part[k, (3 + c) * PACKET_WIDTH + lane] += light * weight[PACKET_WIDTH + lane]
-        # Use the closed form where no ray is blocked. It has no variance, so `second` is unchanged.
+        # Use the closed form if no test ray is blocked. It has no variance, so `second` is unchanged.
         if untextured and blocked == 0 and tested >= _MIN_TESTS * lanes and n_samples >= N_POINTS:
             for lane in range(lanes):
                 analytic[group + lane] = 1
@@ -323,7 +330,7 @@ def light_samples(
                     out[group + lane, c] += found[c * PACKET_WIDTH + lane]
                     out[group + lane, 3 + c] += found[c * PACKET_WIDTH + lane]
             continue
-        # Else sum over the points.
+        # Otherwise sum over the points.
         for lane in range(lanes):
             squares = 0.0
             for k in range(N_POINTS):
@@ -344,13 +351,15 @@ def light_samples(
 def emitter_hit(
     row, emitter_row, chance, cumulative, prim, m, direction, normal, distance, n_light, n_hemisphere
 ):
-    """Return the factor from the radiance of emitter m, hit by a hemisphere ray, to its share of irradiance.
+    """Return the factor from the radiance of emitter m to the irradiance that one hemisphere ray adds.
 
-    row : (T, 16) float32, see `TriangleLookup`; prim : triangle hit
+    row : (T, 16) float32, see `TriangleLookup`; prim : triangle that the ray hits
     emitter_row (M, 24), chance, cumulative (C,) : see `emitters.TileEmitters`
-    direction : unit direction of the ray; normal : unit normal of the texel's point; tuples of three float32
-    distance : metres; n_light, n_hemisphere : samples of the balance heuristic
-    0 for the back of a one-sided emitter.
+    direction, normal : tuples of three float32, unit direction of the ray, and unit normal of the texel's
+        point
+    distance : distance of the hit, metres
+    n_light, n_hemisphere : numbers of shadow rays and hemisphere rays
+    The factor is 0 at the back of a one-sided emitter.
     """
     dx, dy, dz = direction
     nx, ny, nz = normal

@@ -19,14 +19,16 @@ def conjugate_step(
 ):
     """Advance the solution of (I - rho F) x = b by one step, separately for each colour.
 
-    product : (P, 3) float64, F direction; overwritten
-    albedo, weight : (P, 3) float64, rho and A / rho
-    direction, exitance, residual : (P, 3) float64, search direction, solution and b - (I - rho F) x; updated
+    product : (P, 3) float64, F times `direction`; overwritten
+    albedo, weight : (P, 3) float64, rho, and A / rho, the weight of the scalar product (A: patch area)
+    direction : (P, 3) float64, search direction; updated
+    exitance : (P, 3) float64, x, the solution; updated
+    residual : (P, 3) float64, b - (I - rho F) x; updated
     allowed : (P, 3) float64, allowed residual, as a share of exitance
     dark : (3,) float64, lower bound of the exitance that `allowed` is multiplied by
-    active : (3,) uint8, colours to advance; set to 0 where the direction has no curvature
+    active : (3,) uint8, 1 for colours to advance; set to 0 if the curvature along `direction` is not positive
     size : (3,) float64, weighted squared norm of the residual; updated
-    worst : (3,) float64 output, largest ratio of residual and allowed residual
+    worst : (3,) float64 output, largest residual / allowed residual of a patch
     """
     n = len(residual)
     curvature, step, ratio = _three(), _three(), _three()
@@ -51,7 +53,7 @@ def conjugate_step(
             residual[i, c] -= step[c] * product[i, c]
             size[c] += weight[i, c] * residual[i, c] * residual[i, c]
             light = allowed[i, c] * larger(exitance[i, c], dark[c])
-            # Compare products: both sides are 0 where there is no light.
+            # Compare products, because a quotient would be 0 / 0 without light.
             if abs(residual[i, c]) > worst[c] * light:
                 worst[c] = abs(residual[i, c]) / light
     # Choose the next direction.

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays that estimate which clusters of emitters the texels of a tile can see."""
+"""Shadow rays that estimate which clusters of emitters are visible from the texels of a tile."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from baker.trace.jit import inner, kernel, smaller
 from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
-# Shadow rays end at this share of their length, just before the light.
+# TFAR of shadow rays, as a share of the distance to the emitter, so that they do not hit it.
 _SHORT = np.float32(0.9999)
-# First of the hash inputs for the uniform numbers of a ray.
+# Hash input for dimension 0 of a ray's uniform numbers; dimension d uses _SALT + d.
 _SALT = 77
 _INV_2_24 = np.float32(5.9604645e-08)
 
 
 @kernel
 def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen):
-    """Count the rays from blocks of texels to each cluster with non-zero cosines, and the unblocked ones.
+    """Trace shadow rays from blocks of texels to each cluster, and count the unblocked rays.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of neighbouring texels
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of the texels of a tile
     row (M, 24) float32, first (C + 1,) int32 : see `emitters.Emitters`
     buffers : PacketBuffers
-    bounds : (B + 1,) int64, texels of block b are bounds[b] to bounds[b + 1]
+    bounds : (B + 1,) int64, block b contains the texels bounds[b] to bounds[b + 1] - 1
     chosen : (C,) bool, clusters to probe
     n_rays : rays from each block to each cluster, from points distributed over the block
-    asked : (B, C) int32 output, rays between a front of the surface and a side that emits
-    seen : (B, C) int32 output, the unblocked ones of them
+    asked : (B, C) int32 output, rays with positive cosines at the texel and at the emitter
+    seen : (B, C) int32 output, rays of `asked` that nothing blocks
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query
@@ -54,7 +54,7 @@ def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, 
                             rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, k, a]
                         on[lane] = _aim(rays, lane, normal, i, k, row, first[c], first[c + 1], code)
                         asked[b, c] -= on[lane]
-                # Trace it, and count the unblocked rays.
+                # Trace the packet, and count the unblocked rays.
                 trace_shadow_lanes(
                     buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare
                 )
@@ -71,11 +71,13 @@ def _uniform(code, dimension):
 
 @inner
 def _aim(rays, lane, normal, i, k, row, start, end, code):
-    """Write a ray to a point of emitters `start` to `end`; return -1 if light may arrive along it, else 0.
+    """Write a ray from a texel's point to a random point of a cluster.
 
-    rays : (21 * 16,) float32, a packet with origins
+    rays : (21 * 16,) float32, a packet with origins; the direction and TFAR of `lane` are set
     normal : (m, 16, 3) float32, unit; the ray starts at point [i, k]
-    row : (M, 24) float32, see `emitters.Emitters`; code : uint32, number of the ray
+    row : (M, 24) float32, see `emitters.Emitters`; the cluster contains the emitters `start` to `end` - 1
+    code : uint32, number of the ray
+    Returns -1 if the cosines at the texel and at the emitter are positive, else 0.
     """
     # Choose an emitter of the cluster in proportion to its power.
     u = _uniform(code, 2)

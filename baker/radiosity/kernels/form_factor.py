@@ -1,7 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Form factors of patches by cosine-weighted rays, and products with their matrix.
+"""Form factors of patches from cosine-weighted rays, and operations on their matrix.
 
-    F_ij = share of light leaving patch i that arrives at j = share of i's cosine-weighted rays that hit j
+    F_ij = share of the light leaving patch i that arrives at patch j
+         = share of the cosine-weighted rays of patch i that hit patch j
 
 Based on: Malley, A shading method for computer generated images, 1988; Goral et al., Modeling the
 interaction of light between diffuse surfaces, 1984; Cohen and Wallace, Radiosity and realistic image
@@ -30,9 +31,10 @@ from baker.trace.packets import (
     trace_lanes,
 )  # fmt: skip
 
-# Targets of rays that hit no patch; SPLIT - s: the split texel in row s of the table of sides.
+# Values of `target` instead of a patch: the ray ended on a surface without a patch; it left the scene; SPLIT
+# - s: it hit the split texel in row s of the `SideTable`.
 LOST, SKY, SPLIT = -1, -2, -3
-# Columns of `tally`: rays that left the scene, rays lost on black backs or uncovered texels.
+# Columns of `tally`: number of rays that left the scene, and that ended on black backs or uncovered texels.
 ESCAPED, ABSORBED = 0, 1
 
 
@@ -40,15 +42,15 @@ ESCAPED, ABSORBED = 0, 1
 def cast_form_factors(
     origin, normal, lookup, seen, buffers, begin, sobol_points, shared, target, tally, colour
 ):
-    """Trace the rays of patches, and write the patches that they hit.
+    """Trace R rays from each of m patches, and write the patch that each ray hits.
 
-    origin, normal : (m, R, 3) float32, metres, world, and unit; one point a ray of patches begin to begin + m
-    lookup : TriangleLookup; seen : SeenPatch, patches that hits lie on
-    buffers : PacketBuffers; begin : number of the first patch, for its random numbers
-    sobol_points : (R, 2) uint32, one row a ray; shared : uint32, see `sampling`
-    target : (m, R) int32 output, patch hit, LOST or SKY
-    tally : (P, 2) int32, rays are added, see the column names
-    colour : (m, R, 3) float32 output, transmittance along each ray; (0, R, 3) if no BLEND surface is coloured
+    origin, normal : (m, R, 3) float32, metres, world, and unit; one point per ray
+    lookup : TriangleLookup; seen : SeenPatch, maps hits to patches
+    buffers : PacketBuffers; begin : number of the first patch, which seeds its random numbers
+    sobol_points : (R, 2) uint32, one row per ray; shared : uint32, see `sampling`
+    target : (m, R) int32 output, patch that was hit, LOST or SKY
+    tally : (P, 2) int32, counts are added, see the column names
+    colour : (m, R, 3) float32 output, RGB transmittance of each ray; (0, R, 3) if no surface colours light
     """
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
     query = buffers.query
@@ -72,7 +74,7 @@ def cast_form_factors(
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
             trace_transmittance(buffers.blend, buffers.occluded, width, on, rays, words, spare_on, spare)
             _note_colour(buffers.blend, colour, group, lanes, r)
-            # Find the patch of each hit; put hits on split texels aside.
+            # Find the patch of each hit; store hits on split texels for the next step.
             n_split = 0
             for lane in range(lanes):
                 p = group + lane
@@ -95,7 +97,7 @@ def cast_form_factors(
                     n_split += 1
                 elif target[p, r] < 0:
                     tally[begin + p, ABSORBED] += 1
-            # Find the side of each hit on a split texel. That uses the packet's lanes.
+            # Find the side of each hit on a split texel. `find_side` overwrites the packet.
             if n_split > 0:
                 for lane in range(lanes):
                     p = group + lane
@@ -116,9 +118,9 @@ def cast_form_factors(
 
 @inner
 def _note_colour(blend, colour, group, lanes, r):
-    """Write the transmittance of ray r of patches `group` to `group + lanes`.
+    """Write the transmittance of ray r of `lanes` patches from patch `group` on.
 
-    blend : of `PacketBuffers`; colour : (m, R, 3) float32 output, or without rows
+    blend : `PacketBuffers.blend`; colour : (m, R, 3) float32 output, or (0, R, 3): nothing is written
     """
     if blend is None or len(colour) == 0:
         return
@@ -129,7 +131,7 @@ def _note_colour(blend, colour, group, lanes, r):
 
 @kernel
 def multiply(first, column, value, exitance, irradiance):
-    """Write irradiance = F exitance.
+    """Write the product of F and `exitance` to `irradiance`.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR
     exitance : (P, 3) float64, lx; irradiance : (P, 3) float64 output, lx
@@ -149,7 +151,7 @@ def multiply(first, column, value, exitance, irradiance):
 
 @kernel
 def multiply_coloured(first, column, value, transmittance, exitance, irradiance):
-    """Write irradiance = F exitance, with a transmittance for each form factor and colour.
+    """Write the product of F and `exitance` to `irradiance`, with F_ij times its RGB transmittance.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR
     transmittance : (nnz, 3) float32; exitance : (P, 3) float64, lx; irradiance : (P, 3) float64 output, lx
@@ -169,10 +171,10 @@ def multiply_coloured(first, column, value, transmittance, exitance, irradiance)
 
 @kernel
 def transpose(first, column, value, at, out_column, out_value):
-    """Write column and value of the transpose of a square CSR matrix; columns of a row ascend.
+    """Write the transpose of a square CSR matrix; columns ascend within its rows.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : the matrix
-    at : (P,) int64, where each row of the transpose begins; advanced to where it ends
+    at : (P,) int64, index of the first element of each row of the transpose; the row's end on return
     out_column (nnz,) int32, out_value (nnz,) float32 : output
     """
     for i in range(len(first) - 1):
@@ -195,10 +197,11 @@ def merge_reciprocal_estimates(
     patch's own estimate and A_i / (A_i + A_j) for the reciprocal one.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR, columns of a row ascend
-    other_first, other_column, other_value : its transpose: row i has the entries F_ji
+    other_first, other_column, other_value : transpose of F, whose row i contains F_ji
     area : (P,) float64, m2
-    out_first (P + 1,), out_column, out_value (2 nnz or less,) : output
-    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| of the raw estimates.
+    out_first (P + 1,), out_column (2 nnz,), out_value (2 nnz,) : output, merged F in CSR; the end may be
+        unused
+    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| before merging.
     """
     at = 0
     exchanged = 0.0
@@ -231,28 +234,31 @@ def merge_reciprocal_estimates(
 
 @kernel
 def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
-    """Replace F_ij by d_i F_ij d_j with factors d that make row sums `goal`; A_i F_ij stays symmetric.
+    """Replace F_ij by d_i F_ij d_j, with factors d for which the row sums are close to `goal`.
 
-    The condition is d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i). Without slack, a large patch whose few
-    rays all missed a small patch would lower the small patch's accurate row sum. In log d this is the minimum
-    of a convex function, and each step is the exact minimum along one coordinate, so no damping is needed (15
-    passes; damped passes over all coordinates took over 30).
+    A_i F_ij stays symmetric. The factors satisfy
+
+        d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i)
+
+    Without slack, a large patch whose few rays all missed a small patch would lower the small patch's
+    accurate row sum. The solution minimises a convex function of log d. Each step finds the exact minimum
+    along one coordinate, so the steps need no damping.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR; value is changed in place
-    goal : (P,) float64, row sums; slack : (P,) float64, uncertainty of each goal
+    goal : (P,) float64, row sums; slack : (P,) float64, uncertainty of each row sum
     factor : (P,) float64, d; ones on entry
-    steps : int, passes at most
-    Returns the largest distance of a row sum from its goal before balancing.
+    steps : int, largest number of passes over all coordinates
+    Returns the largest |row sum - goal| before balancing.
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008.
     """
-    # Measure the distance from the goal.
+    # Compute the largest error of a row sum.
     error = 0.0
     for i in range(len(first) - 1):
         total = 0.0
         for k in range(first[i], first[i + 1]):
             total += value[k]
         error = max(error, abs(total - goal[i]))
-    # Minimise along one coordinate after the other until no factor moves.
+    # Minimise along one coordinate after the other until the factors converge.
     for _ in range(steps):
         most = 0.0
         for i in range(len(first) - 1):

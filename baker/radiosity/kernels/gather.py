@@ -1,10 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Final gather: irradiance and ambient occlusion of texels from their hemisphere rays.
+"""Final gather: irradiance and ambient occlusion of texels from n cosine-weighted rays each.
 
     E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit, without emission
-    E_sky      = pi / n sum L_sky         over rays that leave the scene
+    E_sky      = pi / n sum L_sky         over rays that leave the scene, L_sky: radiance
     E_emitted  = sum of MIS-weighted hits of emitters, where `area_light` did not use the closed form
-    AO         = share of rays without a hit within the distance
+    AO         = share of rays without a hit within a distance
 
 Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
 Christensen, Faster photon map global illumination, 1999.
@@ -43,10 +43,11 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of `out`: indirect RGB; RGB of sky and emitters; AO; sum over 16 batches of the square of the light.
+# Columns of `out`: indirect RGB; RGB of sky and emitters; AO; sum of the squares of the irradiance (R + G +
+# B) that each of the 16 points contributes.
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
-# Rows of `part` and `total`: the columns up to OPEN.
+# Number of rows of `part` and `total`: INDIRECT to OPEN.
 _SUMS = 7
 # Working memory of the kernels.
 _parts, _floats = scratch((_SUMS * PACKET_WIDTH,), np.float32), scratch((PACKET_WIDTH,), np.float32)
@@ -60,17 +61,18 @@ def gather(
     origin, normal, lookup, seen, emitters, shading, buffers, begin, sobol_points, shared, sky, limits,
     analytic, out,
 ):  # fmt: skip
-    """Write the gathered light and ambient occlusion of texels.
+    """Write the irradiance and ambient occlusion that hemisphere rays of texels find.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
     lookup : TriangleLookup; seen : SeenLight, light that texels reflect
     emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
-    buffers : PacketBuffers; begin : number of the first texel, for its random numbers
-    sobol_points : (n, 2) uint32, one row a ray; shared : uint32, see `sampling`
+    buffers : PacketBuffers; begin : number of the first texel, which seeds its random numbers
+    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
     sky : (3,) float32, radiance, cd/m2
-    limits : (2,) float64, AO distance in metres, and the number of light samples for MIS
-    analytic : (m,) uint8, 1 for texels whose light of emitters is complete already
-    out : (m, 8) float32 output, see the column names; light in lx
+    limits : (2,) float64, AO distance in metres, and the number of shadow rays in the MIS weights
+    analytic : (m,) uint8, 1 for texels to which hits of emitters add nothing, except emitters of the separate
+        stratum (`TileEmitters.apart`)
+    out : (m, 8) float32 output, see the column names; irradiance in lx
     """
     n_samples = len(sobol_points)
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
@@ -84,7 +86,7 @@ def gather(
     for c in range(len(apart)):
         some_apart = some_apart or apart[c] != 0
     radiance = _rgba()
-    # Sums over the few samples of one point are float32, those over all points float64.
+    # Sum over the rays of one point in float32, and over all points in float64.
     part, missed = _parts(), _floats()
     total, squares = _totals(), _doubles()
     pixel = _numbers()
@@ -94,8 +96,8 @@ def gather(
     hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
-    # All sums are multiplied by pi / n in the end: reflected light is divided by pi here, and the result of
-    # `emitter_hit` is multiplied by n / pi.
+    # In the end all sums of light are multiplied by pi / n. Therefore reflected light is divided by pi, and
+    # the result of `emitter_hit` is multiplied by n / pi.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
@@ -119,14 +121,15 @@ def gather(
                     part[j] = _f(0.0)
                 for lane in range(PACKET_WIDTH):
                     missed[lane] = _f(0.0)
-            # Trace one ray of each texel. Without a stop at a BLEND surface turn 1 finds the same hits.
+            # Trace one ray of each texel. If no ray of turn 0 stops at a BLEND surface, turn 1 has the same
+            # hits.
             if turn == 0 or stopped:
                 aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
                     buffers.blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
                 )
             if turn == 0:
-                # AO counts the rays of turn 0, which BLEND surfaces stop with probability alpha.
+                # Use the rays of turn 0 for AO. A BLEND surface stops them with probability alpha.
                 opened = _f(1.0)
                 stopped = any_stopped(buffers.blend, words)
                 if not stopped:
@@ -142,8 +145,8 @@ def gather(
                 part[OPEN * PACKET_WIDTH + lane] += opened if free else _f(0.0)
             opened = _f(0.0)
             _add_coloured_sky(buffers.blend, words, sky, missed, part)
-            # Find the pixel of each hit, and add the emission of emitters. Pixels are read in a loop of their
-            # own below, so that cache misses overlap.
+            # Find the pixel of each hit, and add the light of emitters. A separate loop below reads the
+            # pixels, so that cache misses overlap.
             for lane in range(lanes):
                 pixel[lane] = -1
                 if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
@@ -176,7 +179,7 @@ def gather(
                 front = front_facing(row, prim, dx, dy, dz)
                 pixel[lane] = hit_pixel(row, size, n_pixels, prim, hit_u, hit_v, front)
             if lit:
-                # Add the light that the texels reflect; put hits on split texels aside.
+                # Add the light that the texels reflect; store hits on split texels for the next step.
                 n_split = 0
                 for lane in range(lanes):
                     p = pixel[lane]
@@ -200,7 +203,7 @@ def gather(
                         part[2 * PACKET_WIDTH + lane] += (
                             exitance[p, 2] * inverse_pi * transmittance(blend, 2, lane)
                         )
-                # Find the side of each hit on a split texel. That uses the packet's lanes.
+                # Find the side of each hit on a split texel. `find_side` overwrites the packet.
                 for j in range(n_split):
                     lane = int(split[j])
                     at = np.int64(exitance[pixel[lane], SIDE_ROW]) - 1
@@ -215,7 +218,7 @@ def gather(
                 if n_split > 0:
                     for lane in range(PACKET_WIDTH):
                         on[lane] = -1 if lane < lanes else 0
-            # End a batch: add the sky and the batch's sums.
+            # End a batch: add the sky to its sums, and the sums to the totals.
             if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(PACKET_WIDTH):
                     for c in range(3):
@@ -238,10 +241,10 @@ def gather(
 
 @inner
 def _add_coloured_sky(blend, words, sky, missed, part):
-    """Add the sky's light of rays through BLEND surfaces, and clear these rays in `missed`.
+    """Add the sky's light along rays through BLEND surfaces, and subtract these rays from `missed`.
 
-    blend : of `PacketBuffers`; words : (21 * 16,) uint32, the packet; sky : (3,) float32, cd/m2
-    missed : (16,) float32, rays without a hit; part : (7 * 16,) float32, sums, see `gather`
+    blend : `PacketBuffers.blend`; words : (21 * 16,) uint32, the packet; sky : (3,) float32, cd/m2
+    missed : (16,) float32, number of rays without a hit; part : (7 * 16,) float32, sums, see `gather`
     """
     if blend is None:
         return
@@ -260,14 +263,16 @@ def _add_coloured_sky(blend, words, sky, missed, part):
 
 @kernel
 def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, distance, early_out, out):
-    """Write the ambient occlusion of texels, 1: nothing within `distance`; return the number of rays cast.
+    """Write the ambient occlusion of m texels (1 is unoccluded); return the number of rays cast.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of entries begin to begin + m
+    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of the texels
     buffers : PacketBuffers, without transmittance
-    sobol_points : (n, 2) uint32, one row a ray; shared : uint32, see `sampling`
-    distance : float32, metres
-    early_out : sixteen texels are done after this number of rays if at most one of each was blocked; 0: never
-    out : (n_entries,) float32 output
+    begin : number of the first texel, which seeds its random numbers and is its index in `out`
+    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
+    distance : float32, length of the rays, metres
+    early_out : number of rays after which sixteen texels are finished if at most one ray of each was blocked;
+        0 disables this
+    out : (n_entries,) float32 output; items begin to begin + m - 1 are written
     """
     n_samples = len(sobol_points)
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
@@ -285,7 +290,7 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
             count[lane] = 0
         done = 0
         for s in range(n_samples):
-            # Trace one ray of each texel, and count those that nothing blocks.
+            # Trace one ray of each texel, and count the unblocked rays.
             k = s * N_POINTS // n_samples
             if s == 0 or k != (s - 1) * N_POINTS // n_samples:
                 load_frames(rays, frame, origin, normal, group, lanes, k)
@@ -294,7 +299,7 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
             for lane in range(PACKET_WIDTH):
                 count[lane] += np.int32(1) if rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0) else np.int32(0)
             done += 1
-            # Early out if at most one ray of each texel is blocked.
+            # Stop early if at most one ray of each texel was blocked.
             if done == early_out:
                 clear = 0
                 for lane in range(lanes):

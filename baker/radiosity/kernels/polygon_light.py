@@ -3,11 +3,11 @@
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
 
-over the edges of the part of a triangle above the point's tangent plane, whose unit normal is n. angle_i is
-the angle that edge i subtends at the point, Gamma_i the unit normal of the plane through the point and the
-edge. With a, b the vectors from the point to the edge's ends,
+The sum is over the edges i of the part of the triangle above the point's tangent plane. n is the unit normal
+of that plane and L the radiance. angle_i is the angle that edge i subtends at the point. Gamma_i is the unit
+normal of the plane through the point and the edge. With a, b the vectors from the point to the edge's ends,
 
-    angle Gamma = angle / sin(angle) (a x b) / |a||b|
+    angle Gamma = angle / sin(angle) (a x b) / (|a| |b|)
 
 Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995;
 Abramowitz and Stegun, Handbook of mathematical functions, 1964, 4.4.46 (the polynomial).
@@ -27,25 +27,25 @@ from baker.trace.packets import PACKET_WIDTH
 _f = np.float32
 # Rows of the working memory:
 #
-#     _ORIGIN, _NORMAL   of the point (3 each)
+#     _ORIGIN, _NORMAL   position and normal of the point (3 each)
 #     _ARM               vectors from the point to up to four corners (12)
 #     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
 #     _SUM               sum over the edges
-#     _SMALL             E / L of a triangle of small solid angle, -1 for others
+#     _SMALL             E / L of a triangle that is treated as a point, -1 for other triangles
 #     _FACING            1 if a side that emits faces the point, else 0
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
-# Triangles whose longest edge is below a hundredth of their distance (squares here) are treated as points at
-# their centroid, since the sum over edges would lose digits. The relative error of this is about 1e-5.
+# (longest edge / distance)^2 below which a triangle is treated as a point at its centroid, because the sum
+# over edges would lose digits. The relative error of this approximation is about 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
 @inner
 def angle_over_sine(x, sine):
-    """Return angle / sin(angle) from the cosine x in [-1, 1] and the sine; relative error under 1e-6.
+    """Return angle / sin(angle) from the cosine x in [-1, 1] and the sine; relative error below 1e-6.
 
-    The sine is an argument because near 180 degrees it cannot be computed from the float32 cosine.
+    The sine is an argument, because near 180 degrees the float32 cosine does not determine it accurately.
     """
     y = abs(x)
     series = _f(1.5707963050) + y * (
@@ -67,11 +67,12 @@ def angle_over_sine(x, sine):
 
 @inner
 def unoccluded_irradiance(origin, normal, group, lanes, row, found):
-    """Write the irradiance of sixteen texels from all emitters, without occlusion.
+    """Write the unoccluded irradiance of up to sixteen texels from all emitters.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; texels `group` to `group + lanes` are lit
-    row : (M, 24) float32, see `emitters`; none textured
-    found : (3 * 16,) float32 output, lx: RGB by lane, means over the texels' points
+    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    group, lanes : first texel and number of texels to compute
+    row : (M, 24) float32, see `emitters`; untextured emitters only
+    found : (3 * 16,) float32 output, lx; R, G, B (16 lanes each), means over each texel's points
     """
     work = _work()
     for j in range(3 * PACKET_WIDTH):
@@ -100,7 +101,7 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
 
 @pasted
 def _load_corner(work, j, x, y, z):
-    """Write the vectors from the points to corner j at (x, y, z), and its heights above their planes.
+    """Write the vectors from all lanes' points to corner j at (x, y, z), and its heights above their planes.
 
     work : (24 * 16,) float32, see the row names
     """
@@ -120,12 +121,12 @@ def _load_triangle(work, row, m, lanes):
     work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `emitters`
     Returns the largest number of corners of any lane, 3 or 4; 0 if the triangle emits towards no lane.
     """
-    # Load the corners. Values are read from the row first, and offsets are constants, or the compiler would
-    # not vectorise the loops over lanes.
+    # Load the corners. The values are arguments and j is a constant, so that the compiler vectorises the
+    # loops over lanes.
     _load_corner(work, 0, row[m, CORNER], row[m, CORNER + 1], row[m, CORNER + 2])
     _load_corner(work, 1, row[m, CORNER_1], row[m, CORNER_1 + 1], row[m, CORNER_1 + 2])
     _load_corner(work, 2, row[m, CORNER_2], row[m, CORNER_2 + 1], row[m, CORNER_2 + 2])
-    # Compute the longest edge (squared).
+    # Compute the square of the longest edge.
     longest = _f(0.0)
     for j in range(3):
         edge = _f(0.0)
@@ -135,7 +136,7 @@ def _load_triangle(work, row, m, lanes):
         longest = larger(longest, edge)
     nx, ny, nz = row[m, NORMAL], row[m, NORMAL + 1], row[m, NORMAL + 2]
     two_sided, area = row[m, TWO_SIDED] > _f(0.0), row[m, AREA]
-    # Compute the irradiance from the centroid, and which side faces the point.
+    # Compute E / L of small triangles from the centroid, and whether an emitting side faces the point.
     third = _f(1.0 / 3.0)
     for lane in range(PACKET_WIDTH):
         x = (
@@ -209,7 +210,7 @@ def _clip(work, lane):
 
 @pasted
 def _add_edge(work, first, second):
-    """Add the edge between two corners to the sum of every lane; edges of zero length add 0.
+    """Add the edge between two corners to `_SUM` of every lane; edges of zero length add 0.
 
     work : (24 * 16,) float32, see the row names
     """
@@ -239,9 +240,9 @@ def _add_edge(work, first, second):
 
 @inner
 def _add_edges(work, corners):
-    """Write the sum over the edges between the corners of every lane.
+    """Write the sum over the edges of every lane's polygon to `_SUM`.
 
-    work : (24 * 16,) float32, see the row names
+    work : (24 * 16,) float32, see the row names; corners : 3 or 4
     """
     for lane in range(PACKET_WIDTH):
         work[_SUM * PACKET_WIDTH + lane] = _f(0.0)

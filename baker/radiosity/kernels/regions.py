@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Regions of charts: sets of texels that links between neighbours connect."""
+"""Regions of charts: connected components of the graph whose edges link neighbouring texels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def join_linked(link, root):
     """Find the smallest node in the connected component of each node (union-find).
 
     link : (m, 2) int32, pairs of connected nodes
-    root : (n,) int32, each node's own number on entry; the smallest node of its component on return
+    root : (n,) int32, 0 to n - 1 on entry; on return, the smallest node of each node's component
     """
     for m in range(len(link)):
         a, b = link[m, 0], link[m, 1]
@@ -26,16 +26,16 @@ def join_linked(link, root):
         else:
             root[a] = b
     for i in range(len(root)):
-        # root[i] is at most i, and the roots of smaller nodes are final already.
+        # The roots of smaller nodes are already final, and root[i] is at most i.
         root[i] = root[root[i]]
 
 
 @kernel
 def flood_regions(chart, region, queue):
-    """Give texels without a region that of a neighbour in the same chart, ring by ring, on one page.
+    """Assign to each texel without a region the region of the nearest texel of its chart (breadth-first).
 
-    chart : (H, W) int32, -1 for empty texels
-    region : (H, W) int32, -1 for texels without a region; these are filled in
+    chart : (H, W) int32, chart of each texel of a page, -1 for empty texels
+    region : (H, W) int32, -1 for texels without a region, which are filled in
     queue : (H * W,) int64, working memory
     """
     height, width = chart.shape
@@ -62,13 +62,14 @@ def flood_regions(chart, region, queue):
 
 @kernel
 def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):
-    """List pairs of neighbouring entries of one chart and side; return the number of pairs.
+    """Write the pairs of entries of one chart whose texels share an edge: two fronts, or two backs.
 
     pixel (n,) int64, back (n,) bool, chart (n,) int32 : see `TexelBuffer`
     lookup (P * H * W,) int32, back_entry (n_front,) int32 : see `TexelBuffer`
-    size : int, of a page, texels
-    chosen : (n,) bool; both : bool, whether both entries of a pair must be chosen, or one of them
-    pair : (2 n, 2) int32 output
+    size : int, width and height of a page, texels
+    chosen : (n,) bool; both : bool, whether both entries of a pair must be chosen, else one
+    pair : (2 n, 2) int32 output, entries
+    Returns the number of pairs.
     """
     found = 0
     for i in range(len(pixel)):
@@ -76,7 +77,7 @@ def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, 
             continue
         rest = pixel[i] % (size * size)
         for turn in range(2):
-            # Turn 0: the pixel to the right; 1: the one below.
+            # Turn 0: the pixel to the right; turn 1: the pixel in the next row.
             if (rest % size if turn == 0 else rest // size) == size - 1:
                 continue
             beside = pixel[i] + (1 if turn == 0 else size)

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Visibility of lights: sums irradiance over a texel's points whose shadow rays are not blocked."""
+"""Irradiance of texels from a light without area, with one shadow ray from each point."""
 
 from __future__ import annotations
 
@@ -11,19 +11,22 @@ from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
-# Column of `ray` after the direction.
+# Column of `ray` in `add_visible`; columns 0 to 2 are the direction.
 MAX_DISTANCE = 3
 
 
 @kernel
 def add_visible(buffers, origin, ray, weight, colour, out):
-    """Add colour * mean over a texel's 16 points of weight * visibility to both column blocks of `out`.
+    """Add the irradiance of texels from one light to both RGB estimates in `out`.
 
-    Visibility is 0 where something blocks the ray, else the transmittance of the BLEND surfaces on the way.
+        irradiance = colour * mean over the texel's 16 points of weight * visibility
+
+    The visibility of a blocked ray is 0. Otherwise it is the RGB transmittance of the BLEND surfaces that the
+    ray crosses.
 
     buffers : PacketBuffers; origin : (n, 16, 3) float32, metres, world
-    ray : (n, 16, 4) float32, direction, and MAX_DISTANCE in units of its length
-    weight : (n, 16) float32, unoccluded irradiance for colour 1; 0 casts no ray
+    ray : (n, 16, 4) float32, direction, and TFAR in units of the direction's length (MAX_DISTANCE)
+    weight : (n, 16) float32, unoccluded irradiance for an intensity of 1; no ray is cast where it is 0
     colour : (3,) float32, intensity of the light; out : (n, 6) float32, lx, RGB twice, added to
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
@@ -47,7 +50,7 @@ def add_visible(buffers, origin, ray, weight, colour, out):
                     any_lane = True
             if not any_lane:
                 continue
-            # Trace them, and add the light of those that are not blocked.
+            # Trace the rays, and add the light of rays that are not blocked.
             trace_shadow_lanes(buffers.blend, occluded, scene, width, query, on, rays, words, spare_on, spare)
             for lane in range(lanes):
                 if on[lane] and rays[TFAR * PACKET_WIDTH + lane] >= _f(0.0):

@@ -1,8 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The table of split texels, and the lookup of the side of a split texel that a hit lies on.
+"""The table of split texels, and the search for the side of a split texel on which a hit lies.
 
-A hit lies on the side of the texel's nearest point that is visible from a position shortly before the hit, or
-from one just above it. See `sides` for the height of such segments.
+Each point of a split texel belongs to one side. A hit gets the side of the nearest point that is visible from
+a position on the ray shortly before the hit. If no point is visible from there, the position is just above
+the hit. See `sides` for the height of the segments that test visibility.
 """
 
 from __future__ import annotations
@@ -30,12 +31,13 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Start of a segment: this far back along the ray, or that high above the hit, in sides of a texel.
+# Start of a segment: distance from the hit back along the ray, or height above the hit, in texel sides.
 _BACK, _ABOVE = 0.25, 0.02
-# Rows of `hits` for `find_side`, by lane: ray origin, direction, distance, normal of the face that was hit.
+# Rows of `hits` for `find_side`: ray origin (3), direction (3), distance, normal of the face that was hit
+# (3).
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
-# Last column of `SeenLight.image`, after RGB.
+# Column of `SeenLight.image` after RGB: 1 + row of a split texel in the `SideTable`, else 0.
 SIDE_ROW = 3
 # Working memory of the kernels.
 new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 * PACKET_WIDTH,), np.float32)
@@ -44,17 +46,17 @@ new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 *
 class SideTable(NamedTuple):
     """The S split texel entries and their points.
 
-    Entries of a single side are included if a corner of their surface is not visible from any of their
-    points: a hit near such a corner contributes nothing.
+    An entry with a single side is included if a corner of its surface is not visible from any of its points.
+    A hit near such a corner contributes no light.
 
     Attributes
     ----------
     point, normal : (S, 16, 3) float32
         Ray origins, metres, world, and unit shading normals.
     height : (S, 16) float32
-        Height of segments, metres, see `sides`.
+        Height of segments from each point, metres, see `sides`.
     member : (S, 16) int32
-        Row of the values of the point's side, -1 for points inside geometry.
+        Row of each point's side in `SeenLight.value` or `SeenPatch.value`, -1 for points inside geometry.
     side : (S,) float32
         Side length of the texel, metres.
     """
@@ -78,15 +80,15 @@ def no_sides() -> SideTable:
 
 
 class SeenLight(NamedTuple):
-    """Light that texels reflect, as read at the hits of final-gather rays.
+    """Light that texels reflect, which final-gather rays read at their hits.
 
     Attributes
     ----------
-    image : (sides * P * H * W, 4) float32
-        RGB in lx that the texel at each pixel reflects; SIDE_ROW: its row in `sides` plus 1, 0 if it is not
-        split. No rows if nothing reflects.
+    image : (P * H * W, 4) or (2 * P * H * W, 4) float32
+        Radiosity in lx (RGB) of the front of each pixel, then of the back. Column SIDE_ROW is 1 + row of the
+        texel in `sides`, 0 if it is not split. (0, 4) if nothing reflects.
     value : (K, 4) float32
-        The same light for each side of the split texels.
+        Radiosity in lx (RGB) of each side of the split texels. SIDE_ROW is unused.
     sides : SideTable
         The split texels.
     """
@@ -102,18 +104,19 @@ def nothing_seen() -> SeenLight:
     Returns
     -------
     SeenLight
-        Without rows.
+        All arrays have length 0.
     """
     return SeenLight(np.zeros((0, 4), _f), np.zeros((0, 4), _f), no_sides())
 
 
 class SeenPatch(NamedTuple):
-    """Patches of texels, as read at the hits of form-factor rays.
+    """Patches of texels, which form-factor rays read at their hits.
 
     Attributes
     ----------
-    image : (sides * P * H * W,) int32
-        Patch at each pixel, -1 for none, `form_factor.SPLIT` - s for the texel in row s of `sides`.
+    image : (P * H * W,) or (2 * P * H * W,) int32
+        Patch of the front of each pixel, then of the back; -1 for none. For a split texel in row s of
+        `sides`, `form_factor.SPLIT` - s.
     value : (K,) int32
         Patch of each side of the split texels.
     sides : SideTable
@@ -127,9 +130,10 @@ class SeenPatch(NamedTuple):
 
 @inner
 def segment(rays, lane, x, y, z, tx, ty, tz):
-    """Write the segment from (x, y, z) to (tx, ty, tz) into a lane; return -1 if its length is not 0, else 0.
+    """Write the segment from (x, y, z) to (tx, ty, tz), metres, world, into a lane of a packet.
 
-    rays : (21 * 16,) float32, a packet; coordinates in metres, world
+    rays : (21 * 16,) float32, the packet
+    Returns -1 if the segment's length is not 0, else 0.
     """
     dx, dy, dz = tx - x, ty - y, tz - z
     rays[ORG_X * PACKET_WIDTH + lane] = x
@@ -144,10 +148,11 @@ def segment(rays, lane, x, y, z, tx, ty, tz):
 
 @inner
 def note_hit(hits, lane, rays, row, prim, front):
-    """Copy the hit of a lane for `find_side`.
+    """Copy the hit of a lane to `hits`, from which `find_side` reads it.
 
     hits : (10 * 16,) float32 output, see the row names; rays : (21 * 16,) float32, the packet
-    row : (T, 16) float32, see `TriangleLookup`; prim : triangle that was hit; front : whether at its front
+    row : (T, 16) float32, see `TriangleLookup`; prim : triangle that was hit
+    front : whether the ray hit the front of the triangle
     """
     sign = _f(1.0) if front else _f(-1.0)
     for a in range(3):
@@ -159,12 +164,11 @@ def note_hit(hits, lane, rays, row, prim, front):
 
 @inner
 def find_side(point, normal, height, member, side, s, hits, lane, buffers):
-    """Return the row of values of the side that a hit on split texel s lies on, -1 if no point is visible.
+    """Return the item of `member` for the side of split texel s on which a hit lies, -1 if none is found.
 
-    point, normal : (S, 16, 3) float32; height : (S, 16) float32; member : (S, 16) int32; side : (S,) float32;
-        of a `SideTable`
-    hits : (10 * 16,) float32, from `note_hit`; lane : which of them
-    buffers : PacketBuffers; its sixteen rays are overwritten, except their origins
+    point, normal (S, 16, 3), height (S, 16), member (S, 16), side (S,) : see `SideTable`
+    hits : (10 * 16,) float32, from `note_hit`; lane : lane of the hit
+    buffers : PacketBuffers; its packet is overwritten, except the origins
     """
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     set_blend_rule(buffers.blend, words, SOLID)
@@ -182,8 +186,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):
     z = hits[(HIT_ORIGIN + 2) * PACKET_WIDTH + lane] + distance * dz
     found = np.int32(-1)
     for turn in range(2):
-        # Start at a position on the ray before the hit, since rounding may put the hit itself on the wrong
-        # side. If no point is visible from there, start above the hit.
+        # Start on the ray before the hit, because rounding may place the hit on the other side. If no point
+        # is visible from there, start above the hit.
         step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
         vx, vy, vz = -dx, -dy, -dz
         if turn == 1:

@@ -1,13 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Texels with points on both sides of a surface that passes through them.
+"""Texels with points on both sides of another surface that passes through them.
 
-A floor that continues under a wall has texels with points on both sides of the wall. Two points of a texel
-are on the same side if the segment between them, raised above the surface, is not blocked:
+For example, a floor that continues under a wall has texels with points on both sides of the wall. Two points
+of a texel are on the same side if the segment between them is not blocked. Both ends are raised along the
+normals:
 
-    height = min(HIGH s, half the headroom of either point)        s: side of the texel, metres
+    height = min(HIGH s, headroom / 2)        s: side of the texel, metres
 
-So a step lower than this height does not separate points, and a gap lower than it does not connect them. The
-same test chooses the side of a ray's hit (`side_table`).
+The headroom of a point is the free distance along its normal; the lower of both heights is used. So a step
+lower than the height does not separate two points, and an opening lower than the height does not connect
+them. The same test finds the side of a ray's hit (`side_table`).
 """
 
 from __future__ import annotations
@@ -36,14 +38,14 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Heights of segments above the surface, in sides of a texel.
+# Heights of segments above the surface, in texel sides.
 HIGH, LOW = 0.25, 0.02
-# Half length of the diagonals that test for a crossing surface, as a share of the texel's diagonal: slightly
-# more than the texel, so that both texels find a surface exactly between them.
+# Half length of the test segments along the diagonals, as a share of the texel's diagonal. They extend
+# slightly beyond the texel, so that a surface exactly between two texels is found in both.
 _HALF_DIAGONAL = 0.55
-# Corners of a texel's surface are tested at this share of their distance from its centroid.
+# Distance of a tested corner from the polygon's centroid, as a share of the true corner's distance.
 _CORNER = 0.998
-# Rows of `frame`, by lane: centre, the two half diagonals, and the normal times the side of the texel.
+# Rows of `frame` (3 each): centre, both half diagonals, and the normal times the texel's side.
 _CENTRE, _DIAGONAL_1, _DIAGONAL_2, _NORMAL = 0, 3, 6, 9
 # Working memory of the kernels.
 _points, _heights = scratch((1, PACKET_WIDTH, 3), np.float32), scratch((1, PACKET_WIDTH), np.float32)
@@ -52,12 +54,11 @@ _frame = scratch((12 * PACKET_WIDTH,), np.float32)
 
 @kernel
 def crossed_texels(surface, begin, end, buffers, crossed, side):
-    """Find texels that a surface may pass through: a segment just above their square is blocked.
+    """Find texels that another surface may pass through, with segments just above the texel's square.
 
-    surface : Surface; entries `begin` to `end` are examined; buffers : PacketBuffers
-    crossed : (n,) uint8 output, 1 where one of two diagonals is blocked at one of two heights, or one of the
-        four edges at the upper one
-    side : (n,) float32 output, metres, root mean square of the two sides of the whole texel
+    surface : Surface; begin, end : first entry and end of the tested entries; buffers : PacketBuffers
+    crossed : (n,) uint8 output, 1 if a diagonal is blocked at height HIGH or LOW, or an edge at height HIGH
+    side : (n,) float32 output, metres, root mean square of width and height of the whole texel
     Returns the number of rays cast.
     """
     position, uv, triangle, face = surface.position, surface.uv, surface.triangle, surface.face_normal
@@ -71,7 +72,7 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
     for group in range(begin, end, PACKET_WIDTH):
         lanes = smaller(PACKET_WIDTH, end - group)
         for lane in range(lanes):
-            # Write the texel's frame in the plane of the triangle that covers most of it.
+            # Write the texel's frame in the plane of the triangle with the largest area in the texel.
             i = group + lane
             front = fronts[i]
             most = _f(-1.0)
@@ -99,7 +100,7 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
                 frame[(_NORMAL + axis) * PACKET_WIDTH + lane] = sign * face[t, axis]
             crossed[group + lane] = 0
         for turn in range(8):
-            # Turns 0 to 3: the two diagonals, high, then low; 4 to 7: the four edges, high.
+            # Turns 0 and 1: diagonals at HIGH; 2 and 3: diagonals at LOW; 4 to 7: edges at HIGH.
             height = _f(LOW if turn == 2 or turn == 3 else HIGH)
             row = _DIAGONAL_1 + 3 * (turn % 2)
             for lane in range(PACKET_WIDTH):
@@ -118,7 +119,7 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
                 if turn < 4:
                     on[lane] = segment(rays, lane, x - ex, y - ey, z - ez, x + ex, y + ey, z + ez)
                     continue
-                # From an end of one diagonal to an end of the other.
+                # Write an edge: from an end of one diagonal to an end of the other diagonal.
                 to = _DIAGONAL_1 + _DIAGONAL_2 - row
                 fx, fy, fz = (
                     frame[to * PACKET_WIDTH + lane],
@@ -140,7 +141,7 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
 
 @inner
 def _between(rays, lane, origin, normal, height, m, i, k):
-    """Write the segment between points i and k of item m into a lane; see `segment`.
+    """Write the raised segment between points i and k of texel m into a lane; see `segment`.
 
     rays : (21 * 16,) float32, a packet; origin, normal : (m, 16, 3) float32; height : (m, 16) float32, metres
     """
@@ -156,9 +157,10 @@ def _between(rays, lane, origin, normal, height, m, i, k):
 
 @kernel
 def point_heights(origin, normal, side, buffers, height):
-    """Write the height of segments from points, see the module.
+    """Write the height of segments from each point, see the module.
 
-    origin, normal : (n, 3) float32, metres, world, and unit; side : (n,) float32, metres, of each one's texel
+    origin, normal : (n, 3) float32, metres, world, and unit
+    side : (n,) float32, metres, side length of each point's texel
     buffers : PacketBuffers; height : (n,) float32 output, metres
     """
     scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
@@ -198,7 +200,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
         bits = np.int64(valid_points[m])
         for k in range(N_POINTS):
             label[m, k] = -1
-        # Grow a group from each point that has none.
+        # Start a group at each point without a group.
         groups = 0
         for seed in range(N_POINTS):
             if (bits >> seed) & 1 == 0 or label[m, seed] >= 0:
@@ -227,7 +229,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
                 if other < 0:
                     label[m, k] = own
                     continue
-                # A point of an earlier group is visible from the seed: merge both groups.
+                # Merge both groups, because a point of an earlier group is visible from the seed.
                 for j in range(N_POINTS):
                     label[m, j] = own if label[m, j] == other else label[m, j]
         # Number the remaining groups from 0.
@@ -244,15 +246,16 @@ def group_points(origin, normal, height, valid_points, buffers, label):
 
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
-    """Find texels with a corner of surface visible from none of their points, or with a blocked outline.
+    """Find texels with a corner that none of their points sees, or with a blocked outline.
 
-    Another surface may cut off a corner that contains no point but may be hit by rays. The edge between two
-    walls may enter a texel through one of its sides; it blocks the segment between the corners of that side.
+    Corners are the corners of the part of each triangle inside the texel. Another surface may cut off a
+    corner that contains no point but that rays may hit. The edge between two walls may enter a texel through
+    one of its sides. It then blocks the segment between the corners of that side, a part of the outline.
 
     surface : Surface; chosen : (m,) int64, texel entries
     origin, normal : (m, 16, 3) float32, metres, world, and unit; height : (m, 16) float32, metres
     valid_points : (m,) uint16, see `group_points`; side : (m,) float32, metres
-    buffers : PacketBuffers; hidden : (m,) uint8 output
+    buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for such texels
     Returns the number of rays cast.
     """
     position, shading, face = surface.position, surface.normal, surface.face_normal
@@ -273,7 +276,7 @@ def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, 
             for j in range(3):
                 corner[j, 0] = uv[triangle[t, j], 0] * size
                 corner[j, 1] = uv[triangle[t, j], 1] * size
-            # Clip the triangle to the square, and place the corners of the polygon.
+            # Clip the triangle to the texel's square, and compute ray origins at the corners of the polygon.
             n = clip_to_square(corner, x0, y0, cut, spare)
             if n < 3:
                 continue
@@ -310,7 +313,7 @@ def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, 
 
 @inner
 def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m, k):
-    """Write the segment from corner j to point k of item m into a lane; see `segment`.
+    """Write the raised segment from corner j to point k of texel m into a lane; see `segment`.
 
     rays : (21 * 16,) float32, a packet
     point, facing : (1, 16, 3) float32, corners, metres, and unit normals; headroom : (1, 16) float32, metres
@@ -330,9 +333,9 @@ def _to_point(rays, lane, point, facing, headroom, j, origin, normal, height, m,
 def _trace_corners(
     point, facing, headroom, found, m, origin, normal, height, valid_points, side, buffers, hidden
 ):
-    """Set hidden[m] if one of `found` corners is invisible from all points of item m or the next corner.
+    """Set hidden[m] to 1 if a corner is not visible from the next corner, or from no point of texel m.
 
-    point, facing : (1, 16, 3) float32, corners, metres, and unit normals
+    point, facing : (1, 16, 3) float32, corners, metres, and unit normals; found : number of corners
     headroom : (1, 16) float32, metres, working memory
     origin, normal, height, valid_points, side, buffers, hidden : see `hidden_corners`
     Returns the number of rays cast.
@@ -357,7 +360,7 @@ def _trace_corners(
         buffers.valid,
         buffers.floats,
     )
-    # Their headroom.
+    # Compute the heights of segments from the corners.
     for j in range(found):
         headroom[0, j] = smaller(high, _f(0.5) * rays[TFAR * PACKET_WIDTH + j])
     # Trace the outline, from each corner to the next.
@@ -385,8 +388,8 @@ def _trace_corners(
     first = 0
     while first + 1 < N_POINTS and bits != 0 and (bits >> first) & 1 == 0:
         first += 1
-    # Trace from the first valid point to all corners, then from all points to the corners not visible from
-    # it.
+    # Trace from the first valid point to all corners. Then trace from all points to the corners that are not
+    # visible from the first valid point.
     for j in range(found):
         on[j] = _to_point(rays, j, point, facing, headroom, j, origin, normal, height, m, first)
     trace_lanes(
@@ -426,10 +429,10 @@ def _trace_corners(
 
 @kernel
 def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, buffers, free):
-    """Test which pairs of points see each other.
+    """Test the mutual visibility of n pairs of points a and b.
 
     origin_a, normal_a, origin_b, normal_b : (n, 3) float32, metres, world, and unit
-    height_a, height_b : (n,) float32, metres; the lower one of a pair counts
+    height_a, height_b : (n,) float32, metres, from `point_heights`; the lower height of a pair is used
     buffers : PacketBuffers; free : (n,) uint8 output, 1 if the segment is not blocked
     """
     scene, occluded, width, query = buffers.scene, buffers.occluded, buffers.width, buffers.query
@@ -456,11 +459,11 @@ def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, bu
 
 @kernel
 def count_backs(origin, normal, lookup, buffers, sobol_points, shared, count):
-    """Count the rays, one from each point of a texel, that hit the back of a one-sided surface first.
+    """Cast one ray from each of a texel's 16 points; count the first hits on backs of one-sided surfaces.
 
     origin, normal : (m, 16, 3) float32, metres, world, and unit; lookup : TriangleLookup
     buffers : PacketBuffers; sobol_points : (16, 2) uint32; shared : uint32, see `sampling`
-    count : (m,) int32 output
+    count : (m,) int32 output, 0 on entry
     """
     scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words

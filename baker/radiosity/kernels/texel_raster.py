@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Conservative rasterisation of charts: which triangles each texel's square touches.
+"""Conservative rasterisation of charts: finds the triangles that each texel's square touches.
 
-A texel is an area. Two passes (count, fill) list the triangles of each texel with their areas inside its
-square; a texel belongs to the chart that covers most of it.
+A first pass counts the triangles of each texel. A second pass writes them, with their areas inside the
+texel's square. Each texel then keeps only the triangles of the chart with the largest area in it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 @inner
 def _corners(uv, triangle, t, size, corner):
-    """Write the corners of triangle t in texels, and return first x, first y, last x, last y of its texels.
+    """Write the corners of triangle t in texels; return the first x, first y, last x, last y of its texels.
 
-    uv : (V, 2) float32; triangle : (T, 3) int32; corner : (3, 2) float64 output
+    uv : (V, 2) float32; triangle : (T, 3) int32; size : int, width and height of a page, texels
+    corner : (3, 2) float64 output
     """
     low_x = low_y = 1.0e30
     high_x = high_y = -1.0e30
@@ -31,7 +32,7 @@ def _corners(uv, triangle, t, size, corner):
         corner[i, 1] = y
         low_x, high_x = smaller(low_x, x), larger(high_x, x)
         low_y, high_y = smaller(low_y, y), larger(high_y, y)
-    # A border exactly on a texel's edge must not touch the texel on its other side.
+    # Shrink the range, so that a border exactly between two texels does not touch the outer texel.
     tiny = 1.0e-4
     first_x = larger(math.floor(low_x + tiny), 0)
     first_y = larger(math.floor(low_y + tiny), 0)
@@ -42,11 +43,13 @@ def _corners(uv, triangle, t, size, corner):
 
 @kernel
 def list_overlaps(uv, triangle, page, size, at, entry, area):
-    """Write the triangles that each texel's square touches, and their areas in it, in ascending order.
+    """Write the triangles that each texel's square touches, ascending, and their areas in the square.
 
-    uv : (V, 2) float32; triangle : (T, 3) int32; page : (T,) int32; size : int, of a page, texels
-    at : (P * H * W,) int64, where the next triangle of each texel is written; advanced by their number
-    entry : (m,) int32 output, triangles; (0,): they are only counted
+    uv : (V, 2) float32; triangle : (T, 3) int32; page : (T,) int32
+    size : int, width and height of a page, texels
+    at : (P * H * W,) int64, index at which the next triangle of each texel is written; increased by one for
+        each triangle
+    entry : (m,) int32 output, triangles; with shape (0,), triangles are only counted
     area : (m,) float32 output, texels
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
@@ -70,12 +73,14 @@ def list_overlaps(uv, triangle, page, size, at, entry, area):
 
 @kernel
 def keep_main_chart(first, entry, area, chart, texel_chart, kept):
-    """Choose for each texel the chart with the largest area, and mark its entries.
+    """Choose for each texel the chart with the largest area, and mark the triangles of this chart.
 
-    first : (n + 1,) int64, entries of texel i are first[i] to first[i + 1]
-    entry : (m,) int32, triangles; area : (m,) float32, texels; chart : (T,) int32, of each triangle
-    texel_chart : (n,) int32 output; kept : (m,) bool output, set for the entries of that chart
-    Entries without area (touching corners) are dropped where the texel has others.
+    first : (n + 1,) int64, texel i touches the triangles `entry[first[i] : first[i + 1]]`
+    entry : (m,) int32, triangles; area : (m,) float32, their areas in the texel, texels
+    chart : (T,) int32, chart of each triangle
+    texel_chart : (n,) int32 output, chart of each texel
+    kept : (m,) bool output, set for the items of `entry` in that chart
+    Triangles without area in the texel are marked only if the chart has no others there, and then only one.
     """
     for i in range(len(first) - 1):
         best = -1.0
@@ -102,7 +107,10 @@ def keep_main_chart(first, entry, area, chart, texel_chart, kept):
 
 
 def morton_keys(pixel: NDArray[np.int64], size: int) -> NDArray[np.uint64]:
-    """Return the (n,) uint64 Morton order of flat pixel numbers, page first (Morton, 1966)."""
+    """Return (n,) uint64: keys that sort pixels by page, then in Morton order (Morton, 1966).
+
+    pixel : (n,) int64, (page * size + row) * size + column
+    """
     number, spread = np.arange(size, dtype=np.uint64), np.zeros(size, np.uint64)
     for bit in range(16):
         spread |= (number >> np.uint64(bit) & np.uint64(1)) << np.uint64(2 * bit)
