@@ -1,4 +1,7 @@
-"""Speed of bakes on this machine, from the manifest of a named bake or of one beside the scene."""
+"""Speed of bakes on this machine, read from the manifest of an earlier bake.
+
+The user names this bake, or it is the latest bake of the scene in a folder beside the scene file.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,10 @@ from baker.core.errors import SettingsError
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
 
-# Largest number of folders beside a scene that are searched, and largest manifest that is read, bytes.
+# Number of entries of the scene's folder that are searched for `bake.json`.
+# Size above which a manifest is not read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages whose time is proportional to texels, and to triangles; that of the rest is proportional to rays.
+# Stages whose time is proportional to the number of texels, of triangles, and of rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (
@@ -34,11 +38,13 @@ class Rates:
     Attributes
     ----------
     ray : dict of Stage to float
-        Seconds per ray of each stage.
-    texel, triangle : float
-        Seconds per texel and per triangle of the stages that cast no rays.
+        Seconds per ray, for each stage that casts rays.
+    texel : float
+        Seconds per texel, summed over the stages `BY_TEXEL`.
+    triangle : float
+        Seconds per triangle, summed over the stages `BY_TRIANGLE`; 0 if unknown.
     basis : str
-        Source of the numbers, in words.
+        Where the rates come from, for messages: "an earlier bake", "a probe of one second", ...
     """
 
     ray: Mapping[Stage, float]
@@ -55,7 +61,7 @@ def rates_of_bake(manifest: Mapping[str, Any]) -> Rates:
         stage: timings[stage] / rays[stage] for stage in RAY_STAGES if timings.get(stage) and rays.get(stage)
     }
     per_texel = sum(timings.get(stage, 0.0) for stage in BY_TEXEL) / max(texels, 1)
-    # The manifest does not count triangles.
+    # The manifest has no number of triangles, so the time per triangle is unknown.
     return Rates(ray, per_texel, 0.0, "an earlier bake")
 
 
@@ -74,7 +80,7 @@ def rates_of(folder: Path) -> Rates:
     Raises
     ------
     SettingsError
-        If there is none, or its manifest lacks rays and timings.
+        If the folder has no bake, or the manifest lacks the numbers of rays or the timings.
     """
     try:
         return rates_of_bake(json.loads((folder / MANIFEST_NAME).read_text("utf-8")))
@@ -84,11 +90,10 @@ def rates_of(folder: Path) -> Rates:
 
 
 def rates_beside(scene: Path) -> Rates | None:
-    """Return the speed of the latest bake of a scene among the folders beside it; None if there is none.
+    """Return the speed of the latest bake of a scene in the folders beside the scene file.
 
-    Notes
-    -----
-    A bake is the scene's if its manifest names this file, whether or not that has changed since.
+    A bake is taken if its manifest names the scene file. The file may have changed after that bake. None is
+    returned if no such bake is found.
     """
     found: list[tuple[str, str, Rates]] = []
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The context of a check: a scene as its file has it, with values that several rules use."""
+"""The context of a check: the scene, defective triangles included, and values that several rules use."""
 
 from __future__ import annotations
 
@@ -25,22 +25,28 @@ from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, 
 
 
 class CheckContext:
-    """A scene, the settings of its bake, and values derived from both, each computed once on first use.
+    """A scene, the settings of its bake, and values derived from both.
+
+    Each derived value is computed on first use and then stored. A good triangle is one that a bake uses, see
+    `MeshFacts`.
 
     Attributes
     ----------
     scene : Scene
-        Read leniently, or for a bake.
+        The scene, read for a check (leniently) or for a bake.
     source : SourceScene
-        The meshes of the file, defective triangles included; of a scene read for a bake, its good triangles.
+        The meshes of the file. In a scene read for a check they include defective triangles. In a scene read
+        for a bake they contain the good triangles only.
     settings : BakeSettings
+        Settings of the bake that the scene is checked for.
     mip : int
-        Mip level of the lightmap down to which charts must not bleed into each other.
-    meshes : tuple of MeshFacts, one for each of `source.meshes`
+        Coarsest mip level at which charts must not bleed into each other; 0 is the page itself.
+    meshes : tuple of MeshFacts
+        One for each of `source.meshes`.
     rates : Rates or None
         Speed of an earlier bake.
     probe : bool
-        Measure the speed of rays if there are no rates.
+        Whether the speed of rays is measured if `rates` is None.
 
     Raises
     ------
@@ -70,7 +76,7 @@ class CheckContext:
 
     @cached_property
     def first_instance(self) -> dict[int, SourceInstance]:
-        """Return the first instance of each mesh."""
+        """Return the first instance of each mesh, by mesh index."""
         found: dict[int, SourceInstance] = {}
         for instance in self.source.instances:
             found.setdefault(instance.mesh, instance)
@@ -78,13 +84,16 @@ class CheckContext:
 
     @cached_property
     def box(self) -> NDArray[np.float64]:
-        """Return the lowest and highest corner (2, 3) of all good triangles, metres, world; inf if none."""
+        """Return the bounding box of all good triangles, (2, 3) float64: lowest and highest corner.
+
+        In metres, world space. Without good triangles the corners are +inf and -inf.
+        """
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.source.instances:
             facts = self.meshes[instance.mesh]
             if not len(facts.good):
                 continue
-            # Transform the corners of the mesh's bounding box; their box bounds the transformed mesh.
+            # Bound the transformed mesh by the transformed corners of its bounding box.
             own = facts.bounds
             box = np.array(list(product(*own.T)))
             world = box @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
@@ -93,13 +102,13 @@ class CheckContext:
 
     @property
     def diagonal(self) -> float:
-        """Return the diagonal of that box, metres."""
+        """Return the length of the diagonal of `box`, metres; 0 without good triangles."""
         low, high = self.box
         return float(np.linalg.norm(high - low)) if np.isfinite(low).all() else 0.0
 
     @cached_property
     def world(self) -> WorldTriangles:
-        """Return the good triangles of all instances."""
+        """Return the good triangles of all instances in world space."""
         threads = thread_count(self.settings.threads)
         return WorldTriangles(
             self.source.instances, self.meshes, self.scene.materials, self.scene.origin, threads=threads
@@ -107,7 +116,7 @@ class CheckContext:
 
     @cached_property
     def used_materials(self) -> list[int]:
-        """Return the indices of materials that good triangles have, sorted."""
+        """Return the indices of the materials that good triangles use, sorted."""
         used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
         return [int(k) for k in np.unique(np.concatenate(used))] if used else []
 
@@ -128,18 +137,24 @@ class CheckContext:
 
     @cached_property
     def emission(self) -> Emission:
-        """Return the triangles that emit."""
+        """Return the world triangles that emit, with their radiance."""
         return find_emission(self.world)
 
     @property
     def emits(self) -> bool:
-        """Return whether any triangle emits. One whose part of the emissive texture is black does not."""
+        """Return whether any triangle emits.
+
+        A triangle does not emit if the emissive texture is black all over it.
+        """
         some = any(max(self.scene.materials[k].emission) > 0 for k in self.used_materials)
         return some and len(self.emission.triangle) > 0
 
     @cached_property
     def levels(self) -> Levels | None:
-        """Return direct light at sample points; None without light or surface, or for a bake of AO alone."""
+        """Return direct irradiance at sample points.
+
+        None if the scene has no light or no surface, or if only ambient occlusion is baked.
+        """
         bright = [max(light.intensity) for light in self.scene.lights]
         lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
         if not self.bakes_light or not (lit or self.emits) or not self.world.area.sum() > 0:
@@ -147,20 +162,20 @@ class CheckContext:
         return estimate_levels(self.scene, self.world, self.emission, self.settings)
 
     def uv(self, mesh: int) -> UvFacts:
-        """Return the lightmap uv of a mesh."""
+        """Return the lightmap uv of the mesh with index `mesh`."""
         if mesh not in self._uv:
             self._uv[mesh] = UvFacts(self.meshes[mesh])
         return self._uv[mesh]
 
     def location(self, mesh: int) -> Location:
-        """Return the first instance of a mesh as the location of a finding."""
+        """Return the location of a finding about a mesh: its first instance, or its name if it has none."""
         instance = self.first_instance.get(mesh)
         if instance is None:
             return Location(self.source.meshes[mesh].name)
         return Location(instance.name or self.source.meshes[mesh].name, instance.node)
 
     def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
-        """Return the world position, metres, of a (3,) object-space point in the first instance of a mesh."""
+        """Transform a (3,) object-space point to world space, metres, by the mesh's first instance."""
         instance = self.first_instance.get(mesh)
         matrix = np.eye(4) if instance is None else instance.world_from_object
         x, y, z = (float(v) for v in matrix[:3, :3] @ np.asarray(point, np.float64) + matrix[:3, 3])
@@ -168,14 +183,14 @@ class CheckContext:
 
 
 def source_scene_of(scene: Scene) -> SourceScene:
-    """Return the good triangles of a scene as a source scene, without copies."""
+    """Return a source scene that shares the arrays of a scene read for a bake."""
     meshes = tuple(SourceMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
     stand = tuple(SourceInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
     return SourceScene(meshes, stand)
 
 
 def _primitives(mesh: Mesh) -> tuple[SourcePrimitive, ...]:
-    # Vertices and triangles are sorted by primitive.
+    # Vertices and triangles are sorted by primitive, so a slice selects those of one primitive.
     out = []
     for number in np.unique(mesh.primitive):
         rows = slice(*np.searchsorted(mesh.vertex_primitive, [number, number + 1]))

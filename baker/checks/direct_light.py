@@ -1,6 +1,10 @@
-"""Direct irradiance at a few hundred points of a scene, before any bake.
+"""Estimate of direct irradiance at a few hundred points of a scene, without a bake.
 
-E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each times visibility
+    E = sum I cos / r^2  +  sum L cos cos' A / r^2  +  pi L_sky
+
+The first sum is over lights without area (intensity I), the second over emitters (radiance L, area A), and
+L_sky is the radiance of the sky. r is the distance to the light. cos and cos' are the cosines at the point
+and at the emitter. Each term is multiplied by visibility.
 """
 
 from __future__ import annotations
@@ -17,7 +21,8 @@ from baker.core.light_kind import kind_of
 from baker.core.scene import PunctualLight, Scene
 from baker.core.settings import BakeSettings
 
-# Number of points, a multiple of 16; rays from each to emissive surfaces, and into the sky.
+# Number of sample points, a multiple of 16.
+# Rays from each point to emitters, and rays from each point for the sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
@@ -28,9 +33,11 @@ class Levels:
 
     Attributes
     ----------
-    position : (n, 3) float64, metres, relative to `Scene.origin`
-    irradiance : (n,) float64, lx, brightest of RGB
-    triangle : (n,) int64, triangle of `WorldTriangles` that each point lies on
+    position : (n, 3) float64, metres, world, relative to `Scene.origin`
+    irradiance : (n,) float64, lx
+        The largest of the components R, G and B.
+    triangle : (n,) int64
+        Index in `WorldTriangles` of the triangle on which each point lies.
     """
 
     position: NDArray[np.float64]
@@ -41,21 +48,23 @@ class Levels:
 def estimate_levels(
     scene: Scene, world: WorldTriangles, emission: Emission, settings: BakeSettings
 ) -> Levels:
-    """Estimate direct light at points on all front sides, stratified by area.
+    """Estimate direct irradiance at random points on the fronts of all triangles, stratified by area.
 
     Parameters
     ----------
     scene : Scene
+        The lights.
     world : WorldTriangles
-        Its triangles.
+        The triangles of the scene.
     emission : Emission
-        Those of them that emit.
+        The triangles that emit.
     settings : BakeSettings
-        `seed` and the sky are used.
+        The seed and the radiance of the sky.
 
     Returns
     -------
     Levels
+        `POINTS` points with their irradiance.
     """
     random = np.random.default_rng(settings.seed)
     position, normal, triangle = spread_points(world, POINTS, random)
@@ -79,7 +88,10 @@ def estimate_levels(
 def spread_points(
     world: WorldTriangles, n: int, random: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return n points, stratified by area: positions (n, 3), face normals (n, 3) and triangles (n,)."""
+    """Return n random points on all triangles, stratified by area.
+
+    The results are positions (n, 3), metres, unit face normals (n, 3) and triangle indices (n,).
+    """
     share = np.cumsum(world.area)
     pick = (np.arange(n) + random.random(n)) / n * share[-1]
     triangle = np.minimum(np.searchsorted(share, pick), len(share) - 1)
@@ -92,7 +104,10 @@ def points_inside(
     random: np.random.Generator,
     part: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Return a random point of each triangle, (n, 3), or of the part of it that `Emission.inside` gives."""
+    """Return one uniform random point inside each triangle, (n, 3) float64, metres.
+
+    With `part`, (n, 3) rows of `Emission.inside`, the point lies in that part of the triangle.
+    """
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
@@ -109,7 +124,7 @@ def _punctual(
     world: WorldTriangles, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the irradiance of a light without area at (n, 3) points, (n, 3) float64."""
-    # `LightKind.fill` takes rows of 16 points.
+    # `LightKind.fill` takes points in groups of 16.
     shape = (len(origin) // 16, 16)
     ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
     at, up = (value.astype(np.float32).reshape(*shape, 3) for value in (origin, normal))
@@ -127,7 +142,10 @@ def _emissive(
     normal: NDArray[np.float64],
     random: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Return the irradiance of emissive triangles, (n, 3) float64, by points on them chosen by power."""
+    """Return the irradiance at (n, 3) points from emitters, (n, 3) float64, lx.
+
+    Monte Carlo estimate: rays aim at points on emitters chosen with probability proportional to power.
+    """
     power = found.area * (found.radiance @ _LUMINANCE)
     total = np.zeros((len(origin), 3))
     if not power.sum() > 0:

@@ -1,4 +1,4 @@
-"""Emission of each triangle of the file: exact means of emissive textures over triangles or parts of them."""
+"""Radiance that each triangle emits: the exact mean of the emissive texture over it or its parts."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from numpy.typing import NDArray
 from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Largest number of parts that cutting adds to the textured triangles.
+# Largest number of parts by which subdivision may exceed the number of textured triangles.
 _MOST_PARTS = 2048
 
 
 @dataclass(frozen=True)
 class Emission:
-    """The E triangles that emit, textured ones in parts.
+    """E emitting surfaces: whole triangles without emissive texture, and parts of triangles with one.
 
     Attributes
     ----------
     triangle : (E,) int64
-        Triangle of `WorldTriangles`.
+        Index of the triangle in `WorldTriangles`.
     inside : (E, 3) float64
-        The part of it, see `baker.lights.emissive_texture.Parts`.
-    radiance : (E, 3) float64
-        Mean, cd/m2.
+        The part of the triangle: barycentrics (b1, b2) of its corner 0, and its relative size. (0, 0, 1) is
+        the whole triangle. See `baker.lights.emissive_texture.Parts`.
+    radiance : (E, 3) float64, cd/m2
+        Mean over the part.
     area : (E,) float64, m2
+        Area of the part.
     """
 
     triangle: NDArray[np.int64]
@@ -36,7 +38,7 @@ class Emission:
 
 
 def find_emission(world: WorldTriangles) -> Emission:
-    """Find the triangles that emit. Those whose part of the texture is black do not."""
+    """Return the triangles and parts of triangles that emit; those with black texture are left out."""
     materials = world.materials
     factor = np.array([m.emission for m in materials], np.float64).reshape(-1, 3)
     emits = np.flatnonzero((factor.max(axis=1, initial=0.0) > 0)[world.material] & (world.area > 0))
@@ -45,7 +47,7 @@ def find_emission(world: WorldTriangles) -> Emission:
     triangle, inside = untextured, np.tile([0.0, 0.0, 1.0], (len(untextured), 1))
     radiance = factor[world.material[untextured]]
     if len(image):
-        # Import, and compile, these kernels only for files with emissive textures.
+        # Import these modules only for files with emissive textures, because they compile kernels.
         from baker.kernels.textures import pack_textures
         from baker.lights.emissive_texture import EmissiveTextures, cut
 
@@ -64,7 +66,10 @@ def find_emission(world: WorldTriangles) -> Emission:
 
 
 def _image_uv(world: WorldTriangles, triangle: NDArray[np.int64], texture: Texture) -> NDArray[np.float64]:
-    """Return the uv of triangles' corners in a texture, (n, 3, 2) float64; 0 without the uv set."""
+    """Return the texture uv of the corners of n triangles, (n, 3, 2) float64.
+
+    The uv are 0 on primitives that lack the texture's uv set.
+    """
     out = np.zeros((len(triangle), 3, 2))
     for k in np.unique(world.instance[triangle]):
         own = np.flatnonzero(world.instance[triangle] == k)

@@ -1,11 +1,11 @@
-"""Findings of checks: location, count, severity and advice."""
+"""The classes of a finding: its location, counts, severity and advice."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
 
-# In ascending order; the index is the rank.
+# Severities in ascending order. The index is the rank.
 SEVERITIES = ("info", "warning", "error")
 # Largest number of faces or face pairs that one finding lists.
 MOST_FACES = 10
@@ -18,9 +18,10 @@ class Location:
     Attributes
     ----------
     object : str
-        Name of the node (the first one that shows the mesh), light or material; empty for the whole scene.
+        Name of the node, light or material. For a mesh, the name of the first node that has it. Empty if the
+        finding is about the whole scene.
     node : int or None
-        glTF node index.
+        Index of the node in the glTF file.
     """
 
     object: str = ""
@@ -29,29 +30,29 @@ class Location:
 
 @dataclass(frozen=True)
 class RawFinding:
-    """A finding as a rule yields it; `run_check` adds the severity and advice of the rule.
+    """A finding as a rule yields it. `run_check` adds the code, severity and advice of the rule.
 
     Attributes
     ----------
     message : str
-        One sentence with the numbers.
+        One sentence that states what was found, with its numbers.
     location : Location
     count : int
-        Number of faces, vertices, edges ... concerned.
+        Number of defective faces, vertices, edges or other elements.
     percent : float or None
-        Share of the object concerned.
+        Share of the object that is defective, percent.
     primitive : int or None
-        Primitive of the first face concerned.
+        Index of the primitive of the first defective face.
     faces : tuple of int
-        Up to `MOST_FACES` face numbers within their primitive.
+        Up to `MOST_FACES` defective faces, as numbers within their primitive.
     pairs : tuple of (int, int)
-        Up to `MOST_FACES` pairs of faces.
+        Up to `MOST_FACES` pairs of defective faces, as numbers within their primitives.
     position : (3,) tuple or None
-        World position of the defect, metres.
+        Position of the defect, metres, world.
     severity : str or None
-        Overrides the severity of the rule.
+        Severity of this finding if it differs from that of the rule.
     more : dict
-        Further keys of the finding in `--json`.
+        Additional keys of the finding in the output of `--json`.
     """
 
     message: str
@@ -78,12 +79,12 @@ class Finding:
 
     @property
     def object(self) -> str:
-        """Return the name of the object concerned, empty for the whole scene."""
+        """Return the name of the defective object, empty for the whole scene."""
         return self.found.location.object
 
     @property
     def node(self) -> int | None:
-        """Return the node index of the object concerned."""
+        """Return the node index of the defective object, or None."""
         return self.found.location.node
 
     @property
@@ -93,7 +94,7 @@ class Finding:
 
 
 def finding_json(finding: Finding) -> dict[str, Any]:
-    """Return a finding as JSON values. Keys after `fix` are left out where they do not apply."""
+    """Return a finding as JSON values. Optional keys (`percent` and later) without a value are left out."""
     found = finding.found
     value: dict[str, Any] = {
         "code": finding.code,

@@ -1,4 +1,7 @@
-"""Accepted findings, which do not fail a check: `CODE` or `CODE@OBJECT`, both may contain `*`."""
+"""Patterns of accepted findings, which do not fail a check.
+
+A pattern is `CODE` or `CODE@OBJECT`. Both parts may contain `*` for any letters.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +26,12 @@ class Ignore:
 
 
 def parse_ignore(rules: Iterable[str]) -> list[Ignore]:
-    """Return the patterns of `CODE[@OBJECT]` texts.
+    """Parse texts of the form `CODE[@OBJECT]`.
 
     Raises
     ------
     SettingsError
-        For a code that no check has.
+        If a code matches no check.
     """
     known = CHECKS.names()
     out = []

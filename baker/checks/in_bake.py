@@ -1,4 +1,4 @@
-"""The rules that a bake runs: defects that its importer and unwrapper do not report."""
+"""The rules that every bake runs, for defects that neither the importer nor the unwrapper reports."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from baker.core.settings import BakeSettings
 def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     """Return warnings about a scene before it is baked.
 
-    The importer warns of unusable faces and the unwrapper of lightmap uv that cannot be kept, by the codes of
-    `baker check`. This function adds `inside-out`, `invisible`, `collision-hull` and `light-range`.
+    The importer warns of unusable faces, and the unwrapper of lightmap uv that cannot be kept. Both use the
+    codes of `baker check`. This function runs the rules `inside-out`, `invisible` and `collision-hull`, and
+    for bakes of light also `light-range`.
 
     Parameters
     ----------
     scene : Scene
-        As the importer returns it for a bake.
+        The scene, read for a bake.
     settings : BakeSettings
         Settings of the bake.
 
     Returns
     -------
     list of SceneWarning
-        In the order of these rules.
+        Sorted by rule, in the order above.
     """
-    # Import these rules directly: the registry would import all of them.
+    # Import the four rules directly, because the registry would import all rules.
     from baker.checks.context import CheckContext
     from baker.checks.rules.collision import collision_hull
     from baker.checks.rules.inside_out import inside_out

@@ -1,4 +1,4 @@
-"""The result of a check as JUnit test cases, one for each scene and code."""
+"""The result of a check as JUnit test cases, one for each pair of scene and rule."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from baker.io.junit import Case, junit_text
 
 
 def check_junit(reports: Sequence[CheckReport]) -> str:
-    """Return the JUnit document. Findings below `fail_on` do not fail a case.
+    """Return the JUnit document.
+
+    A case fails if its rule has a finding of the severity `fail_on` or a higher one.
 
     Parameters
     ----------

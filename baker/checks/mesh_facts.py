@@ -1,4 +1,7 @@
-"""Properties of a mesh that several rules use, each computed once on first use: faces, edges, pieces."""
+"""Properties of the faces, edges and pieces of a mesh that several rules use.
+
+Each property is computed on first use and then stored.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +19,28 @@ from baker.topology.weld import number_by_first
 
 
 class MeshFacts:
-    """A mesh of the file, and the mask of triangles that a bake can use.
+    """A mesh of the file, with V vertices and T triangular faces.
 
-    Faces are numbered over all primitives, without those that only stitch a triangle strip.
+    Faces are numbered from 0 to T - 1 over all primitives. Degenerate triangles that only join the pieces of
+    a triangle strip are left out.
+
+    The G good faces are those that a bake uses: their indices and coordinates are valid, they have area, and
+    they repeat no earlier face. Arrays of shape (G, ...) have one entry for each entry of `good`.
+
+    The S sheet faces are the good faces that share their three positions with no other good face. Edges and
+    pieces are those of sheet faces.
 
     Attributes
     ----------
     position : (V, 3) float32, object space
-    triangle : (T, 3) int64, indices into `position`, possibly out of range
+    triangle : (T, 3) int64
+        Indices into `position`, possibly out of range.
     primitive, local : (T,) int64
-        Primitive of each face and its number in it.
+        Primitive of each face, and the number of the face within the primitive.
     material : (T,) int32
+        Material index of each face.
     trusted : bool
-        The importer has removed bad faces already; all faces count as good.
+        True if the importer has already removed unusable faces; then all faces are good.
     """
 
     def __init__(self, source: SourceMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
@@ -43,7 +55,7 @@ class MeshFacts:
         for k, p in enumerate(source.primitives):
             number = np.arange(len(p.triangle))
             if p.stitched:
-                # Drop triangles with a repeated index, which only join the pieces of a strip.
+                # Drop triangles with a repeated index, which only join the pieces of a triangle strip.
                 t = p.triangle
                 number = number[(t[:, 0] != t[:, 1]) & (t[:, 1] != t[:, 2]) & (t[:, 2] != t[:, 0])]
             parts.append(p.triangle[number] + start[k])
@@ -58,7 +70,7 @@ class MeshFacts:
 
     @cached_property
     def within(self) -> NDArray[np.bool_]:
-        """Return which faces have indices of vertices of their own primitive only, (T,) bool."""
+        """Return (T,) bool: the faces whose three indices are those of vertices of their own primitive."""
         if self.trusted:
             return np.ones(len(self.triangle), bool)
         low, high = self.vertex_start[self.primitive], self.vertex_start[self.primitive + 1]
@@ -66,7 +78,7 @@ class MeshFacts:
 
     @cached_property
     def usable(self) -> NDArray[np.bool_]:
-        """Return which faces have valid indices and usable coordinates (`usable_vertices`), (T,) bool."""
+        """Return (T,) bool: the faces with valid indices and usable coordinates (see `usable_vertices`)."""
         if self.trusted:
             return self.within
         good = usable_vertices(self.position)
@@ -78,7 +90,7 @@ class MeshFacts:
 
     @cached_property
     def flat(self) -> NDArray[np.bool_]:
-        """Return which usable faces have no area, (T,) bool."""
+        """Return (T,) bool: the usable faces without area."""
         found = np.zeros(len(self.triangle), bool)
         if self.trusted:
             return found
@@ -88,7 +100,7 @@ class MeshFacts:
 
     @cached_property
     def repeated(self) -> NDArray[np.bool_]:
-        """Return which usable faces with area repeat an earlier one, (T,) bool."""
+        """Return (T,) bool: the usable faces with area that repeat an earlier face."""
         found = np.zeros(len(self.triangle), bool)
         if self.trusted:
             return found
@@ -99,7 +111,7 @@ class MeshFacts:
 
     @cached_property
     def good(self) -> NDArray[np.int64]:
-        """Return the numbers of the faces that a bake uses, (G,) int64."""
+        """Return the indices of the faces that a bake uses, (G,) int64, ascending."""
         return np.flatnonzero(self.usable & ~self.flat & ~self.repeated)
 
     @cached_property
@@ -109,13 +121,13 @@ class MeshFacts:
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """Return the lowest and highest corner of the good faces, (2, 3) float64, object space."""
+        """Return the bounding box of the good faces, (2, 3) float64, object space: lowest, highest corner."""
         used = self.position[self.triangle[self.good].reshape(-1)].astype(np.float64)
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
     def area_vector(self) -> NDArray[np.float64]:
-        """Return normals of the good faces whose length is the area, (G, 3) float64, object space."""
+        """Return the normals of the good faces scaled by their areas, (G, 3) float64, object space."""
         return 0.5 * face_normal(self.position, self.triangle[self.good])
 
     @cached_property
@@ -126,22 +138,25 @@ class MeshFacts:
 
     @cached_property
     def double_sided(self) -> NDArray[np.bool_]:
-        """Return which good faces have a double-sided material, (G,) bool."""
+        """Return (G,) bool: the good faces with a double-sided material."""
         return np.array([m.double_sided for m in self.materials], bool)[self.material[self.good]]
 
     @cached_property
     def welded(self) -> NDArray[np.int64]:
-        """Return the good faces' corners as numbers of positions, (G, 3) int64: equal positions share one."""
+        """Return the welded vertex of each corner of the good faces, (G, 3) int64.
+
+        Corners with equal positions have the same number.
+        """
         corner = self.triangle[self.good]
         # + 0 makes -0 equal to 0.
         return unique_rows([self.position + np.float32(0.0)], len(self.position))[1][corner]
 
     @cached_property
     def single(self) -> NDArray[np.bool_]:
-        """Return which good faces share their three positions with no other good face, (G,) bool."""
+        """Return (G,) bool: the good faces that share their three positions with no other good face."""
         ordered = np.sort(self.welded, axis=1)
         n = int(ordered.max(initial=0)) + 1
-        # Hash the three numbers to one key: their product may exceed 64 bits.
+        # Hash the three vertex numbers of a face, because a unique key may need more than 64 bits.
         key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
         key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
         order = np.argsort(key)
@@ -153,27 +168,27 @@ class MeshFacts:
 
     @cached_property
     def edges(self) -> Edges:
-        """Return the edges of the faces of `sheet`, whose rows `Edges.face` counts."""
+        """Return the edges of the sheet faces. `Edges.face` contains indices into `sheet`."""
         return find_edges(self.welded[self.sheet])
 
     @cached_property
     def sheet(self) -> NDArray[np.int64]:
-        """Return the rows of `good` without a twin (see `single`), (S,) int64."""
+        """Return the sheet faces as indices into `good`, (S,) int64: those for which `single` is true."""
         return np.flatnonzero(self.single)
 
     @cached_property
     def piece(self) -> NDArray[np.int32]:
-        """Return the piece of each face of `sheet`, (S,) int32: faces connected by edges."""
+        """Return the piece of each sheet face, (S,) int32. The faces of a piece are connected by edges."""
         return number_by_first(self.edges.connected_faces(len(self.sheet)))
 
     @cached_property
     def n_pieces(self) -> int:
-        """Count the pieces."""
+        """Return the number of pieces, P."""
         return int(self.piece.max(initial=-1)) + 1
 
     @cached_property
     def closed(self) -> NDArray[np.bool_]:
-        """Return which pieces have two consistently wound faces at every edge, (P,) bool."""
+        """Return (P,) bool: the pieces in which two consistently wound faces meet at every edge."""
         edges = self.edges
         fine = (edges.count == 2) & (edges.balance == 0)
         closed = np.ones(self.n_pieces, bool)
@@ -182,16 +197,19 @@ class MeshFacts:
 
     @cached_property
     def volume(self) -> NDArray[np.float64]:
-        """Return the signed volume of each piece, (P,) float64, object space; meaningful where `closed`."""
+        """Return the signed volume of each piece, (P,) float64, object space.
+
+        It is positive if the fronts point outwards, and defined for pieces that are `closed`.
+        """
         corner = self.corner[self.sheet]
         corner = corner - corner.mean(axis=(0, 1))
         six = np.einsum("gx,gx->g", corner[:, 0], 2.0 * self.area_vector[self.sheet])
         return np.bincount(self.piece, six / 6.0, minlength=self.n_pieces).astype(np.float64)
 
     def named(self, faces: NDArray[np.integer], most: int = 10) -> tuple[int, ...]:
-        """Return the numbers within their primitives of the first `most` faces."""
+        """Return the first `most` of the faces (n,) as numbers within their primitives."""
         return tuple(int(k) for k in self.local[faces[:most]])
 
     def primitive_of(self, faces: NDArray[np.integer]) -> int | None:
-        """Return the number in the file of the first face's primitive, or None without faces."""
+        """Return the index in the file of the primitive of the first of the faces (n,), None if n is 0."""
         return int(self.source.primitives[self.primitive[faces[0]]].index) if len(faces) else None

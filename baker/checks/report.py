@@ -18,7 +18,7 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
     reports : sequence of CheckReport
         One for each scene that could be read.
     unreadable : sequence of Unreadable
-        The other scenes; they fail the check.
+        The scenes that could not be read. Each of them fails the check.
 
     Returns
     -------
@@ -53,18 +53,18 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
 
 
 def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: bool = False) -> None:
-    """Write one line for each finding with its advice below, and a summary.
+    """Write each finding on one line with its advice on the next, then a summary line.
 
     Parameters
     ----------
     report : CheckReport
         The result for one scene.
     stream : TextIO
-        Where to write.
+        Text stream to write to.
     verbose : int
-        Above 0: also findings of severity info, and face numbers.
+        If above 0, findings of severity info, face numbers and the share of each object are written as well.
     cost : bool
-        Also the finding `cost`, with the share of each object.
+        Whether the finding `cost` is written, with the share of each object.
     """
     shown = [
         finding

@@ -1,8 +1,8 @@
-"""The registry of checks: one function per code, with its severity, advice and documentation.
+"""The registry of rules: one function for each code, with its severity, advice and documentation.
 
-A rule is a function that takes a `CheckContext` and yields `RawFinding`, decorated with `check` in a file of
-`baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line names the defect, the
-rest describes its effect and the test.
+A rule is a function that takes a `CheckContext` and yields `RawFinding` objects. It is decorated with `check`
+and defined in a file of `baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line
+names the defect, and the rest describes the effect of the defect and the test for it.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ class Check:
     Attributes
     ----------
     code : str
-        Stable name of its findings.
+        Name of the findings, the same in all versions.
     group : str
-        One of `GROUPS`, its chapter of the docs.
+        Chapter of docs/CHECKS.md, one of `GROUPS`.
     severity : str
-        One of `baker.checks.finding.SEVERITIES`; a finding may override it.
+        Default severity, one of `baker.checks.finding.SEVERITIES`. A finding may override it.
     fix : str
-        One line of advice.
+        Advice, one line.
     docs : str
         The docstring of the rule.
     function : callable
+        The rule itself.
     in_bake : bool
-        `bake_warnings` runs it in every bake, too.
+        Whether `bake_warnings` also runs the rule in every bake.
     """
 
     code: str
@@ -60,12 +61,12 @@ CHECKS: Registry[Check] = Registry("baker.checks.rules")
 def check(
     code: str, *, group: str, severity: str, fix: str, in_bake: bool = False
 ) -> Callable[[CheckFunction], CheckFunction]:
-    """Return a decorator that registers a function as the rule of a code.
+    """Return a decorator that registers a function as the rule with the given code.
 
     Parameters
     ----------
     code : str
-        Lower-case words joined by dashes; lightmap uv have the prefix `uv.`.
+        Lower-case words joined by dashes. Codes of rules about lightmap uv have the prefix `uv.`.
     group : str
         One of `GROUPS`.
     severity : str
@@ -73,12 +74,12 @@ def check(
     fix : str
         One line of advice, without a full stop.
     in_bake : bool
-        Marks the rules that `baker.checks.in_bake` calls.
+        Whether `baker.checks.in_bake` calls the rule.
 
     Returns
     -------
     callable
-        The decorator; it returns the function unchanged.
+        The decorator, which returns the function unchanged.
 
     Raises
     ------
@@ -107,7 +108,7 @@ def all_checks() -> list[Check]:
 
 
 def run_check(entry: Check, context: CheckContext) -> list[Finding]:
-    """Run one rule and return its findings with severity and advice."""
+    """Run one rule on a context and return its findings with severity and advice."""
     return [
         Finding(entry.code, found.severity or entry.severity, found.message, entry.fix, found)
         for found in entry.function(context)

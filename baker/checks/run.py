@@ -32,15 +32,15 @@ class CheckReport(Result):
     ----------
     path : Path
     findings : tuple of Finding
-        By severity, worst first, then by code and object.
+        Findings that are not ignored, sorted by severity (errors first), then by code and object.
     ignored : tuple of Finding
-        Findings that `ignore` accepts.
+        Findings that match the setting `ignore`.
     fail_on : str
-        Least severity that fails the check.
+        Lowest severity that fails the check.
     seconds : float
-        Duration of reading and checking.
+        Duration of reading and checking, seconds.
     timings : dict of str to float
-        Seconds of each rule by its code, and of reading the scene by "load".
+        Duration of each rule by its code, seconds. The key "load" is the duration of reading the scene.
     """
 
     path: Path
@@ -57,7 +57,7 @@ class CheckReport(Result):
         return all(finding.rank < limit for finding in self.findings)
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that the short text shows."""
         counts = Counter(finding.severity for finding in self.findings)
         return {
             "scene": self.path.name,
@@ -66,7 +66,7 @@ class CheckReport(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as plain values."""
+        """Return the report as values that JSON can represent."""
         return {
             "scene": str(self.path),
             "passed": self.passed,
@@ -83,30 +83,31 @@ def check_scene(
     bake_settings: BakeSettings,
     progress: Progress = silent,
 ) -> CheckReport:
-    """Run every rule on a scene; a file is read leniently.
+    """Run every rule on a scene.
 
     Parameters
     ----------
     scene : Scene, Path or str
-        A Scene is checked as it is.
+        A scene, or the path of a scene file. A file is read leniently: most defects become findings.
     settings : CheckSettings
-        The scene's own extras are added to them.
+        Settings of the check. Those in the scene's extras are added.
     bake_settings : BakeSettings
-        Settings of the bake that is checked for: resolution, padding, uv, sky ...
+        Settings of the bake that the scene is checked for: resolution, padding, uv, sky and others.
     progress : Progress
         Called with the stage "checks".
 
     Returns
     -------
     CheckReport
-        All findings, those about the file included.
+        The findings about the scene and about its file.
 
     Raises
     ------
     InputError
         If the file cannot be read at all.
     SettingsError
-        For an unknown code among `ignore`, `rates` without a bake, or wrong values in the scene's extras.
+        If `ignore` has an unknown code, `rates` is not the folder of a bake, or the scene's extras have wrong
+        values.
     """
     start = time.perf_counter()
     path = (scene.path or Path("scene")) if isinstance(scene, Scene) else Path(scene)
@@ -150,7 +151,7 @@ def _run(
 
 
 def _index_range(error: IndexRangeError) -> Finding:
-    # An importer that stops at a wrong index returns no scene that other rules could read.
+    # An importer that stops at an index out of range returns no scene, so no other rule can run.
     entry = CHECKS.require("index-range", "check")
     found = RawFinding(error.message, Location(error.object or ""))
     return Finding(entry.code, entry.severity, error.message, entry.fix, found)

@@ -1,4 +1,4 @@
-"""The result of a check as SARIF, which code hosts show beside the files concerned.
+"""The result of a check as SARIF, a format that code hosts show beside the checked files.
 
 Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0, 2020.
 """
@@ -19,14 +19,14 @@ _LEVEL = {"info": "note", "warning": "warning", "error": "error"}
 
 
 def sarif_log(reports: Sequence[CheckReport], folder: Path) -> dict[str, Any]:
-    """Return one SARIF run over all scenes.
+    """Return a SARIF log with one run that contains the findings about all scenes.
 
     Parameters
     ----------
     reports : sequence of CheckReport
         One for each scene.
     folder : Path
-        Scenes below it have URIs relative to it, which code hosts resolve against the repository.
+        Scenes below this folder get URIs relative to it. Code hosts resolve these in the repository.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def _result(finding: Finding, index: dict[str, int], uri: str, *, suppressed: bo
         "level": _LEVEL[finding.severity],
         "message": {"text": f"{where}{finding.message}. To do: {finding.fix}."},
         "locations": [location],
-        # Independent of other findings and of counts.
+        # The fingerprint depends on neither other findings nor counts, so it survives other changes.
         "partialFingerprints": {"object/v1": f"{finding.code}@{finding.object}"},
         "properties": finding_json(finding),
     }

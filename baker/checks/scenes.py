@@ -1,4 +1,4 @@
-"""Scene files of paths, folders and patterns, checked one after the other."""
+"""Finds the scene files in paths, folders and patterns, and checks them one after the other."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from baker.io.load import IMPORTERS
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A scene of several that could not be read."""
+    """A scene file that could not be read, and the error."""
 
     path: Path
     error: InputError
 
 
 def find_scenes(paths: Sequence[Path]) -> list[Path]:
-    """Return the scene files of paths, folders and patterns, each once.
+    """Return the scene files that paths, folders and patterns name, without duplicates.
 
     Parameters
     ----------
     paths : sequence of Path
-        Files; folders, of which all scenes below are taken; patterns with `*`, `?` or `[`.
+        Paths of files, folders, or patterns with `*`, `?` or `[`. A folder stands for all scene files in it
+        and in its subfolders.
 
     Returns
     -------
     list of Path
-        In the order of `paths`, those of a folder or pattern sorted.
+        In the order of `paths`. The files of each folder or pattern are sorted.
 
     Raises
     ------
     InputError
-        For a folder or a pattern without any scene file.
+        If a folder or a pattern contains no scene file.
     """
     known = set(IMPORTERS.names())
     found: dict[Path, None] = {}
@@ -51,7 +52,7 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
                 raise InputError(f"there is no scene file ({', '.join(sorted(known))}) below", file=str(path))
             found.update(dict.fromkeys(inside))
         elif not path.exists() and glob.has_magic(str(path)):
-            # Expand patterns for shells that do not.
+            # Expand the pattern here, because some shells pass it on unexpanded.
             root = Path(path.anchor)
             matches = sorted(root.glob(str(path.relative_to(root))))
             if not matches:
@@ -65,32 +66,36 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
 def check_scenes(
     paths: Sequence[Path], settings: CheckSettings, bake_settings: BakeSettings, progress: Progress = silent
 ) -> tuple[list[CheckReport], list[Unreadable]]:
-    """Check scenes; if there are several, unreadable ones are returned and the others are checked.
+    """Check scene files one after the other.
+
+    With more than one file, an unreadable file is returned as `Unreadable` and the others are still checked.
+    A single unreadable file raises.
 
     Parameters
     ----------
     paths : sequence of Path
         Scene files.
     settings : CheckSettings
-        Severity that fails the check, and findings to ignore.
+        Settings of the check, the same for all scenes.
     bake_settings : BakeSettings
-        Settings of the bake that the scenes are meant for.
+        Settings of the bakes that the scenes are checked for.
     progress : Progress
-        Called with the stage "checks" and fractions from 0 to 1 for each scene.
+        Called with the stage "checks" and, for each scene, fractions from 0 to 1.
 
     Returns
     -------
     reports : list of CheckReport
         One for each scene that could be read.
     unreadable : list of Unreadable
-        The others.
+        One for each scene that could not be read.
 
     Raises
     ------
     InputError
         If the only scene cannot be read.
     SettingsError
-        For an unknown code among `ignore`.
+        If `ignore` has an unknown code, `rates` is not the folder of a bake, or a scene's extras have wrong
+        values.
     """
     parse_ignore(settings.ignore)
     reports, unreadable = [], []

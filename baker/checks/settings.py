@@ -1,4 +1,8 @@
-"""The settings of a check: from flags or keywords, the table `[check]` of a file, and the scene's extras."""
+"""The settings of a check.
+
+They come from flags or keyword arguments, from the table `[check]` of a configuration file, and from the
+scene's extras.
+"""
 
 from __future__ import annotations
 
@@ -10,51 +14,55 @@ from baker.core.settings_model import Settings, Texts, setting
 if TYPE_CHECKING:
     from baker.core.scene import Scene
 
-# Mip level of the lightmap down to which charts must not bleed into each other.
+# Default of `mip`: the coarsest mip level at which charts must not bleed into each other; 0 is the page
+# itself.
 DEFAULT_MIP = 2
 
 
 class CheckSettings(Settings):
-    """Holds the settings of a check, checked."""
+    """Settings of a check. Values are validated when an object is created."""
 
     table: ClassVar[str] = "check"
     what: ClassVar[str] = "check setting"
 
     fail_on: Literal["warning", "error"] | None = setting(
-        None, "Least severity that fails the check; default: the scene's extras, else error."
+        None, "Lowest severity that fails the check; default: the scene's extras, else error."
     )
     ignore: Texts = setting(
-        (), "Findings that do not count, with `*` for any letters; repeatable.",
+        (), "Findings to ignore; `*` matches any letters. Repeatable.",
         metavar="CODE[@OBJECT]", repeated=True,
     )  # fmt: skip
-    mip: int = setting(DEFAULT_MIP, "Mip level at which charts must not mix.", ge=0, le=14)
+    mip: int = setting(DEFAULT_MIP, "Mip level at which charts must not bleed together.", ge=0, le=14)
     rates: Path | None = setting(
         None,
-        "Estimate time with the speed of this earlier bake (else of one beside the scene).",
+        "Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.",
         metavar="OUT",
     )
     cost: bool = setting(False, "Estimate time and memory of a bake; measures ray rates for about a second.")
 
 
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
-    """Return settings to which the scene's own `extras.baker.check` is added.
+    """Add the settings in the scene's `extras.baker.check` to settings of a check.
 
-    On the document: `fail_on` (unless `settings` has one) and `ignore`. On a node: `ignore`, a list of codes
-    that do not count for that node, or true for all.
+    The extras of the document may have `fail_on`, which is used if `settings` has none, and `ignore`. The
+    extras of a node may have `ignore`: a list of codes to ignore for this node, or true for all codes.
 
     Parameters
     ----------
     settings : CheckSettings
+        Settings from flags and files.
     scene : Scene
+        The scene whose extras are read.
 
     Returns
     -------
     CheckSettings
+        The settings with the extras added.
 
     Raises
     ------
     SettingsError
-        For a wrong value in the extras.
+        If the extras have a wrong value.
     """
     if scene.source is None:
         return settings
@@ -76,7 +84,7 @@ def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
 
 
 def _table(holder: Any) -> dict[str, Any]:
-    """Return `extras.baker.check` of a glTF object, empty if it is not there."""
+    """Return `extras.baker.check` of a glTF object, an empty dictionary if it is missing."""
     for key in ("extras", "baker", "check"):
         holder = holder.get(key) if isinstance(holder, dict) else None
     return holder if isinstance(holder, dict) else {}

@@ -1,7 +1,8 @@
-"""Gain of light by reflections between nearly white surfaces, by random paths.
+"""Gain of light by reflections between nearly white surfaces, estimated with random paths.
 
-If the share s_n of the light is left after n reflections, each of them keeps about s_n^(1/n), and all bounces
-together multiply light by 1 / (1 - s_n^(1/n)), the sum of the geometric series.
+Let s_n be the share of the light that is left after n reflections. Each reflection then keeps a share of
+about s_n^(1/n). All reflections together then multiply light by the sum of the geometric series,
+1 / (1 - s_n^(1/n)).
 """
 
 from __future__ import annotations
@@ -12,27 +13,30 @@ from numpy.typing import NDArray
 from baker.checks.context import CheckContext
 from baker.checks.direct_light import cosine_directions, spread_points
 
-# Points on surfaces (a multiple of 16), paths from each, and their reflections.
+# Number of points on surfaces (a multiple of 16), of paths from each point, and of reflections in each path.
 POINTS, PATHS, REFLECTIONS = 256, 16, 20
-# As in the solve of a bake.
+# Upper limit of albedos, the same as `MAX_ALBEDO` of `baker.radiosity.solve`.
 MAX_ALBEDO = 0.999
-# Gain above which light counts as trapped: that of albedo 0.95 everywhere, more than any ordinary room.
+# Gain above which light counts as trapped: the gain of a closed room whose albedo is 0.95 everywhere.
 MOST_GAIN = 20.0
 
 
 def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
-    """Return the factor by which all bounces multiply light where it is trapped.
+    """Return the gain of light by reflections at the points at which light is trapped.
+
+    Light is trapped at a point if the gain along the paths from this point exceeds `MOST_GAIN`.
 
     Parameters
     ----------
     context : CheckContext
+        The scene.
     albedo : (M,) float64
-        Of each material, 0 to 1.
+        Albedo of each material, 0 to 1.
 
     Returns
     -------
     float
-        1 if there is no surface, or no point at which the gain exceeds `MOST_GAIN`.
+        1 if the scene has no surface, or if light is trapped nowhere.
     """
     world = context.world
     if not world.area.sum() > 0:
@@ -60,7 +64,7 @@ def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
             alive[:, None], origin + direction * np.where(alive, distance, 0.0)[:, None], position
         )
     mean = left.reshape(POINTS, PATHS).mean(axis=1)
-    # Average over points where light is trapped only: otherwise an open part of the scene would outweigh a
-    # white room.
+    # Average only over points where light is trapped, because open parts of the scene would hide a white
+    # room.
     trapped = mean > (1.0 - 1.0 / MOST_GAIN) ** REFLECTIONS
     return 1.0 / (1.0 - float(mean[trapped].mean()) ** (1.0 / REFLECTIONS)) if trapped.any() else 1.0

@@ -1,4 +1,4 @@
-"""Properties of a mesh's lightmap uv that several rules use: triangles, areas, charts."""
+"""Properties of the lightmap uv of a mesh that several rules use: ranges, areas and charts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ LIGHTMAP_SET = 1
 
 
 class UvFacts:
-    """TEXCOORD_1 of the good faces of a mesh.
+    """One uv set, TEXCOORD_1 by default, of the F good faces whose primitives have this set.
 
     Attributes
     ----------
     rows : (F,) int64
-        Rows of `MeshFacts.good` whose primitive has the set.
+        The faces, as indices into `MeshFacts.good`.
+    triangle : (F, 3) int64
+        Vertices of the faces, as indices into `MeshFacts.position`.
     uv : (F, 3, 2) float64
+        The uv of the corners.
     """
 
     def __init__(self, facts: MeshFacts, number: int = LIGHTMAP_SET) -> None:
@@ -36,48 +39,51 @@ class UvFacts:
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """Return the face numbers of the rows."""
+        """Return the indices of the faces in the mesh, (F,) int64."""
         return self.facts.good[self.rows]
 
     @cached_property
     def finite(self) -> NDArray[np.bool_]:
-        """Return which rows have finite uv, (F,) bool."""
+        """Return (F,) bool: the faces with finite uv."""
         return np.asarray(np.isfinite(self.uv).all(axis=(1, 2)))
 
     @cached_property
     def valid(self) -> bool:
-        """Return whether there are rows, all finite and inside the page, as other rules require."""
+        """Return whether there are faces with this uv set, and all their uv are finite and inside 0..1."""
         return bool(len(self.rows)) and bool(self.finite.all()) and not self.outside.any()
 
     @cached_property
     def outside(self) -> NDArray[np.bool_]:
-        """Return which rows leave 0..1 by more than `RANGE_SLACK`, (F,) bool."""
+        """Return (F,) bool: the faces with a uv outside 0..1 by more than `RANGE_SLACK`."""
         with np.errstate(invalid="ignore"):
             return np.asarray(((self.uv < -RANGE_SLACK) | (self.uv > 1.0 + RANGE_SLACK)).any(axis=(1, 2)))
 
     @cached_property
     def signed_area(self) -> NDArray[np.float64]:
-        """Return the signed uv areas, (F,) float64."""
+        """Return the signed uv area of each face, (F,) float64; the page has area 1."""
         e1, e2 = self.uv[:, 1] - self.uv[:, 0], self.uv[:, 2] - self.uv[:, 0]
         area: NDArray[np.float64] = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
         return area
 
     @cached_property
     def area(self) -> NDArray[np.float64]:
-        """Return the faces' areas in object space, (F,) float64."""
+        """Return the area of each face in object space, (F,) float64."""
         return self.facts.area[self.rows]
 
     @cached_property
     def chart(self) -> NDArray[np.int32]:
-        """Return the chart of each row, (F,) int32: pieces connected both in space and in uv."""
+        """Return the chart of each face, (F,) int32.
+
+        Faces that share a corner with the same position and the same uv are of one chart.
+        """
         label = weld(self.facts.position, self._vertex)
         return connected_vertices(label[self.triangle], int(label.max(initial=-1)) + 1)
 
     @cached_property
     def n_charts(self) -> int:
-        """Count the charts."""
+        """Return the number of charts, C."""
         return int(self.chart.max(initial=-1)) + 1
 
     def per_chart(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the sum of (F,) values over each chart, (C,) float64."""
+        """Return the sum over each chart of one value per face (F,), as (C,) float64."""
         return np.bincount(self.chart, value, self.n_charts).astype(np.float64)

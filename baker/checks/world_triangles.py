@@ -1,4 +1,4 @@
-"""The good triangles of all instances in world space, and rays among them."""
+"""The good triangles of all instances in world space, and rays that are traced against them."""
 
 from __future__ import annotations
 
@@ -17,32 +17,41 @@ from baker.core.stage import Stage
 if TYPE_CHECKING:
     from baker.trace.embree import RayScene, Tracer
 
-# Rays per call of the kernel, which is one task of a thread.
+# Number of rays in each call of the kernel. A call is one task of a thread.
 _TILE = 1 << 16
 
 
 class WorldTriangles:
-    """The good faces of every instance, in the order of instances.
+    """The T good faces of all instances in world space, sorted by instance.
 
     Parameters
     ----------
     instances : sequence of SourceInstance
+        The instances of the source scene.
     meshes : sequence of MeshFacts
-        Indexed by `SourceInstance.mesh`.
+        The meshes that `SourceInstance.mesh` refers to.
     materials : sequence of Material
+        The materials of the scene.
     origin : (3,) float64, metres, world
-        Positions are relative to it: `Scene.origin`.
+        `Scene.origin`, which is subtracted from all positions.
     threads : int
+        Number of threads for tracing rays.
 
     Attributes
     ----------
     position : (V, 3) float32, metres, world, relative to `origin`
+        Vertices of all instances.
     triangle : (T, 3) int64
-        Counter-clockwise seen from the front: mirroring nodes reverse the winding.
-    instance : (T,) int64, index into the source scene's instances
-    face : (T,) int64, face number in `MeshFacts`
-    normal : (T, 3) float64, unit; area : (T,) float64, m2
-    material : (T,) int32; double_sided : (T,) bool
+        Indices into `position`, counter-clockwise seen from the front. Under a mirroring node they are in the
+        reverse of the mesh's order.
+    instance : (T,) int64
+        Index of the triangle's instance in `instances`.
+    face : (T,) int64
+        Index of the triangle's face in the `MeshFacts` of its mesh.
+    normal : (T, 3) float64, unit
+    area : (T,) float64, m2
+    material : (T,) int32
+    double_sided : (T,) bool
     """
 
     def __init__(
@@ -81,7 +90,7 @@ class WorldTriangles:
         self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
         sided = np.array([m.double_sided for m in materials], bool)
         self.double_sided: NDArray[np.bool_] = sided[self.material]
-        # Instances that a scale of zero flattens have faces without area.
+        # Divide safely, because an instance with a scale of zero has faces without area.
         a, b, c = (self.position[self.triangle[:, k]].astype(np.float64) for k in range(3))
         cross = np.cross(b - a, c - a)
         length = np.sqrt(np.einsum("tx,tx->t", cross, cross))
@@ -90,15 +99,15 @@ class WorldTriangles:
 
     @cached_property
     def size(self) -> NDArray[np.float64]:
-        """Return the largest edge component of each triangle, (T,) float64, metres."""
+        """Return the largest x, y or z extent of the edges from corner 0, for each triangle, (T,), metres."""
         corner = self.position[self.triangle].astype(np.float64)
         return np.asarray(np.abs(corner[:, 1:] - corner[:, :1]).max(axis=(1, 2), initial=0.0))
 
     def lifted(
         self, point: NDArray[np.float64], triangle: NDArray[np.int64], normal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return ray origins: (n, 3) points of (n,) triangles moved off the surface along (n, 3) normals."""
-        # Imported here, since it imports the compiler.
+        """Return ray origins (n, 3): points on (n,) triangles, moved off the surface along (n, 3) normals."""
+        # Import the module here, because it imports the compiler.
         from baker.kernels.surface import OFFSET, ROUNDING
 
         far, size = np.abs(point).max(axis=1, initial=0.0), self.size[triangle]
@@ -106,14 +115,14 @@ class WorldTriangles:
         return np.asarray(point + step[:, None] * normal)
 
     def middle_of(self, triangle: int) -> tuple[float, float, float]:
-        """Return the centroid of a triangle, metres, world."""
+        """Return the centroid of the triangle with this index, metres, world."""
         middle = self.position[self.triangle[triangle]].mean(axis=0) + self.origin
         x, y, z = (float(v) for v in middle)
         return x, y, z
 
     @cached_property
     def rays(self) -> RayScene:
-        """Return the ray tree."""
+        """Return the ray tree of all triangles."""
         from baker.trace.embree import RayScene
 
         return RayScene(self.position, self.triangle.astype(np.uint32), threads=self.threads)
@@ -125,13 +134,17 @@ class WorldTriangles:
         near: NDArray[np.floating],
         far: NDArray[np.floating],
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Return the first hits of n rays: triangle (n,) int32, -1 for none, and distance (n,) float32.
+        """Return the first hits of n rays: triangles (n,) int32 and distances (n,) float32.
+
+        The triangle is -1 for rays without a hit. Distances are in lengths of `direction`.
 
         Parameters
         ----------
-        origin, direction : (n, 3) float, metres, relative to `Scene.origin`
+        origin : (n, 3) float, metres, relative to `Scene.origin`
+        direction : (n, 3) float
+            Need not have unit length.
         near, far : (n,) float
-            Range of the ray parameter, in lengths of `direction`.
+            Range of distances within which hits are searched, in lengths of `direction`.
         """
         return cast(self.rays.tracer, self.threads, origin, direction, near, far)
 
@@ -144,7 +157,7 @@ def cast(
     near: NDArray[np.floating],
     far: NDArray[np.floating],
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the first hits of n rays through any tracer, see `WorldTriangles.first_hits`."""
+    """Trace n rays with any tracer. The results are those of `WorldTriangles.first_hits`."""
     from baker.core.parallel import run_tiles
     from baker.core.progress import silent
     from baker.kernels.cast import first_hits

@@ -1,4 +1,4 @@
-"""Kernels of the checks: coplanar faces, overlapping uv."""
+"""Kernels that find overlapping coplanar faces and overlapping lightmap uv."""
 
 from baker.trace.kernel_cache import keep_kernels
 

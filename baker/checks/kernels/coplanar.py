@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Finds triangles of different objects that overlap within one plane."""
+"""Finds coplanar triangles of different objects that overlap."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ from baker.trace.jit import inner, kernel
 
 @kernel
 def coplanar_partners(corner, low, high, first, owner, slack, partner):
-    """Write for each triangle one of another owner that it overlaps in its plane.
+    """For each triangle, write the index of one coplanar triangle that overlaps it and has another owner.
 
-    Two triangles overlap if their projections overlap on the normals of all sides (separating axis theorem).
+    Two triangles overlap if their projections on the normals of all six sides overlap (separating axis
+    theorem).
 
     Parameters
     ----------
     corner : (T, 3, 2) float64
-        In the coordinates of their plane, grouped by plane and sorted by `low` along x.
+        Corners of each triangle, 2D coordinates in its plane. Triangles are grouped by plane, and those of a
+        plane are sorted by `low[:, 0]`.
     low, high : (T, 2) float64
-        Bounding box of each triangle.
+        Bounding box of each triangle, in the same coordinates.
     first : (P + 1,) int64
-        First triangle of each plane; the last entry is T.
+        Index of the first triangle of each of P planes; the last entry is T.
     owner : (T,) int64
         Object of each triangle.
     slack : float
-        Triangles whose overlap along some axis is at most this do not count. Unit of `corner`.
+        Largest overlap along an axis that is treated as none, in the unit of `corner`.
     partner : (T,) int64
-        In and out: a triangle of another owner, -1 where none was found yet.
+        In and out: index of an overlapping triangle, -1 if none is known.
     """
     for p in range(len(first) - 1):
         for i in range(first[p], first[p + 1]):
@@ -45,7 +47,7 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
 
 @inner
 def _apart(a, b, slack):
-    """Return whether a side of `a` (3, 2) separates all of `b` (3, 2) from it, up to `slack`."""
+    """Return whether a side of triangle `a` (3, 2) separates `a` from triangle `b` (3, 2), up to `slack`."""
     turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
     sign = 1.0 if turn > 0.0 else -1.0
     for k in range(3):

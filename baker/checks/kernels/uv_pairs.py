@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Finds which triangles of a uv layout cover the same samples."""
+"""Finds pairs of triangles of a uv layout that cover the same samples of a regular grid."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 
 from baker.trace.jit import kernel
 
-# Entries of `counts`: samples covered, samples covered again, triangles that cover samples of an earlier one,
-# pairs listed.
+# Indices into `counts`, the numbers of: samples covered by a triangle, further coverings of covered samples,
+# triangles that share samples with an earlier triangle, and pairs written to `pairs`.
 COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 
 
@@ -16,18 +16,22 @@ COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 def cover_pairs(corner, slack, owner, pairs, counts):
     """Mark the samples that each triangle covers, and list pairs of triangles that share samples.
 
-    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers it if it lies inside by more than `slack`.
+    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers a sample that lies inside it, farther than
+    `slack` from every side.
 
     Parameters
     ----------
-    corner : (T, 3, 2) float64, in samples
-    slack : float, in samples
+    corner : (T, 3, 2) float64
+        Corners (x, y) of each triangle, in sample spacings.
+    slack : float
+        Distance from a side within which a sample is not covered, in sample spacings.
     owner : (H, W) int32
-        In and out: number of the last triangle that covered the sample, plus 1; 0 where free.
+        In and out: 1 + index of the last triangle that covered each sample; 0 if none did.
     pairs : (K, 2) int64
-        Out: the first K pairs of triangles that share samples, each counted once for each later triangle.
+        Out: the first K pairs (earlier triangle, later triangle) that share samples. A pair may be repeated
+        if the later triangle also shares samples with other triangles.
     counts : (4,) int64
-        In and out: see `COVERED` to `LISTED`.
+        In and out: totals, see `COVERED` to `LISTED`.
     """
     height, width = owner.shape
     for t in range(len(corner)):
@@ -36,7 +40,7 @@ def cover_pairs(corner, slack, owner, pairs, counts):
         cx, cy = corner[t, 2, 0], corner[t, 2, 1]
         if (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
-        # Divide by the sides' lengths below; skip triangles with a side of no length.
+        # Skip triangles with a side of length 0, because distances are divided by these lengths.
         l0 = np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         l1 = np.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
         l2 = np.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
@@ -50,7 +54,7 @@ def cover_pairs(corner, slack, owner, pairs, counts):
                 max(0, int(min(ax, bx, cx) - 0.5)), min(width - 1, int(max(ax, bx, cx) + 0.5)) + 1
             ):
                 x = c + 0.5
-                # Distance to the nearest side, positive inside.
+                # Compute the distance to the nearest side, positive inside the triangle.
                 nearest = min(
                     ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / l0,
                     ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / l1,

@@ -1,4 +1,4 @@
-"""Rules about single faces and vertices that a bake cannot use, and slivers."""
+"""Rules about faces and vertices that a bake cannot use, and about slivers."""
 
 from __future__ import annotations
 
@@ -18,23 +18,26 @@ from baker.topology.triangle_check import usable_vertices
 def faces_found(
     context: CheckContext, mesh: int, faces: NDArray[np.integer], what: str, *, whole: int | None = None
 ) -> RawFinding:
-    """Return a finding about faces of a mesh, by their numbers over all its primitives.
+    """Return a finding about faces of a mesh.
 
     Parameters
     ----------
     context : CheckContext
+        The scene.
     mesh : int
         Index into `context.meshes`.
     faces : (n,) int
-        The first one gives primitive and position.
+        Indices of the faces in the mesh. The primitive and position of the finding are those of the first
+        face.
     what : str
-        The message, with `{n}` for the count and `{some}` for "1 face" or "n faces".
+        The message. `{n}` is replaced by n, and `{some}` by "1 face" or "n faces".
     whole : int or None
-        Count that is 100 %; all faces of the mesh by default.
+        The number of faces that is 100 %. By default, the number of all faces of the mesh.
 
     Returns
     -------
     RawFinding
+        The finding, with count, percentage, position and the numbers of the first faces.
     """
     facts = context.meshes[mesh]
     n = len(faces)
@@ -68,9 +71,9 @@ def _each(context: CheckContext) -> Iterator[tuple[int, MeshFacts]]:
     fix="export the mesh again: its index buffer belongs to other vertices",
 )
 def index_range(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces with the index of a vertex that does not exist.
+    """Faces whose index buffer refers to a vertex that does not exist.
 
-    The index buffer was made for other vertices. A bake stops with an error.
+    The index buffer was probably made for other vertices. A bake stops with an error.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(~facts.within)
@@ -85,9 +88,9 @@ def index_range(context: CheckContext) -> Iterator[RawFinding]:
     fix="delete or repair these vertices where the mesh was made; a bake leaves their faces out",
 )
 def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces with a corner that is NaN, infinite or further away than 1e18.
+    """Faces with a corner whose position is NaN, infinite or above 1e18.
 
-    A bake leaves them out, which opens holes that let light through.
+    A bake leaves these faces out. Light leaks through the holes.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.within & ~facts.usable)
@@ -102,11 +105,11 @@ def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
     fix="dissolve degenerate faces (`fix` drops them); a bake leaves them out",
 )
 def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces without area: a line or a point.
+    """Faces without area, collapsed to a line or a point.
 
-    They are not visible and a bake leaves them out, but a collapsed face may leave a hole where a real one
-    was intended. The limit is a height of 1e-7 of the longest side, below which the plane of the face
-    consists of rounding errors.
+    Such faces are invisible, and a bake leaves them out. If the face was meant to have an area, there is a
+    hole instead. A face has no area if its height is below 1e-7 of its longest side, because rounding errors
+    then determine its normal.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.flat)
@@ -121,11 +124,11 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="remesh or retriangulate where these faces are (`repair` can, for scans)",
 )
 def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces less than a fiftieth as high as long.
+    """Slivers: faces whose height is less than a fiftieth of their longest side.
 
-    A sliver has few texels: at a length of 50 texels it is less than one texel high. The
-    thinner it is, the more its normal consists of rounding. By the same limit, `repair` remeshes meshes of
-    500 faces or more of which a tenth are slivers.
+    A sliver has few texels: at a length of 50 texels it is less than one texel high. The thinner it is, the
+    larger is the rounding error of its normal. `repair` uses the same limit: it remeshes meshes of at least
+    500 faces if a tenth of the faces are slivers.
     """
     for m, facts in _each(context):
         if not len(facts.good):
@@ -142,11 +145,11 @@ def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="remove doubles (`fix` drops them); a bake keeps the first of each",
 )
 def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces that repeat another one of the same mesh, corner by corner.
+    """Faces with the same three positions as another face of the mesh.
 
-    Two surfaces at the same position shadow each other at random. A bake keeps the first of each; engines
-    keep both. A face with the opposite winding is the back of the other and no duplicate, unless their
-    material is double-sided.
+    Two surfaces at the same position shadow each other at random. A bake keeps only the first face, but
+    engines keep both. Two faces with opposite winding are front and back of a sheet. They are reported only
+    if their material is double-sided.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.repeated)
@@ -163,7 +166,7 @@ def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
 def no_triangles(context: CheckContext) -> Iterator[RawFinding]:
     """Meshes without any usable triangle.
 
-    An error if the whole scene holds no usable triangle: a bake then refuses it.
+    It is an error if the whole scene has no usable triangle, because a bake refuses such a scene.
     """
     if not any(len(facts.good) for facts in context.meshes):
         yield RawFinding("the scene holds no usable triangle: there is nothing to bake", severity="error")

@@ -1,4 +1,4 @@
-"""Meshes that engines use for collision only, by the naming conventions of engines and exporters."""
+"""Rule about meshes that engines use only for collision, recognised by their names."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
-# Unreal: UCX_, UBX_, USP_, UCP_, MCDCX_; Godot: -colonly, -convcolonly, -navmesh, -occonly; plain words.
+# Line 1: prefixes of Unreal and suffixes of Godot. Line 2: English words at the end of a name.
 _NAME = re.compile(
     r"^(ucx|ubx|usp|ucp|mcdcx)_|-(colonly|convcolonly|navmesh|occonly)\b"
     r"|(^|[_.\- ])(collision|collider|hitbox)([_.\- ]?\d*)$",
@@ -27,9 +27,9 @@ _NAME = re.compile(
 def collision_hull(context: CheckContext) -> Iterator[RawFinding]:
     """An object with the name of a collision hull.
 
-    Engines do not show such meshes, but in a bake they block light like all others, and surfaces that they
-    enclose are black. Recognized are Unreal's UCX_, UBX_, USP_, UCP_ and MCDCX_, Godot's -colonly,
-    -convcolonly, -navmesh and -occonly, and names that end in collision, collider or hitbox.
+    Engines do not show collision hulls. In a bake they block light like all other meshes, so surfaces inside
+    them are black. These names are recognised: Unreal's prefixes UCX_, UBX_, USP_, UCP_ and MCDCX_; Godot's
+    suffixes -colonly, -convcolonly, -navmesh and -occonly; names that end in collision, collider or hitbox.
     """
     for instance in context.source.instances:
         name = next(

@@ -17,17 +17,30 @@ from baker.checks.rule import check
 from baker.core.budget import FILLED, Workload, image_bytes, texels_and_pages
 from baker.core.stage import Stage
 
-# With a probe only: rays a bake traces in the time of a probe's ray, and a texel's other seconds a thread.
-# Measured on cornell.glb, hall.glb and interior.glb.
+# Constants of the time estimate without an earlier bake, measured on cornell.glb, hall.glb and interior.glb:
+# number of rays that a bake traces in the time of one ray of the probe;
+# time per texel of the stages without rays, seconds times threads.
 _OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
+# Duration of the probe, seconds.
 PROBE_SECONDS = 1.0
-# Number of objects whose share is listed.
+# Largest number of objects whose share of the cost is listed.
 MOST_SHARES = 20
 
 
 @dataclass(frozen=True)
 class Cost:
-    """An estimate. The number of rays is an upper bound, since rows of texels may end early."""
+    """Estimated cost of a bake. Numbers of rays are upper bounds, because texels may need fewer rays.
+
+    Attributes
+    ----------
+    texels, pages, triangles : int
+    rays : dict of Stage to int
+        Number of rays of each stage.
+    bytes : int
+        Peak memory, bytes.
+    shares : list of dict
+        The objects with the largest area, and the share of each.
+    """
 
     texels: int
     pages: int
@@ -38,15 +51,17 @@ class Cost:
 
 
 def estimate_cost(context: CheckContext) -> Cost:
-    """Estimate the cost of a bake with the settings of a context.
+    """Estimate the cost of a bake.
 
     Parameters
     ----------
     context : CheckContext
+        The scene and the settings of its bake.
 
     Returns
     -------
     Cost
+        The estimate, without time.
     """
     settings, world = context.settings, context.world
     area = np.bincount(world.instance, world.area, len(context.source.instances)).astype(np.float64)
@@ -71,7 +86,10 @@ def estimate_cost(context: CheckContext) -> Cost:
 
 
 def _shares(context: CheckContext, area: NDArray[np.float64], texels: int) -> list[dict[str, Any]]:
-    """Return the instances of largest `area` (I,), m2, with their share of it and of the texels."""
+    """Return the instances with the largest area, with their share of the area and of the texels.
+
+    `area` (I,), m2, is the area of each instance.
+    """
     order = np.argsort(-area, kind="stable")[:MOST_SHARES]
     total = max(float(area.sum()), 1e-300)
     return [
@@ -86,7 +104,7 @@ def _shares(context: CheckContext, area: NDArray[np.float64], texels: int) -> li
 
 
 def probe(context: CheckContext) -> Rates:
-    """Return rates measured with cosine-weighted rays from surfaces of the scene, cast for about a second."""
+    """Measure the speed of rays: trace cosine-weighted rays from the surfaces for about one second."""
     world = context.world
     random = np.random.default_rng(context.settings.seed)
     share = np.cumsum(world.area)
@@ -98,7 +116,7 @@ def probe(context: CheckContext) -> Rates:
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     direction += world.normal[chosen]
     near, far = np.zeros(len(direction)), np.full(len(direction), 1e30)
-    # Load the kernel and build the tree before measuring.
+    # Load the kernel and build the ray tree before the measurement.
     world.first_hits(origin, direction, near, far)
     start, cast = time.perf_counter(), 0
     while time.perf_counter() - start < PROBE_SECONDS:
@@ -110,7 +128,10 @@ def probe(context: CheckContext) -> Rates:
 
 
 def seconds_of(cost: Cost, rates: Rates) -> float:
-    """Return the seconds of a bake. A stage without a rate gets the slowest known one."""
+    """Return the estimated duration of a bake, seconds.
+
+    The slowest known rate is used for stages without a rate.
+    """
     slowest = max(rates.ray.values(), default=0.0)
     rays = sum(n * rates.ray.get(stage, slowest) for stage, n in cost.rays.items())
     return rays + cost.texels * rates.texel + cost.triangles * rates.triangle
@@ -122,10 +143,11 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
 def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
     """The cost of a bake with these settings: texels, pages, rays, memory, and time if known.
 
-    Time comes from an earlier bake: the one that `rates` names, else the latest of this scene in a
-    folder beside it; or, with `cost` and no bake, from rays cast for one second. Else it is left out. It
-    does not include unwrapping, whose time depends on the shapes. `objects` lists the 20 largest with their
-    share of surface, which is their share of texels and nearly of the time.
+    Time is estimated from the speed of an earlier bake: the bake that `rates` names, or else the latest bake
+    of this scene in a folder beside the scene file. If there is none and `cost` is set, the speed of rays is
+    measured for one second. Otherwise no time is given. The time does not include unwrapping, which depends
+    on the shapes. `objects` lists the 20 objects with the largest area. An object's share of the area is its
+    share of the texels and approximately its share of the time.
     """
     if not context.world.area.sum() > 0:
         return

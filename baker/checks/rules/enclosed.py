@@ -1,4 +1,4 @@
-"""Faces inside solids, which are never visible."""
+"""Rule about faces that lie inside solids and are therefore never visible."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from baker.checks.rule import check
 from baker.checks.world_triangles import WorldTriangles
 from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
 
-# A face is tested at its centroid and near its corners, which are moved this share of the way to the
-# centroid.
+# A face is tested at its centroid and near its three corners. This is the share of the way from a corner to
+# the centroid at which the point near the corner lies.
 _DRAWN_IN = 0.02
-# Number of rays that must hit the inside of a solid for a point to count as inside.
+# Number of rays from a point that must hit the inner side of a solid for the point to count as inside.
 _PROOF = 2
-# Unit directions that are added to the normal; arbitrary, so that rays avoid edges of modelled geometry.
+# A ray's direction is the normal plus one of these unit vectors. They are arbitrary, so that rays rarely hit
+# edges of modelled geometry.
 _DIRECTIONS = np.array(
     [
         [0.53, 0.41, 0.743],
@@ -40,12 +41,14 @@ _DIRECTIONS = np.array(
 def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces that lie completely inside a closed solid.
 
-    Examples: the base of a crate that is sunk into a floor, the end of a wall inside another wall, faces
-    between two boxes that touch. They are never visible and receive no light. A bake marks their texels
-    invalid and fills them from visible neighbours of the same chart. Double-sided materials make no
-    difference; rooms (with a light, a camera or most of the scene inside) are no solids. Faces that a solid
-    encloses only in part are not counted. Double-sided faces that bound a solid and whose fronts point into
-    it are counted: flip them, since their lightmap contains the dark inside.
+    Examples are the base of a crate that is sunk into a floor, the end of a wall inside another wall, and
+    faces between two boxes that touch. They are never visible and receive no light. A bake marks their texels
+    invalid and fills them from visible neighbours of the same chart. Faces with double-sided materials are
+    reported, too. A closed surface with a light, a camera or most of the scene inside is a room, not a solid.
+    Faces that lie only partly inside a solid are not reported.
+
+    The rule also reports double-sided faces that bound a solid and whose fronts point into it. Flip these
+    faces, because their lightmap contains the dark inside of the solid.
     """
     world = context.world
     if not len(world.triangle):
@@ -104,7 +107,7 @@ def _solids(context: CheckContext, world: WorldTriangles) -> Solids:
 
 
 def _holders(world: WorldTriangles, solids: Solids) -> NDArray[np.int64]:
-    """Return an object with a solid that encloses each face, (T,) int64, -1 where there is none."""
+    """Return (T,) int64: for each face, the instance of a solid that encloses the whole face, or -1."""
     corner = world.position[world.triangle].astype(np.float64)
     middle = corner.mean(axis=1)
     rows = np.flatnonzero(world.area > 0)
@@ -121,7 +124,10 @@ def _holders(world: WorldTriangles, solids: Solids) -> NDArray[np.int64]:
 def _held(
     world: WorldTriangles, solids: Solids, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Return an object with a solid that encloses each point (n, 3), (n,) int64, or -1."""
+    """Return (n,) int64: for each point of `origin` (n, 3), the instance of a solid around it, or -1.
+
+    `normal` (n, 3) are the unit normals of the faces on which the points lie.
+    """
     count, holder = np.zeros(len(origin), np.int64), np.full(len(origin), -1, np.int64)
     near, far = np.zeros(len(origin), np.float32), np.full(len(origin), np.inf, np.float32)
     for direction in _DIRECTIONS:

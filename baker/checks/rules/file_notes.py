@@ -1,4 +1,4 @@
-"""Warnings of the importer that no other check reports."""
+"""Rule that reports those warnings of the importer that no other rule reports."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
-# Code of the importer: severity, advice. Codes that are those of a check are reported by that check.
+# Severity and advice for each code of an importer warning. If a code is also the code of a rule, that rule
+# reports the warning.
 NOTES = {
     "broken-attribute": ("warning", "export the attribute again if the level needs it"),
     "broken-camera": ("info", "export the camera again if the level needs it"),
@@ -33,12 +34,12 @@ NOTES = {
 
 @check("file-note", group="file", severity="info", fix="see the message")
 def file_note(context: CheckContext) -> Iterator[RawFinding]:
-    """Parts of the file that a bake ignores or interprets.
+    """Parts of the file that a bake ignores, or interprets in one of several possible ways.
 
-    The importer's code is in `note`: unknown extensions, skins (posed by their joints), morph targets
-    (the base shape is baked), primitives of points and lines, several scenes in one file, missing texture
-    coordinates or material libraries, materials of an unknown model, and whatever cannot be read but is not
-    needed: normal maps, unused files, tangents, cameras.
+    The key `note` has the code of the importer's warning. Reported are unknown extensions, skins (posed by
+    their joints), morph targets (the base shape is baked), primitives of points and lines, several scenes in
+    one file, missing texture coordinates or material libraries, and materials of an unknown model. Unreadable
+    parts that a bake does not need are reported as well: normal maps, unused files, tangents, cameras.
     """
     for warning in context.scene.warnings:
         if warning.code in NOTES:

@@ -1,4 +1,4 @@
-"""Closed parts of meshes whose fronts point inwards although they contain nothing."""
+"""Rule about closed parts of meshes whose fronts point inwards although nothing is inside."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.core.light_kind import light_positions
 from baker.topology.winding_number import first_inside
 
-# Length of the sum of area vectors over the area, above which a mesh cannot be closed.
+# Largest value of |sum of area vectors| / total area for a closed mesh. It is 0 except for rounding.
 _ROUNDING = 1e-4
-# Share of a mesh's surface below which parts that are inside out are a warning only.
+# Share of a mesh's area. If the inside-out parts have less than this share, the finding is a warning.
 MOST_WRONG = 0.05
-# Number of points of another object that are tested.
+# Number of points of each other part or object that are tested for being inside.
 _WITNESSES = 8
 
 
@@ -34,9 +34,10 @@ _WITNESSES = 8
 def inside_out(context: CheckContext) -> Iterator[RawFinding]:
     """A closed part whose fronts all point inwards, with nothing inside.
 
-    From outside it is black and absorbs all light. The fronts of rooms point inwards by design, so parts with
-    a light, a camera or other geometry inside are not reported, nor are parts that emit, the inner surfaces
-    of shells, and double-sided surfaces. Less than 5 % of an object's surface is a warning only.
+    From outside, such a part is black and absorbs all light. The fronts of rooms point inwards by design.
+    Parts with a light, a camera or other geometry inside are therefore not reported. Parts that emit, the
+    inner surfaces of shells, and double-sided surfaces are not reported either. If these parts make up less
+    than 5 % of an object's surface, the finding is a warning instead of an error.
     """
     for m, facts in enumerate(context.meshes):
         wrong = inside_out_parts(context, m)
@@ -64,7 +65,7 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
     Returns
     -------
     list of (n,) int64
-        Rows of `MeshFacts.good`, an array for each part.
+        The faces of each part, as indices into `MeshFacts.good`.
     """
     facts = context.meshes[mesh]
     if not len(facts.good) or not _may_be(facts):
@@ -82,24 +83,27 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
 
 
 def _may_be(facts: MeshFacts) -> bool:
-    """Return False if no closed part can be inside out, by tests that need no edges."""
+    """Return False if certainly no closed part is inside out, using only fast tests that need no edges."""
     if facts.double_sided.all():
         return False
     if len(facts.good) < 4:
         return False
     total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
-    # A positive volume of the whole mesh does not rule out a part with a negative one. Rule out meshes whose
-    # area vectors add up to zero and of which no front faces the centroid.
+    # The sign of the volume of the whole mesh is no sufficient test, because parts of both signs may add up.
+    # A mesh is ruled out if its area vectors add up to zero and no front faces the centroid.
     outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 
 
 def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
-    """Return whether a closed part contains anything, or is the inner surface of another part."""
+    """Return whether a closed part contains something, or is the inner surface of a shell.
+
+    The part is number `piece` of the mesh, and `rows` are its faces as indices into `MeshFacts.good`.
+    """
     facts = context.meshes[mesh]
     corner = facts.corner[rows]
     others = [np.zeros((0, 3))]
-    # Test the other parts of the same mesh.
+    # Test points of the other parts of the mesh, and whether another closed part contains this one.
     for other in range(facts.n_pieces):
         if other != piece:
             own = facts.sheet[facts.piece == other]
@@ -110,7 +114,7 @@ def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece:
                     return True
     if first_inside(corner, np.concatenate(others)) is not None:
         return True
-    # Test lights, cameras and other objects, in the space of each instance.
+    # Test lights, cameras and points of other objects, in the object space of each instance.
     for instance in context.source.instances:
         if instance.mesh == mesh:
             inverse = np.linalg.pinv(instance.world_from_object)
@@ -122,7 +126,10 @@ def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece:
 
 
 def _things(context: CheckContext, node: int) -> NDArray[np.float64]:
-    """Return points of lights, cameras and all objects except that of `node`, (n, 3) float64, world."""
+    """Return positions of lights and cameras, and some vertices of all objects except that of `node`.
+
+    The result is (n, 3) float64, metres, world.
+    """
     scene = context.scene
     points = list(light_positions(scene))
     points += [np.array(camera.position) for camera in scene.cameras]

@@ -1,6 +1,7 @@
-"""Objects that are invisible: alpha 0 everywhere, or below the cutoff everywhere.
+"""Rule about objects that are invisible everywhere because of their alpha.
 
-alpha = factor x texture x vertex alpha; visible is alpha >= cutoff in mode MASK, alpha > 0 in mode BLEND.
+Alpha is factor x texture x vertex alpha. A point is visible if alpha >= cutoff (mode MASK) or if alpha > 0
+(mode BLEND).
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.core.scene import Material, Texture
 
-# Least visible alpha of mode BLEND: half a level of an 8-bit image.
+# Smallest alpha that counts as visible in mode BLEND: half a level of an 8-bit image.
 LEAST_ALPHA = 0.5 / 255.0
-# Barycentric coordinates of the points of a triangle at which textures are sampled first.
+# Barycentric coordinates of the points of each triangle at which the texture is sampled first.
 _SAMPLES = np.array(
     [[1 / 3, 1 / 3, 1 / 3], [2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]]
 )
@@ -33,12 +34,12 @@ _SAMPLES = np.array(
     in_bake=True,
 )
 def invisible(context: CheckContext) -> Iterator[RawFinding]:
-    """An object that its materials make invisible as a whole.
+    """An object that is invisible everywhere because of its alpha.
 
-    Alpha (factor, texture and vertex colours) is 0 everywhere (BLEND) or below the cutoff everywhere (MASK).
-    Such an object neither blocks nor reflects nor emits light. Causes are exporters that interpret `Tr` of
-    MTL files as opacity, and alpha channels that were never painted. An object with a visible part is not
-    reported.
+    Alpha is the product of factor, texture and vertex alpha. It is 0 everywhere (mode BLEND) or below the
+    cutoff everywhere (mode MASK). Such an object neither blocks nor reflects nor emits light. Typical causes
+    are exporters that interpret `Tr` of MTL files as opacity, and alpha channels that were never painted. An
+    object with a visible part is not reported.
     """
     fades = np.array([material.alpha_mode != "OPAQUE" for material in context.scene.materials], bool)
     if not fades.any():
@@ -69,11 +70,11 @@ def _sentence(materials: list[Material]) -> str:
 
 
 def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
-    """Return whether any face of material `number` on a mesh is visible."""
+    """Return whether any face of a mesh with this material, whose index is `number`, is visible."""
     least_alpha = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_ALPHA
     face = facts.good[facts.material[facts.good] == number]
     alpha = material.base_colour[3] * _vertex_alpha(facts)[facts.triangle[face]]
-    # Compare in float32 like the kernels, with a margin for the last digit.
+    # Compare in float32 as the kernels do, with a margin for rounding of the last digit.
     enough = np.float32(least_alpha) * np.float32(1.0 - 1e-6)
     strong = alpha.max(axis=1) >= enough
     if not strong.any():
@@ -96,7 +97,7 @@ def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
 
 
 def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
-    """Return the alpha of the vertex colours, (V,) float32, 1 without colours."""
+    """Return the vertex alpha of a mesh, (V,) float32; 1 in primitives without vertex colours."""
     parts = [
         np.ones(len(p.position), np.float32)
         if p.colour is None
@@ -107,7 +108,10 @@ def _vertex_alpha(facts: MeshFacts) -> NDArray[np.float32]:
 
 
 def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
-    """Return the uv of each vertex in the texture, (V, 2) float64; primitives without that uv set have 0."""
+    """Return the texture uv of each vertex, (V, 2) float64.
+
+    The untransformed uv are 0 in primitives that lack the texture's uv set.
+    """
     parts = [
         np.nan_to_num(
             p.texcoord.get(texture.texcoord, np.zeros((len(p.position), 2))), nan=0.0, posinf=0.0, neginf=0.0
@@ -118,17 +122,20 @@ def _image_uv(facts: MeshFacts, texture: Texture) -> NDArray[np.float64]:
 
 
 def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[str, str]) -> bool:
-    """Return whether any texel of a mask is in the uv bounding box of a triangle.
+    """Return whether the uv bounding box of any triangle contains a texel at which `mask` is true.
 
-    Boxes include the neighbouring texels that a bilinear lookup reads.
+    The bounding box is enlarged by the neighbouring texels that a bilinear lookup reads.
 
     Parameters
     ----------
     mask : (H, W) bool
+        Texels of the texture with visible alpha.
     uv : (T, 3, 2) float64
+        Texture uv of the triangles' corners.
     wrap : (str, str)
+        Wrap mode of u and v: "repeat", "mirror" or "clamp".
     """
-    # Summed-area table: the values at the four corners of a box give the number of texels in it.
+    # Build a summed-area table, with which four lookups count the true texels in a box.
     total = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), np.int64)
     total[1:, 1:] = mask.cumsum(axis=0).cumsum(axis=1)
     (left, right), (top, bottom) = (
@@ -139,9 +146,10 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
 
 
 def _range(value: NDArray[np.float64], size: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the first and the last texel (exclusive) that triangles sample along one axis, (T,) int64 each.
+    """Return the range [first, last) of texels that each triangle samples along one axis, (T,) int64 each.
 
-    If a triangle crosses from one repeat of the image to the next, its range is the whole image.
+    `value` (T, 3) is u or v of the triangles' corners, and `size` the number of texels along this axis. If a
+    triangle crosses from one repeat of the image to the next, its range is the whole image.
     """
     low, high = value.min(axis=1), value.max(axis=1)
     if wrap == "clamp":

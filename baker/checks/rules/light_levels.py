@@ -1,7 +1,4 @@
-"""Rules about direct light at a few hundred points: all black, or too bright for half floats.
-
-E = sum I cos / r^2 + sum L cos cos' A / r^2 + pi L_sky, each times visibility
-"""
+"""Rules about direct irradiance at sample points, as `baker.checks.direct_light` estimates it."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
 
-# Rays from each emissive object to find whether it lights anything.
+# Number of rays from each emissive object that test whether it faces any surface.
 FACING_RAYS = 64
 
 
@@ -26,7 +23,7 @@ FACING_RAYS = 64
     fix="look where the lights are and what is between them and the surfaces",
 )
 def all_black(context: CheckContext) -> Iterator[RawFinding]:
-    """A scene whose light reaches none of 512 points on its surfaces."""
+    """A scene with light that reaches none of 512 points on the surfaces."""
     levels = context.levels
     if levels is not None and not levels.irradiance.any():
         yield RawFinding(f"there is light, but none arrives at {len(levels.position)} points on the surfaces")
@@ -39,9 +36,10 @@ def all_black(context: CheckContext) -> Iterator[RawFinding]:
     fix="lower the lights, move them away from surfaces, or bake with `dtype='float'`",
 )
 def clips_half(context: CheckContext) -> Iterator[RawFinding]:
-    """Direct light over 65504 lx, the largest half float, at some of 512 points on the surfaces.
+    """Direct light that is too bright for half floats, whose largest value is 65504.
 
-    The map stores that number instead. With `dtype='float'` nothing is clipped.
+    Direct irradiance exceeds 65504 lx at some of 512 points on the surfaces. The map stores 65504 there. With
+    `dtype='float'` no value is clipped.
     """
     levels = context.levels
     if levels is None:
@@ -66,7 +64,7 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     fix="nothing to do: this is what direct light will look like",
 )
 def light_levels(context: CheckContext) -> Iterator[RawFinding]:
-    """Brightest and darkest direct irradiance at 512 points on the surfaces, without reflected light."""
+    """The range of direct irradiance at 512 points on the surfaces, without reflected light."""
     levels = context.levels
     if levels is not None and levels.irradiance.any():
         low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
@@ -83,10 +81,10 @@ def light_levels(context: CheckContext) -> Iterator[RawFinding]:
     fix="turn the emitting faces towards the scene, or make their material double-sided",
 )
 def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
-    """An emissive object that faces away from everything.
+    """An emissive object that faces away from all surfaces.
 
-    None of 64 rays from its front hits anything, so it lights nothing. One-sided surfaces emit on their front
-    only.
+    None of 64 rays from its front hits a surface, so it lights nothing. One-sided surfaces emit only from
+    their front.
     """
     if not context.emits or len(context.source.instances) < 2:
         return

@@ -15,13 +15,14 @@ from baker.core.colour import linear_from_srgb
 from baker.core.light_kind import kind_of, light_positions
 from baker.topology.winding_number import first_inside
 
-# Albedo above which reflections decay very slowly.
+# Albedo above which a material is reported.
 MOST_REFLECTED = 0.95
 # Albedo above which paths are traced to find trapped light.
 NEARLY_WHITE = 0.98
-# cd/m2; more is probably a wrong unit. For lights without area see `LightKind.plausible_max`.
+# Radiance of a material above which its unit is probably wrong, cd/m2. For lights without area see
+# `LightKind.plausible_max`.
 ABSURD_EMISSION = 1e8
-# Least y component of the normal of a floor.
+# y component of the unit normal above which a face counts as a floor.
 FLOOR = 0.5
 
 
@@ -46,10 +47,10 @@ def no_light(context: CheckContext) -> Iterator[RawFinding]:
     fix="give the light's node and its parents a scale other than zero; a bake leaves the light out",
 )
 def flat_light(context: CheckContext) -> Iterator[RawFinding]:
-    """Lights with a direction whose node leaves them none.
+    """Spot and directional lights whose direction is undefined, because a node has a scale of zero.
 
-    A scale of zero along the axis of the light, of the node or of a parent, maps the direction to zero or to
-    rounding errors. Point lights need no direction and are kept.
+    The scale along the axis of the light is zero in the light's node or in a parent. The transformed
+    direction is then zero, or only rounding errors. Point lights need no direction and are not affected.
     """
     for warning in context.scene.warnings:
         if warning.code == "flat-light":
@@ -63,9 +64,9 @@ def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     fix="raise or remove the range, if surfaces farther away are to be lit",
 )
 def light_range(context: CheckContext) -> Iterator[RawFinding]:
-    """Lights whose `range` ends inside the scene.
+    """Lights whose `range` is smaller than the distance to the farthest corner of the scene.
 
-    Light fades to zero at the range, as KHR_lights_punctual defines it. Engines use other falloffs, and some
+    Light fades to zero at the range, as KHR_lights_punctual specifies. Engines may use another falloff or
     ignore the range.
     """
     lights = [
@@ -95,10 +96,10 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
     fix="move the light out of the geometry, or make the shade emissive or see-through",
 )
 def light_inside(context: CheckContext) -> Iterator[RawFinding]:
-    """A light inside a closed solid, such as a bulb.
+    """A light inside a closed solid, such as a light inside the mesh of its bulb.
 
-    Every surface blocks light from both sides, so none of it leaves the solid. Rooms, whose surfaces look
-    inwards, and parts with a material that light may cross (MASK, BLEND) are not reported.
+    Every surface blocks light from both sides, so no light leaves the solid. Two cases are not reported:
+    rooms, whose fronts point inwards, and parts with a material that may let light pass (MASK, BLEND).
     """
     solids = None
     for light in context.scene.lights:
@@ -114,7 +115,10 @@ def light_inside(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield name and world corners (n, 3, 3) of opaque closed parts whose box holds a light."""
+    """Yield the instance name and the face corners (n, 3, 3), metres, world, of opaque closed parts.
+
+    Instances whose bounding box contains no light are left out.
+    """
     materials = context.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
     position = light_positions(context.scene)
@@ -141,12 +145,13 @@ def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
     fix="set the intensity in cd (lights with a position), lx (parallel light) or cd/m2 (emission)",
 )
 def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
-    """Lights that are negative, zero or absurdly strong.
+    """Lights with a negative or zero intensity, or an implausibly high one.
 
-    Negative light is an error, since a bake refuses it. Absurd is more than 1e6 cd for a point, 1e7 cd for a
-    spot, 2e5 lx for a sun (the real one gives 1.2e5) and 1e8 cd/m2 for a surface: often watts or lumens
-    interpreted as candela. Exporters that convert watts multiply by 683 lm/W: Blender does so with the
-    lighting mode Standard, and writes the numbers unchanged with Unitless.
+    A negative intensity is an error, because a bake refuses it. The limits are 1e6 cd for point lights, 1e7
+    cd for spot lights, 2e5 lx for directional lights (the sun gives 1.2e5 lx) and 1e8 cd/m2 for surfaces.
+    Higher numbers are often watts or lumens that were exported as candela. Some exporters convert watts with
+    683 lm/W. Blender does so in the lighting mode Standard, and exports the numbers unchanged in the mode
+    Unitless.
     """
     for light in context.scene.lights:
         location = Location(light.name, light.node)
@@ -176,12 +181,12 @@ def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
     fix="lower the base colour to 0.9 or less: fresh snow has 0.9, white paint 0.8",
 )
 def albedo(context: CheckContext) -> Iterator[RawFinding]:
-    """Materials that reflect over 95 % of the light.
+    """Materials that reflect more than 95 % of the light.
 
     No natural material does. Light decays very slowly between such surfaces, and closed rooms of them become
-    arbitrarily bright. A glTF material without a base colour is white: albedo 1. For an albedo above 0.98,
-    paths of 20 reflections measure the factor by which all bounces together multiply the light. It is
-    reported if it is above 20; a bake reports it, too.
+    arbitrarily bright. A glTF material without a base colour is white: its albedo is 1. If an albedo exceeds
+    0.98, paths of 20 reflections measure the factor by which all reflections together multiply the light.
+    This factor is reported if it exceeds 20. A bake reports it as well.
     """
     gain = None
     reflected = albedos(context)
@@ -201,7 +206,11 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def albedos(context: CheckContext) -> NDArray[np.float64]:
-    """Return the mean albedo of each used material, its largest component, (M,) float64; 0 if unused."""
+    """Return the albedo of each material, (M,) float64: its largest colour component, 0 if it is not used.
+
+    It is an upper bound, base colour factor times brightest vertex colour. If this exceeds `MOST_REFLECTED`
+    and the material has a base colour texture, it is replaced by factor times mean texture colour.
+    """
     out = np.zeros(len(context.scene.materials))
     for k in context.used_materials:
         material = context.scene.materials[k]
@@ -213,7 +222,10 @@ def albedos(context: CheckContext) -> NDArray[np.float64]:
 
 
 def _painted(context: CheckContext, material: int) -> float:
-    """Return the largest vertex colour component on a material's surfaces, 1 where there are no colours."""
+    """Return the largest vertex colour component on surfaces of a material.
+
+    It is 1 if a primitive with this material has no vertex colours.
+    """
     brightest = []
     for facts in context.meshes:
         for k, p in enumerate(facts.source.primitives):
@@ -240,7 +252,10 @@ def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
     fix="paint the emissive texture, or give the material an emissiveFactor",
 )
 def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
-    """Emissive materials whose texture is black wherever they are used, or whose factor is zero."""
+    """Emissive materials that emit nothing.
+
+    The emissive texture is black on all surfaces that use the material, or the emissive factor is zero.
+    """
     for k in context.used_materials:
         material = context.scene.materials[k]
         if material.emission_texture is None:

@@ -1,4 +1,4 @@
-"""Rules about the connections of faces: edges, vertices, holes, winding."""
+"""Rules about the connectivity of meshes: edges, vertices, holes and winding."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.topology.weld import connected, number_by_first
 
-# A piece is treated as closed if its holes have less than this share of its area.
+# A piece counts as closed except for holes if the holes' area is less than this share of the piece's area.
 MOST_OPEN = 0.05
 
 
 def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return the sorted unique face numbers of rows of `MeshFacts.sheet`, (n,) int64."""
+    """Return the faces of the mesh, (n,) int64, for indices into `MeshFacts.sheet`; sorted, no duplicates."""
     return facts.good[facts.sheet[np.unique(rows)]]
 
 
@@ -33,8 +33,9 @@ def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
 def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Edges at which more than two faces meet.
 
-    Inside and outside are not defined there. Causes are walls inside walls and faces left over from boolean
-    operations. Faces back to back at the same position are not counted, since they are two sheets.
+    Inside and outside are not defined at such an edge. Typical causes are walls inside other walls and faces
+    left over from boolean operations. Pairs of faces with the same three positions are ignored, because they
+    are the two sides of a sheet.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -55,7 +56,7 @@ def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
 def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
     """Vertices at which parts of a mesh touch only in a point.
 
-    Harmless for light, but subdivision, simplification and some unwrappers fail at them.
+    They do not affect light, but subdivision, simplification and some unwrappers fail at them.
     """
     for m, facts in enumerate(context.meshes):
         edges, welded = facts.edges, facts.welded[facts.sheet]
@@ -65,7 +66,8 @@ def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
         n = int(welded.max()) + 1
         pairs = np.unique(welded.reshape(-1) * (int(fan.max()) + 1) + fan)
         fans = np.bincount(pairs // (int(fan.max()) + 1), minlength=n)
-        # Fans are not defined at an edge of more than two faces; `non-manifold-edges` reports its vertices.
+        # Skip the ends of edges with more than two faces, where fans are undefined; `non-manifold-edges`
+        # reports these edges.
         crowded = edges.count > 2
         fans[edges.low[crowded]] = 1
         fans[edges.high[crowded]] = 1
@@ -79,14 +81,18 @@ def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _fans(facts: MeshFacts) -> NDArray[np.int64]:
-    """Return the fan of faces around its vertex of each corner of `sheet`, (3S,) int64."""
+    """Return the fan of each corner of the sheet faces, (3S,) int64.
+
+    The faces at a vertex that are connected by edges at this vertex have the same fan number there.
+    """
     edges = facts.edges
     one, two = edges.pairs(edges.count == 2)
     face, corner = edges.face, edges.corner
     same_way = edges.balance[edges.count == 2] != 0
     start = [face[k] * 3 + corner[k] for k in (one, two)]
     end = [face[k] * 3 + (corner[k] + 1) % 3 for k in (one, two)]
-    # Consistently wound neighbours run along their edge in opposite directions.
+    # Connect the corners at both ends of each edge. Half edges of consistently wound faces run in opposite
+    # directions, so the start of one is the end of the other.
     a = np.concatenate([start[0], end[0]])
     b = np.concatenate([np.where(same_way, start[1], end[1]), np.where(same_way, end[1], start[1])])
     n = 3 * len(facts.sheet)
@@ -102,8 +108,9 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
 def open_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Open edges in a mesh that is closed except for small holes.
 
-    Light leaks through cracks. A part counts if its holes have less than 5 % of its surface; a box without a
-    lid or a sheet of terrain is open on purpose.
+    Light leaks through the holes. A part of the mesh is reported if the area of its holes is less than 5 % of
+    the area of its faces. Larger holes are assumed to be intended, as in a box without a lid or a sheet of
+    terrain.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -132,9 +139,9 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
 def _loops(
     low: NDArray[np.int64], high: NDArray[np.int64], piece: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], int]:
-    """Return the hole at each open edge, (n,) int64, and the number of holes.
+    """Return the hole to which each of n open edges belongs, (n,) int64, and the number of holes.
 
-    `low` and `high` are the (n,) vertices of the edges, `piece` the (n,) pieces of their faces.
+    `low` and `high` (n,) are the vertices of the edges, and `piece` (n,) are the pieces of their faces.
     """
     n = int(max(low.max(), high.max())) + 1
     ends = np.concatenate([low, high]) + n * np.concatenate([piece, piece]).astype(np.int64)
@@ -148,7 +155,11 @@ def _loops(
 def _hole_area(
     facts: MeshFacts, border: NDArray[np.int64], hole: NDArray[np.int64], n_holes: int
 ) -> NDArray[np.float64]:
-    """Return the area of each hole, (n_holes,) float64: of the fan from its border to the centroid."""
+    """Return the area of each hole, (n_holes,) float64, in object space.
+
+    It is the length of the sum of the area vectors of the triangles between a border edge and the hole's
+    centroid. `border` (n,) are the open edges, and `hole` (n,) are their holes.
+    """
     edges = facts.edges
     face, corner = edges.face[edges.first[border]], edges.corner[edges.first[border]]
     around = facts.corner[facts.sheet[face]]
@@ -168,9 +179,9 @@ def _hole_area(
     fix="recalculate normals outside (`fix` does, in closed meshes)",
 )
 def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
-    """Neighbouring faces wound in opposite directions.
+    """Neighbouring faces that are wound in opposite directions.
 
-    One of them shows its back where the other shows its front. The back of a one-sided surface is black: it
+    One face shows its back where the other shows its front. The back of a one-sided surface is black: it
     neither receives nor reflects light, and points near it count as inside geometry.
     """
     for m, facts in enumerate(context.meshes):
@@ -185,5 +196,5 @@ def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _counted(found: RawFinding, count: int, whole: int) -> RawFinding:
-    """Return a finding with a count of edges or vertices instead of faces, `whole` of which are 100 %."""
+    """Return a finding whose count is a number of edges or vertices; `whole` is the number that is 100 %."""
     return replace(found, count=count, percent=100.0 * count / max(whole, 1))

@@ -15,7 +15,8 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.core.source_mesh import SourcePrimitive
 from baker.topology.unique_rows import unique_rows
 
-# Largest deviation of a normal's length from 1 that rounding to normalized bytes causes.
+# Largest deviation of a normal's length from 1 that is accepted; rounding to normalized bytes causes this
+# much.
 UNIT_SLACK = 0.02
 
 
@@ -24,7 +25,10 @@ def _parts(facts: MeshFacts) -> Iterator[tuple[int, SourcePrimitive]]:
 
 
 def _faces_at(facts: MeshFacts, part: int, vertex: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the faces of a primitive with a corner in the (V,) mask of its vertices, (n,) int64."""
+    """Return the faces of a primitive that have a corner at a marked vertex, (n,) int64.
+
+    `vertex` (V,) bool marks vertices of the primitive with index `part`.
+    """
     rows = np.flatnonzero((facts.primitive == part) & facts.within)
     local = facts.triangle[rows] - facts.vertex_start[part]
     touched: NDArray[np.bool_] = vertex[local].any(axis=1)
@@ -47,7 +51,7 @@ def _length(normal: NDArray[np.float32]) -> NDArray[np.float64]:
 def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
     """Meshes without vertex normals.
 
-    glTF requires flat normals for them, so the light has an edge between any two faces.
+    glTF requires flat normals for such meshes, so light changes abruptly at every edge.
     """
     for m, facts in enumerate(context.meshes):
         lacking = [k for k, p in _parts(facts) if p.normal is None and len(p.triangle)]
@@ -63,7 +67,7 @@ def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
     fix="recalculate normals where the mesh was made; a bake computes these from the faces",
 )
 def bad_normals(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertex normals that are NaN, infinite or of no length."""
+    """Vertex normals that are NaN, infinite or zero."""
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
             if p.normal is None:
@@ -81,7 +85,7 @@ def bad_normals(context: CheckContext) -> Iterator[RawFinding]:
     fix="normalise the normals on export; a bake does so by itself, engines may not",
 )
 def normal_length(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertex normals that are not one unit long, by more than 2 %.
+    """Vertex normals whose length differs from 1 by more than 2 %.
 
     A shader that does not normalise them shades the surface too bright or too dark.
     """
@@ -104,10 +108,10 @@ def normal_length(context: CheckContext) -> Iterator[RawFinding]:
     fix="recalculate normals, or flip the faces: winding and normals disagree about the front",
 )
 def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces whose vertex normals all point to their back.
+    """Faces whose vertex normals all point to the back of the face.
 
-    The winding defines the front, which receives light; the normals define the hemisphere from which light is
-    counted. The two have nothing in common, and the face is black.
+    The winding defines the front, which is the side that receives light. The vertex normals define the
+    hemisphere from which light is gathered. Here this hemisphere is at the back, so the face is black.
     """
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):
@@ -129,7 +133,7 @@ def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="merge equal vertices on export (`fix` welds them): smaller files, the same picture",
 )
 def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertices that equal another one of the same primitive in every attribute."""
+    """Vertices that equal another vertex of the same primitive in every attribute."""
     for m, facts in enumerate(context.meshes):
         double, total = 0, 0
         first: int | None = None

@@ -1,4 +1,4 @@
-"""Rules about intersecting and overlapping surfaces: in a mesh by rays along edges, of objects by planes."""
+"""Rules about intersecting faces of a mesh and about overlapping coplanar faces of different objects."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.checks.world_triangles import cast
 from baker.core.parallel import thread_count
 
-# Share of an edge at each end that rays skip, since neighbours touch it there.
+# Share of an edge's length at each end that rays skip, because neighbouring faces touch the edge there.
 _ENDS = 1e-4
-# Least depth of an intersection, as a share of the mesh's diagonal; less is a touch.
+# Depth below which faces touch instead of intersecting, as a share of the mesh's diagonal.
 _DEPTH = 1e-5
-# Largest number of hits along an edge; a ray continues after each neighbour that it hits.
+# Largest number of hits that are tested along an edge.
 _ROUNDS = 4
-# Distance of planes that count as the same, as a share of the scene's diagonal, and its limits in metres.
+# Largest distance between two planes that count as the same, as a share of the scene's diagonal. The distance
+# is clamped between the following two limits, metres.
 COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3
-# Steps per unit to which components of plane normals are rounded.
+# Components of plane normals are rounded to multiples of 1 / _TURN before they are compared.
 _TURN = 256.0
 
 
@@ -35,11 +36,11 @@ _TURN = 256.0
     fix="join the parts with a boolean union, if light bleeds where they meet",
 )
 def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces of one mesh that pierce each other.
+    """Faces of one mesh that intersect each other.
 
-    Common and mostly harmless where parts are joined by overlap: the texels inside the other part are black
-    and are filled from their neighbours. Found by rays along all edges; parts that only touch are not
-    counted.
+    Intersections are common where parts of a mesh overlap, and mostly harmless: texels inside the other part
+    are filled from their neighbours. Rays along all edges find the intersections. Parts that only touch are
+    not reported.
     """
     for m, facts in enumerate(context.meshes):
         pierced, n = _crossings(facts, thread_count(context.settings.threads))
@@ -52,7 +53,10 @@ def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
-    """Return pairs of intersecting faces, (n, 2) int64 rows of `good`, and the number of piercing edges."""
+    """Return pairs of intersecting faces and the number of edges that pierce a face.
+
+    The pairs are (n, 2) int64, indices into `MeshFacts.good`.
+    """
     from baker.trace.embree import RayScene
 
     edges = facts.edges
@@ -95,9 +99,10 @@ def _pierces(
     other: NDArray[np.int64],
     depth: float,
 ) -> NDArray[np.bool_]:
-    """Return which edges have their ends on both sides of face `other`, by more than `depth`, (n,) bool.
+    """Return (n,) bool: the edges whose ends are on different sides of a plane, both farther than `depth`.
 
-    `begin` and `end` are (n, 3) positions in object space, `other` the (n,) faces as rows of `good`.
+    The plane is that of the face `other`, (n,) indices into `MeshFacts.good`. `begin` and `end` are the ends
+    of the edges, (n, 3), object space.
     """
     normal = facts.area_vector[other] / np.maximum(facts.area[other], 1e-300)[:, None]
     at = facts.corner[other, 0]
@@ -113,11 +118,11 @@ def _pierces(
     fix="move one surface by a millimetre, or cut the hidden part away",
 )
 def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
-    """Overlapping surfaces of different objects in one plane with the same front (z-fighting).
+    """Coplanar surfaces of different objects that overlap and have the same front (z-fighting).
 
-    Engines show one or the other by chance, and each shadows the other at random. Planes count as the same
-    within a millionth of the scene's diagonal. A box on a floor is not reported, since the two surfaces look
-    at each other.
+    Engines show one or the other at random, and each shadows the other at random. Two surfaces count as
+    coplanar if the distance between their planes is less than a millionth of the scene's diagonal. A box on a
+    floor is not reported, because the fronts of the two surfaces point in opposite directions.
     """
     partner = _partners(context)
     world = context.world
@@ -151,7 +156,10 @@ def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _partners(context: CheckContext) -> NDArray[np.int64]:
-    """Return a triangle of another instance that overlaps each world triangle in its plane, or -1, (T,)."""
+    """For each world triangle, return a coplanar triangle of another instance that overlaps it.
+
+    The result is (T,) int64, indices of world triangles, -1 for none.
+    """
     world = context.world
     partner = np.full(len(world.triangle), -1, np.int64)
     if len(context.source.instances) < 2 or not len(world.triangle):
@@ -161,8 +169,8 @@ def _partners(context: CheckContext) -> NDArray[np.int64]:
     away = np.einsum("tx,tx->t", world.normal, corner)
     turn = np.round(world.normal * _TURN).astype(np.int64) + int(_TURN)
     direction = (turn[:, 0] * 1024 + turn[:, 1]) * 1024 + turn[:, 2]
-    # Use two grids half a step apart: planes closer than half a step share a cell in one of them. The shifts
-    # keep planes at round numbers away from cell borders.
+    # Quantise plane offsets to two grids that are shifted by half a cell. Planes closer than half a cell
+    # share a cell in at least one grid. The shifts keep planes at round numbers away from cell borders.
     for shift in (0.3137, 0.8137):
         step = np.floor(away / (2.0 * tolerance) + shift).astype(np.int64)
         _match(context, direction, step, tolerance, partner)
@@ -176,7 +184,11 @@ def _match(
     tolerance: float,
     partner: NDArray[np.int64],
 ) -> None:
-    """Find overlaps among triangles of equal (T,) `direction` and `step`; write them to `partner`."""
+    """Find overlaps among triangles of equal `direction` and equal `step`, and write them to `partner`.
+
+    `direction` (T,) encodes the rounded normal of each triangle's plane, and `step` (T,) the grid cell of its
+    offset. `partner` (T,) is as `_partners` returns it.
+    """
     from baker.checks.kernels.coplanar import coplanar_partners
 
     world = context.world
@@ -193,7 +205,7 @@ def _match(
     order, group = order[keep], group[keep]
     if not len(order):
         return
-    # Project along the largest component of the normal.
+    # Project each triangle along the axis of the normal's largest component.
     drop = np.abs(world.normal[order]).argmax(axis=1)
     axes = np.array([[1, 2], [0, 2], [0, 1]])[drop]
     corner = world.position[world.triangle[order]].astype(np.float64)

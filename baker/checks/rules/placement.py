@@ -1,4 +1,4 @@
-"""Rules about scales of nodes, positions far from the origin and the size of the scene."""
+"""Rules about the scales of nodes, positions far from the origin and the size of the scene."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from baker.checks.rule import check
 from baker.checks.rules.cost import estimate_cost
 from baker.core.precision import coarse_objects
 
-# Ratio of smallest to largest singular value of the transform below which a bake leaves an instance out.
+# Smallest / largest singular value of the transform. Below this ratio a bake leaves an instance out.
 FLATTEST = 1e-7
-# Diagonals in metres outside of which a wrong unit is the likely cause.
+# Smallest and largest plausible diagonal of a scene, metres. Outside of this range the unit is probably
+# wrong.
 SMALLEST, LARGEST = 0.05, 5000.0
 
 
@@ -36,10 +37,7 @@ def _stretches(
     fix="give the node a scale other than zero, or delete it; a bake leaves it out",
 )
 def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
-    """Nodes whose scale is zero along an axis.
-
-    The object has no area left.
-    """
+    """Nodes whose scale is zero along an axis, which flattens the object."""
     for location, stretch, _, at in _stretches(context):
         if not stretch[2] > FLATTEST * stretch[0]:
             yield RawFinding("the node's scale is zero along an axis", location, position=at)
@@ -52,9 +50,9 @@ def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
     fix="apply the scale to the mesh and recalculate its normals, if an engine shows it inside out",
 )
 def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
-    """Nodes that mirror their mesh.
+    """Nodes that mirror their mesh, by a negative scale.
 
-    glTF reverses their winding, and so does a bake; some engines and exporters do not.
+    glTF reverses the winding of such meshes, and so does a bake. Some engines and exporters do not.
     """
     for location, stretch, turn, at in _stretches(context):
         if turn < 0 and stretch[2] > FLATTEST * stretch[0]:
@@ -70,7 +68,8 @@ def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
 def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
     """Nodes whose scales along two axes differ by more than 1 %.
 
-    Lightmap UVs made for the mesh are stretched in the world. A bake measures density in the world.
+    A lightmap uv that was made for the mesh is stretched in world space. The unwrapper of a bake measures
+    texel density in world space.
     """
     for location, stretch, _, at in _stretches(context):
         if stretch[2] > FLATTEST * stretch[0] and stretch[0] > 1.01 * stretch[2]:
@@ -89,10 +88,11 @@ def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
     fix="keep vertices near their own origin and far-apart places in scenes of their own",
 )
 def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
-    """Objects whose positions have steps of more than a tenth of a texel in single precision.
+    """Objects whose float32 vertex positions are spaced by more than a tenth of a texel.
 
-    Files store vertices in single precision: 100 km from the mesh's own origin its steps are 8 mm. A node's
-    translation is exact, so a level far from the world's origin is no problem if its nodes take it there.
+    Files store vertices in single precision. 100 km from the origin of the mesh, neighbouring float32 numbers
+    differ by 8 mm. Translations of nodes have no such rounding, so a level may be far from the world's origin
+    if its nodes place it there.
     """
     scene, world = context.scene, context.world
     area = float(world.area.sum())
@@ -114,9 +114,10 @@ def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
     fix="export in metres (`scale` for formats without units)",
 )
 def scene_size(context: CheckContext) -> Iterator[RawFinding]:
-    """A scene whose size suggests a wrong unit: a diagonal below 5 cm or above 5 km.
+    """A scene with a diagonal below 5 cm or above 5 km, which suggests a wrong unit.
 
-    Intensities in candela fall off with metres, AO reaches metres, `density` counts texels per metre.
+    The unit of length must be metres: it determines the falloff of light, the maximum distance of ambient
+    occlusion, and the texels per metre of `density`.
     """
     diagonal = context.diagonal
     if diagonal > 0 and not SMALLEST <= diagonal <= LARGEST:

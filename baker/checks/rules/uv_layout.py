@@ -1,4 +1,4 @@
-"""Rules about a lightmap uv itself: present, finite, inside the page, not folded, not degenerate."""
+"""Rules about the layout of a lightmap uv: missing, not finite, outside the page, overlapping, degenerate."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _UNWRAP = "unwrap the object (`fix` does, a bake with `uv='auto'` does so, too)"
 
 
 def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
-    """Yield the meshes that have a lightmap uv; with `valid` only finite ones inside the page."""
+    """Yield index and lightmap uv of each mesh that has a lightmap uv.
+
+    With `valid`, meshes whose uv are not finite or outside the page are left out.
+    """
     for m in range(len(context.meshes)):
         uv = context.uv(m)
         if len(uv.rows) and (uv.valid or not valid):
@@ -27,7 +30,7 @@ def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int
 
 
 def worst_first(faces: NDArray[np.int64], badness: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return (n,) faces in descending order of their (n,) badness."""
+    """Return faces (n,) sorted by `badness` (n,), the largest first."""
     return faces[np.argsort(-badness, kind="stable")]
 
 
@@ -40,7 +43,7 @@ def worst_first(faces: NDArray[np.int64], badness: NDArray[np.float64]) -> NDArr
 def missing(context: CheckContext) -> Iterator[RawFinding]:
     """Objects without a lightmap uv (TEXCOORD_1).
 
-    A bake unwraps them. With `uv='keep'` that is an error.
+    A bake unwraps them. With `uv='keep'` a bake does not unwrap, so a missing lightmap uv is an error.
     """
     severity = "error" if context.settings.uv == "keep" else None
     for m, facts in enumerate(context.meshes):
@@ -54,7 +57,7 @@ def missing(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.not_finite", group="uv", severity="error", fix=_UNWRAP)
 def not_finite(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that is NaN or infinite somewhere."""
+    """A lightmap uv with NaN or infinite coordinates."""
     for m, uv in laid_out(context, valid=False):
         bad = uv.faces[~uv.finite]
         if len(bad):
@@ -63,9 +66,9 @@ def not_finite(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.out_of_range", group="uv", severity="error", fix=_UNWRAP)
 def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that leaves 0..1.
+    """A lightmap uv with coordinates outside 0..1.
 
-    A lightmap does not repeat, so faces outside have no texels.
+    A lightmap does not repeat, so surfaces outside 0..1 have no texels.
     """
     for m, uv in laid_out(context, valid=False):
         bad = uv.finite & uv.outside
@@ -77,10 +80,10 @@ def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.overlap", group="uv", severity="error", fix=_UNWRAP)
 def overlap(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces of one object that share texels.
+    """Faces of one object that overlap in the lightmap uv and therefore share texels.
 
-    Both show the light of one of them. The percentage is that of texels at the given resolution; the first
-    ten pairs of faces are listed. 0.1 % or less counts as rounding.
+    Both faces show the light of one of them. The percentage is the share of texels that overlap at the given
+    resolution. Up to 0.1 % is accepted as rounding. The first ten pairs of faces are listed.
     """
     from baker.checks.kernels.uv_pairs import COVERED, COVERED_AGAIN, LISTED, OVERLAPPING, cover_pairs
 
@@ -102,9 +105,9 @@ def overlap(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.degenerate", group="uv", severity="warning", fix=_UNWRAP)
 def degenerate(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces without area in the lightmap uv.
+    """Faces without area in the lightmap uv, which have no texels.
 
-    They have no texels. An error if they make up over 1 % of the object's surface, or if the whole layout is
+    The finding is an error if they make up more than 1 % of the object's surface, or if the whole layout is
     smaller than one texel.
     """
     resolution = context.settings.resolution
@@ -122,7 +125,7 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
 def flipped(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces mirrored in uv relative to the rest of their chart: the layout is folded there."""
+    """Faces whose orientation in uv is opposite to that of their chart, which is folded there."""
     for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))
@@ -139,13 +142,13 @@ def flipped(context: CheckContext) -> Iterator[RawFinding]:
     fix="mirror these charts if an engine uses tangents of the lightmap uv",
 )
 def mirrored(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that are mirrored in uv while others are not.
+    """Charts that are mirrored in uv while other charts of the object are not.
 
-    Irradiance is not affected; directional lightmaps in tangent space are.
+    Irradiance is not affected, but directional lightmaps in tangent space are.
     """
     for m, uv in laid_out(context):
         area = uv.per_chart(uv.signed_area)
-        # Whether v points up or down depends on the exporter: the larger area defines what is not mirrored.
+        # Exporters differ in the direction of v, so take the orientation of the larger area as not mirrored.
         usual = np.sign(area.sum()) or 1.0
         odd = np.flatnonzero(area * usual < 0)
         if len(odd):

@@ -1,4 +1,4 @@
-"""Rules about a lightmap uv at the resolution of the bake: chart size, padding, density, stretch, waste."""
+"""Rules about a lightmap uv at the resolution of the bake: chart size, padding, density, stretch, filling."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.checks.rules.uv_layout import laid_out
 from baker.checks.uv_facts import UvFacts
 
-# Area in texels below which a chart cannot hold a shadow.
+# Area of a chart below which it is reported, texels.
 SMALLEST_CHART = 4.0
-# Factor between a chart's texels per metre and the object's median that counts as an outlier: two mip levels.
+# A chart is reported if its texels per metre differ from the object's median by more than this factor. A
+# factor of 4 is two mip levels.
 DENSITY_FACTOR = 4.0
-# Ratio of singular values above which a face is stretched, and the share of surface that may be.
+# Ratio of singular values above which a face counts as stretched, and the share of an object's surface above
+# which stretched faces are reported.
 STRETCH, MOST_STRETCHED = 4.0, 0.05
-# Least share of its bounding rectangle that a layout should fill.
+# Share of its bounding rectangle below which the area of a layout is reported.
 LEAST_FILLED = 0.4
-# Share of the surface without area in TEXCOORD_0 above which the set is a palette lookup.
+# Share of an object's surface without area in TEXCOORD_0 above which this uv set is a palette lookup.
 PALETTE_SHARE = 0.9
 
 
@@ -34,9 +36,9 @@ PALETTE_SHARE = 0.9
     fix="give these charts more room, join them with neighbours, or raise `resolution`",
 )
 def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that cover less than four texels.
+    """Charts with an area of less than four texels.
 
-    Their light is a single value, which bilinear lookup mixes with the padding.
+    The light of such a chart is nearly a single value, which bilinear lookup mixes with the padding.
     """
     resolution = context.settings.resolution
     for m, uv in laid_out(context):
@@ -56,10 +58,10 @@ def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
     fix="leave at least two texels between charts at the resolution used, or unwrap again",
 )
 def padding(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts so close that bilinear lookup mixes them.
+    """Charts so close to each other that bilinear lookup mixes them.
 
-    A lookup at a chart's border also reads the next texel. If that belongs to another chart, its light
-    appears as a bright or dark line.
+    A lookup at the border of a chart also reads the next texel. If this texel is part of another chart, its
+    light appears as a bright or dark line.
     """
     for m, uv in laid_out(context):
         close, covered = _close(uv, context.settings.resolution)
@@ -80,9 +82,10 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
     fix="use 2^level texels and more between charts, or sample the lightmap without mipmaps",
 )
 def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
-    """Charts that mix at the mip level `mip` (default 2).
+    """Charts that bilinear lookup mixes at the mip level `mip` (default 2).
 
-    A texel of level n covers 2^n x 2^n texels of the page. This affects only lightmaps sampled with mipmaps.
+    A texel of level n covers 2^n x 2^n texels of the page. Only lightmaps that are sampled with mipmaps are
+    affected.
     """
     coarse = context.settings.resolution >> context.mip
     for m, uv in laid_out(context):
@@ -100,7 +103,10 @@ def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
-    """Return the number of texels next to another chart's, and of all covered texels."""
+    """Return the number of texels next to a texel of another chart, and the number of covered texels.
+
+    `resolution` is the width of the page, texels.
+    """
     from baker.uv.kernels.uv_overlap import count_close, mark_charts
 
     owner = np.zeros((resolution, resolution), np.int32)
@@ -117,7 +123,7 @@ def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
 def density(context: CheckContext) -> Iterator[RawFinding]:
     """Charts whose texels per metre differ from the object's median by a factor of more than four.
 
-    At the border to other charts a shadow changes from sharp to blurred.
+    At the border between such a chart and another one, a shadow changes from sharp to blurred.
     """
     for m, uv in laid_out(context):
         flat, real = uv.per_chart(np.abs(uv.signed_area)), uv.per_chart(uv.area)
@@ -152,10 +158,10 @@ def _weighted_median(value: NDArray[np.float64], weight: NDArray[np.float64]) ->
     fix="cut these charts more often, or unwrap again",
 )
 def stretch(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that stretches more than 5 % of the surface over four times more along one axis.
+    """A lightmap uv in which more than 5 % of the surface has a stretch above four.
 
-    Texels are strips there, and shadows look sharp across and blurred along them. Stretch is the ratio of the
-    singular values of the map from surface to uv.
+    Stretch is the ratio of the singular values of the map from surface to uv. Texels on stretched faces are
+    strips: shadows look blurred along the strips and sharp across them.
     """
     for m, uv in laid_out(context):
         ratio = _anisotropy(uv)
@@ -168,11 +174,14 @@ def stretch(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
-    """Return the ratio of singular values of each face's map to uv, (F,) float64; 1 without uv area."""
+    """Return the stretch of each face, (F,) float64: the ratio of singular values of the map to uv.
+
+    It is 1 for faces without uv area.
+    """
     corner = uv.facts.corner[uv.rows]
     e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     length = np.maximum(np.sqrt(np.einsum("fx,fx->f", e1, e1)), 1e-300)
-    # Coordinates of the face in its own plane, with e1 along x.
+    # Compute the corners' coordinates in the plane of the face: (0, 0), (length, 0), (x2, y2).
     x2 = np.einsum("fx,fx->f", e1, e2) / length
     y2 = 2.0 * uv.area / length
     d1, d2 = uv.uv[:, 1] - uv.uv[:, 0], uv.uv[:, 2] - uv.uv[:, 0]
@@ -193,9 +202,9 @@ def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
     fix="pack the charts closer, or unwrap again",
 )
 def utilisation(context: CheckContext) -> Iterator[RawFinding]:
-    """A lightmap uv that fills less than 40 % of its own rectangle.
+    """A lightmap uv that fills less than 40 % of its bounding rectangle.
 
-    The rest of the rectangle is memory without data.
+    The rest of the rectangle is unused memory.
     """
     for m, uv in laid_out(context):
         low, high = uv.uv.min(axis=(0, 1)), uv.uv.max(axis=(0, 1))
@@ -215,21 +224,21 @@ def utilisation(context: CheckContext) -> Iterator[RawFinding]:
     fix="nothing to do for a bake; never use TEXCOORD_0 as lightmap uv here",
 )
 def palette(context: CheckContext) -> Iterator[RawFinding]:
-    """Objects whose TEXCOORD_0 only samples colours of a palette.
+    """Objects whose TEXCOORD_0 only looks up the colours of a palette.
 
-    Nearly all faces are single points in uv, so the set cannot serve as a lightmap uv. Some engines use it as
-    one where TEXCOORD_1 is missing.
+    Nearly all faces are single points in this uv set, so it cannot be used as a lightmap uv. Some engines use
+    TEXCOORD_0 for the lightmap if TEXCOORD_1 is missing.
     """
     for m, facts in enumerate(context.meshes):
         uv = UvFacts(facts, 0)
         if not len(uv.rows) or not uv.finite.all():
             continue
-        # A point is an area of less than one texel of a texture of 1024 x 1024.
+        # A face counts as a point if its uv area is less than one texel of a texture of 1024 x 1024.
         point = np.abs(uv.signed_area) * 1024.0**2 < 1.0
         share = float(uv.area[point].sum()) / max(float(uv.area.sum()), 1e-300)
         if share <= PALETTE_SHARE:
             continue
-        # Round to 1/256; combine u and v to one number, which sorts ten times faster than rows.
+        # Round uv to multiples of 1/256. Combine u and v to one number, because sorting numbers is faster.
         step = np.clip(np.round(uv.uv[point].reshape(-1, 2) * 256.0), -(2.0**20), 2.0**20).astype(np.int64)
         colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
         if len(uv.rows) >= 2 * colours:

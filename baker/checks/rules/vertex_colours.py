@@ -1,4 +1,4 @@
-"""Vertex colours that make a material black."""
+"""Rule about vertex colours that make a material black."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 
-# Largest vertex colour that counts as black, and least base colour for which that is probably a mistake.
+# Vertex colour component below which a vertex counts as black, and base colour component below which a
+# material counts as black itself.
 BLACK, COLOURED = 0.01, 0.05
 
 
@@ -23,8 +24,8 @@ BLACK, COLOURED = 0.01, 0.05
 def black_colours(context: CheckContext) -> Iterator[RawFinding]:
     """A mesh whose vertex colours are all black although its material is not.
 
-    glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Such layers hold data
-    for an engine's shader (wind, wetness) or were never painted.
+    glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Usually the vertex colours
+    were never painted, or contain data for the shader of an engine, such as wind or wetness.
     """
     for m, facts in enumerate(context.meshes):
         for k, primitive in enumerate(facts.source.primitives):
