@@ -154,16 +154,16 @@ class BatchKeywords(TypedDict, total=False):
 class CheckKeywords(TypedDict, total=False):
     """Keywords of `CheckSettings`."""
 
-    # Least severity that fails the check; default: the scene's extras, else error.
+    # Lowest severity that fails the check; default: the scene's extras, else error.
     fail_on: Literal["warning", "error"] | None
 
-    # Findings that do not count, with `*` for any letters; repeatable.
+    # Findings to ignore; `*` matches any letters. Repeatable.
     ignore: str | Sequence[str]
 
-    # Mip level at which charts must not mix.
+    # Mip level at which charts must not bleed together.
     mip: int
 
-    # Estimate time with the speed of this earlier bake (else of one beside the scene).
+    # Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.
     rates: str | Path | None
 
     # Estimate time and memory of a bake; measures ray rates for about a second.
@@ -173,7 +173,7 @@ class CheckKeywords(TypedDict, total=False):
 class DiffKeywords(TypedDict, total=False):
     """Keywords of `DiffSettings`."""
 
-    # Texels of A to compare.
+    # Number of texels of A to compare.
     texels: int
 
     # Also compute the FLIP error of the pages.

@@ -114,7 +114,7 @@ def diff(
         Settings by name, in place of those in `settings`:
 
         texels : int, from 1, default 20000
-            Texels of A to compare.
+            Number of texels of A to compare.
         flip : bool, default True
             Also compute the FLIP error of the pages.
         fail_if : str | None, default None

@@ -81,13 +81,13 @@ def check(
         Settings by name, in place of those in `settings`:
 
         fail_on : Literal["warning", "error"] | None, default None
-            Least severity that fails the check; default: the scene's extras, else error.
+            Lowest severity that fails the check; default: the scene's extras, else error.
         ignore : str | Sequence[str], default ()
-            Findings that do not count, with `*` for any letters; repeatable.
+            Findings to ignore; `*` matches any letters. Repeatable.
         mip : int, 0 to 14, default 2
-            Mip level at which charts must not mix.
+            Mip level at which charts must not bleed together.
         rates : str | Path | None, default None
-            Estimate time with the speed of this earlier bake (else of one beside the scene).
+            Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.
         cost : bool, default False
             Estimate time and memory of a bake; measures ray rates for about a second.
 

@@ -1,1 +1,1 @@
-"""Compares two finished bakes at the same points of the surface, whatever their lightmap uv."""
+"""Compares two finished bakes at the same surface points, even if their lightmap uv differ."""

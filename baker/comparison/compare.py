@@ -1,7 +1,8 @@
-"""Compares the maps of two finished bakes at the same points of the surface.
+"""Compares the maps of two finished bakes, a and b, at the same surface points.
 
-Points are chosen in texels of bake a. The maps of both bakes are looked up there bilinearly, each at its own
-lightmap uv. Bake b is the reference: a bias of +10 % means that a is brighter.
+One surface point is chosen in each of a number of texels of bake a, and matched with a point on the surface
+of bake b. Each bake's map is looked up bilinearly at its own lightmap uv of the point. Bake b is the
+reference: a bias of +10 % means that bake a is brighter.
 """
 
 from __future__ import annotations
@@ -33,19 +34,23 @@ from baker.metrics.sample_texels import choose_texels
 from baker.metrics.texel_area import instance_map, one_surface_point
 from baker.metrics.worst_texels import worst_texels
 
-# A second bake has no noise that is known, so no limit can be set on it.
+# Metrics on which `fail_if` may set limits. The noise of bake b is not known, so metrics that need the noise
+# of the reference are left out, and the energy ratio as well.
 LIMITED = (*(name for name in METRICS if not name.startswith(("noise", "z_", "energy"))), "flip")
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelDifference(Metrics):
-    """A channel at the points of both bakes.
+    """Values of one channel of both bakes at n points, and their error metrics.
 
     Attributes
     ----------
-    value, reference : (n, C) float64, a's and b's
-    standard_error : (n, C) float64, 0: a bake is compared as it is
-    metrics : dict, see `metrics.error_metrics`, and "flip"
+    value, reference : (n, C) float64
+        Values of bake a and of bake b.
+    standard_error : (n, C) float64
+        Standard error of the reference, always 0 here.
+    metrics : dict
+        The metrics of `baker.metrics.error_metrics`, and "flip", the mean FLIP error.
     """
 
     value: NDArray[np.float64]
@@ -61,14 +66,25 @@ class DiffReport(Result):
     Attributes
     ----------
     a, b : StoredBake
-    channels : dict of name to ChannelDifference
-    objects, worst, differences : list of dict, as in the JSON
-    only_in_a, only_in_b : list of {object, node}
+        The two bakes. b is the reference.
+    channels : dict of str to ChannelDifference
+        The channels that both bakes have, by name.
+    objects : list of dict
+        Metrics of each object of a, as in the JSON.
+    worst : list of dict
+        The texels with the largest errors, as in the JSON.
+    differences : list of dict
+        Settings and other manifest entries that differ, as in the JSON.
+    only_in_a, only_in_b : list of dict
+        Name and node of the objects that have no counterpart in the other bake.
     unmatched : int
-        Points of a's objects that are not on b's surface, beside those of `only_in_a`.
+        Number of points of bake a without a matching point in bake b, except points on the objects
+        `only_in_a`.
     verdicts : list of Verdict
+        Results of the limits.
     warnings : list of SceneWarning
     seconds : float
+        Duration of the comparison, seconds.
     """
 
     a: StoredBake
@@ -90,14 +106,14 @@ class DiffReport(Result):
         return not any(verdict.failed for verdict in self.verdicts)
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that the short text shows."""
         rows: dict[str, Any] = {"passed": self.passed}
         for name, channel in self.channels.items():
             rows[f"{name} bias"], rows[f"{name} p95"] = channel.metrics["bias"], channel.metrics["p95"]
         return rows | {"settings that differ": len(self.differences)}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain values, the object of `baker diff` as JSON."""
+        """Return the comparison as the JSON object that `baker diff --json` prints."""
         return {
             "passed": self.passed,
             "channels": {name: check.metrics for name, check in self.channels.items()},
@@ -116,28 +132,28 @@ class DiffReport(Result):
 def compare(
     a: Path | str, b: Path | str, settings: DiffSettings | None = None, progress: Progress = silent
 ) -> DiffReport:
-    """Compare the bake in folder a with that in folder b.
+    """Compare the bake in folder a with the bake in folder b.
 
     Parameters
     ----------
     a, b : Path or str
         Output folders of bakes. b is the reference.
     settings : DiffSettings, optional
-        How much is compared, and limits.
+        Number of texels to compare, limits, and further settings.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with the stage, the fraction done and a text; a truthy return value cancels.
 
     Returns
     -------
     DiffReport
-        Error measures of each channel that both bakes have, and the points with the largest differences.
+        Metrics of each channel that both bakes have, and the texels with the largest errors.
 
     Raises
     ------
     InputError
-        If one is no bake, or they have no channel or no surface in common.
+        If a folder has no bake, or the bakes have no channel or no surface in common.
     SettingsError
-        For a limit that cannot be read.
+        If `fail_if` is malformed, or limits FLIP although `flip` is not set.
     ResourceError
         If memory runs out.
     Cancelled
@@ -156,7 +172,7 @@ def compare(
     for bake in (first, second):
         _check_pages(bake, names)
     pairs = pair_objects(first.scene, second.scene)
-    # Both relative to the same origin.
+    # Make positions of both bakes relative to the same origin.
     origin = first.scene.origin
     surfaces = [world_geometry(bake.scene, bake.atlas, origin) for bake in (first, second)]
     sides = make_sides(surfaces[0], surfaces[1], first.scene, second.scene, pairs)
@@ -200,7 +216,7 @@ def compare(
 
 
 def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
-    """Return (P, H, W): the object of each texel whose surface is compared, -1 for others."""
+    """Return (P, H, W) int32: the instance of each texel of a that may be compared, -1 for other texels."""
     owner = instance_map(sides.a, bake.atlas.n_pages, bake.atlas.resolution)
     covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     return np.where(covered & ~sides.missing_a[owner], owner, -1).astype(np.int32)
@@ -209,7 +225,12 @@ def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
 def _choose(
     bake: StoredBake, sides: Sides, owner: NDArray[np.int32], name: str, settings: DiffSettings
 ) -> tuple[NDArray[np.int64], SurfacePoints, SurfacePoints, NDArray[np.int64]]:
-    """Return texels, their points in both bakes, and the number of texels of each object without one in b."""
+    """Choose texels of bake a that have a matching surface point in bake b.
+
+    Returns the texels (n,) as (page * H + row) * W + column, their points on a and on b, and for each
+    instance of a the number of chosen texels without a matching point. This number is 0 for objects that b
+    lacks.
+    """
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)
     pixel = choose_texels(owner, owner >= 0, brightness, settings.texels, settings.seed)
@@ -234,7 +255,11 @@ def _objects(
     owner: NDArray[np.int32],
     lost: NDArray[np.int64],
 ) -> list[dict[str, Any]]:
-    """Return the metrics of each object that has points."""
+    """Return the metrics of each object of bake a that has compared or unmatched points.
+
+    `owner` (n,) is the instance of each point, and `lost` (I,) the number of unmatched points of each
+    instance.
+    """
     found = []
     floor = {name: dark_floor(check.reference) for name, check in channels.items()}
     for number, instance in enumerate(bake.scene.instances):
@@ -262,7 +287,7 @@ def _add_texels_of_b(
     pixel: NDArray[np.int64],
     other: SurfacePoints,
 ) -> None:
-    """Add to each of the worst texels the texel of b at the same point of the surface."""
+    """Add to each entry of `worst` the texel of bake b at the same surface point, as `in_b`."""
     size_a, size_b = a.atlas.resolution, b.atlas.resolution
     uv = other.at(sides.b, "uv")
     for entry in worst:

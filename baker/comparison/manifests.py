@@ -12,12 +12,16 @@ from baker.io.bake.read_bake import StoredBake
 
 
 def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> list[dict[str, Any]]:
-    """Return [{what, a, b}]: settings, input, versions, lights, pages, channels and matrices of objects.
+    """Return the differing entries of two manifests, as dictionaries with the keys `what`, `a` and `b`.
+
+    Compared are the settings, input, versions, lights, pages, channels and matrices of paired objects.
 
     Parameters
     ----------
+    a, b : StoredBake
+        The two bakes.
     pairs : ObjectPairs
-        Of the instances of both scenes.
+        The pairs of instances of both scenes.
     """
     first, second = dict(_facts(a)), dict(_facts(b))
     found = [
@@ -38,7 +42,7 @@ def _facts(bake: StoredBake) -> Iterator[tuple[str, Any]]:
     for section in ("input", "settings", "versions"):
         entries = manifest.get(section)
         for key, value in entries.items() if isinstance(entries, dict) else ():
-            # The path is relative to the output folder and differs with it.
+            # Leave out the path of the scene, because it is relative to the output folder of each bake.
             if (section, key) != ("input", "path"):
                 yield f"{section}.{key}", value
     yield "pages.count", bake.atlas.n_pages

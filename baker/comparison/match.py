@@ -1,8 +1,9 @@
-"""Finds points of one bake's surface on another's.
+"""Finds the points on the surface of bake b that match given points on the surface of bake a.
 
-If a pair of objects has the same mesh, a point has the same triangle and the same weights in both: a bake
-differs from itself by exactly 0, and an object that was moved is compared with itself. Otherwise the nearest
-point is searched along the normal, within a small distance in the world, on a face with a similar normal.
+If the two objects of a pair have the same mesh, the matching point has the same triangle and the same
+barycentric weights. A bake then differs from itself by exactly 0, and an object that was moved is compared
+with itself. If the meshes differ, the nearest point of b is searched along the normal. It must be within a
+small distance in world space, on a face with a similar normal.
 """
 
 from __future__ import annotations
@@ -19,55 +20,58 @@ from baker.kernels.cast import first_hits
 from baker.trace.embree import RayScene
 from baker.trace.packets import new_packet_buffers
 
-# Largest distance of the matched surface, as a share of the diagonal of the object's bounding box.
+# Largest distance between matched points, as a share of the diagonal of the object's bounding box.
 _MAX_DISTANCE = 1.0e-3
-# Triangles are moved along their normal by this share of the largest distance: of two faces back to back, a
-# ray hits the front-facing one first.
+# Triangles of b are moved along their normals by this share of the largest distance. If two faces are back to
+# back, a ray then hits the front-facing one first.
 _LIFT = 0.01
-# Least cosine between the normals of matched faces.
+# Smallest cosine of the angle between the normals of matched faces.
 _ALIKE = 0.5
-# Hits that are tested along one ray.
+# Largest number of hits that are tested along a ray.
 _LAYERS = 4
-# An object without a partner counts as present if this share of its area lies on the other side's objects
-# without a partner.
+# An object without a partner counts as present in the other bake if at least this share of its area matches
+# objects without a partner there.
 _PRESENT = 0.5
 
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Points on triangles.
+    """n points on the triangles of a geometry.
 
     Attributes
     ----------
-    triangle : (n,) int64, -1 for none
-    weight : (n, 3) float64, of the triangle's corners
+    triangle : (n,) int64
+        Triangle of each point, -1 if the point does not exist.
+    weight : (n, 3) float64
+        Barycentric weights of the triangle's corners.
     """
 
     triangle: NDArray[np.int64]
     weight: NDArray[np.float64]
 
     def __getitem__(self, which: NDArray[np.bool_]) -> SurfacePoints:
-        """Return some of them."""
+        """Return the points that the mask `which` (n,) selects."""
         return SurfacePoints(self.triangle[which], self.weight[which])
 
     def at(self, geometry: Geometry, name: str) -> NDArray[np.float64]:
-        """Return (n, k): "position" or "uv" of the points."""
+        """Return a vertex attribute at the points, (n, k) float64; `name` is "position" or "uv"."""
         corner = getattr(geometry, name)[geometry.triangle[self.triangle]].astype(np.float64)
         return np.asarray((corner * self.weight[..., None]).sum(axis=1))
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Surfaces of both bakes, and the pairs of their objects.
+    """The surfaces of bakes a and b, and the pairs of their objects.
 
     Attributes
     ----------
     a, b : Geometry
     mirrored_a, mirrored_b : (I,) bool
-        Instances whose triangles' corners are in the reverse order of the mesh's.
+        Instances under a mirroring transform. The corners of their triangles are in the reverse of the order
+        in the mesh.
     pairs : ObjectPairs
     missing_a, missing_b : (I,) bool
-        Objects without a counterpart on the other side.
+        Instances without a counterpart in the other bake.
     """
 
     a: Geometry
@@ -80,7 +84,7 @@ class Sides:
 
 
 def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: ObjectPairs) -> Sides:
-    """Return both surfaces, with the objects that exist on one side only."""
+    """Find the objects that exist in one bake only, and return them with both surfaces."""
     return Sides(
         a,
         b,
@@ -93,16 +97,17 @@ def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: 
 
 
 def match(sides: Sides, points: SurfacePoints) -> SurfacePoints:
-    """Return the points of b that match points of a; triangle -1 where b has no such surface.
+    """Return the points on the surface of b that match `points`, which lie on the surface of a.
 
-    sides : both surfaces; points : on a
+    The triangle of a result is -1 if b has no matching surface.
     """
     a, pairs = sides.a, sides.pairs
     triangle, weight = np.full(len(points.triangle), -1, np.int64), np.zeros((len(points.triangle), 3))
     owner = a.instance[points.triangle]
     partner = pairs.partner[owner]
     equal = pairs.same[owner]
-    # The triangles of an instance are one after the other, in the order of its mesh.
+    # Match points on equal meshes by triangle number. The triangles of an instance are consecutive, in the
+    # order of its mesh.
     first_a, first_b = (_first(geometry) for geometry in (a, sides.b))
     mine, theirs = owner[equal], partner[equal]
     triangle[equal] = points.triangle[equal] - first_a[mine] + first_b[theirs]
@@ -148,7 +153,11 @@ def _missing(
     other: Geometry,
     other_rest: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Return (I,): instances of `rest` most of whose triangle centroids match nothing of `other_rest`."""
+    """Return (I,) bool: the instances of `rest` that have no counterpart among `other_rest`.
+
+    An instance has a counterpart if enough of its area matches. The area of a triangle matches if its
+    centroid does.
+    """
     missing = np.zeros(n_instances, bool)
     missing[rest] = True
     mine = np.flatnonzero(np.isin(geometry.instance, rest))
@@ -175,14 +184,24 @@ def _near(
     normal: NDArray[np.float64],
     max_distance: float,
 ) -> SurfacePoints:
-    """Return the nearest points of wanted triangles along normals (n, 3), on faces with a similar normal."""
+    """Search triangles along the normals of n points, and return the nearest points with similar normals.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    wanted : (m,) int64
+        The triangles that are searched.
+    position, normal : (n, 3) float64
+        The points and the unit normals of their faces.
+    max_distance : float, metres
+    """
     n = len(position)
     triangle, offset = np.full(n, -1, np.int64), np.full(n, np.inf)
     if not len(wanted) or max_distance <= 0:
         return SurfacePoints(triangle, np.zeros((n, 3)))
     face = geometry.face_normal[wanted].astype(np.float64)
     corner = geometry.position[geometry.triangle[wanted]].astype(np.float64)
-    # Relative to the centre: single precision is finest around 0.
+    # Make positions relative to the centre of the triangles, because single precision is finest around 0.
     centre = corner.reshape(-1, 3).mean(axis=0)
     lifted = corner - centre + _LIFT * max_distance * face[:, None]
     index = np.arange(3 * len(wanted), dtype=np.int32).reshape(-1, 3)
@@ -217,7 +236,7 @@ def _near(
 
 
 def _weights(corner: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return barycentric weights (n, 3) of positions (n, 3) in triangles (n, 3, 3), clamped to them."""
+    """Return barycentric weights (n, 3) of positions (n, 3), clamped to the triangles `corner` (n, 3, 3)."""
     u, v, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], position - corner[:, 0]
     uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
     pu, pv = (p * u).sum(axis=1), (p * v).sum(axis=1)

@@ -1,9 +1,15 @@
 """Pairs the objects of two bakes.
 
-Three rules are applied in order to the objects that are not paired yet. Each pairs the objects of which a key
-occurs once in both scenes: node and name; name; node, if the meshes are equal (renamed objects). The
-remaining objects may have been joined or split, so points on them are matched with all remaining objects of
-the other scene.
+Three rules are applied one after the other, each to the objects that are not paired yet. A rule pairs two
+objects if they have the same key, and no other unpaired object of either scene has this key.
+
+    rule | key            | further condition
+    1    | node and name  |
+    2    | name           |
+    3    | node           | the meshes are equal (the object was renamed)
+
+Objects that remain unpaired may have been joined or split. Points on them are therefore matched with all
+unpaired objects of the other scene.
 """
 
 from __future__ import annotations
@@ -17,7 +23,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Mesh, Scene
 
-# Largest difference of coordinates of equal corners, relative to the mesh's largest coordinate.
+# Largest difference between coordinates that count as equal, relative to the mesh's largest coordinate.
 _NEAR = 1.0e-6
 
 
@@ -28,11 +34,11 @@ class ObjectPairs:
     Attributes
     ----------
     partner : (A,) int64
-        Instance of b for each of a, -1 for none.
+        For each of the A instances of a, its partner among the instances of b, or -1.
     same : (A,) bool
-        The pair's meshes are equal triangle by triangle.
+        Whether the instance has a partner and their meshes are equal triangle by triangle.
     rest_a, rest_b : (k,) int64
-        Instances without a partner.
+        Instances of a and of b without a partner.
     """
 
     partner: NDArray[np.int64]
@@ -67,7 +73,11 @@ def _pair(
     key: Callable[[Instance], Hashable],
     accept: Callable[[int, int], bool] = lambda i, j: True,
 ) -> None:
-    """Pair instances whose key occurs once among those without a partner, on both sides."""
+    """Pair instances with equal keys, if the key occurs once among the unpaired instances of each scene.
+
+    `partner` (A,) is changed in place. `accept(i, j)` returns whether instances i of a and j of b may be
+    paired.
+    """
     taken = set(partner.tolist())
     left = {i: key(instance) for i, instance in enumerate(a.instances) if partner[i] < 0}
     right = {j: key(instance) for j, instance in enumerate(b.instances) if j not in taken}

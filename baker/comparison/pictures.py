@@ -15,7 +15,8 @@ from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import look_up_uv, one_surface_point
 
-# Larger pages are subsampled to at most this many rows and columns: FLIP takes two seconds for 512 x 512.
+# Largest number of rows and columns for which FLIP is computed; larger pages are subsampled. FLIP takes two
+# seconds for 512 x 512 texels.
 _LARGEST = 512
 
 
@@ -25,10 +26,10 @@ class FlipMeans:
 
     Attributes
     ----------
-    channel : dict of channel to float or None
-        Over all compared texels; None without any.
-    object : dict of (channel, instance of a) to float
-        Over the compared texels of an instance.
+    channel : dict of str to float or None
+        Mean over all compared texels, by channel; None if no texel is compared.
+    object : dict of (str, int) to float
+        Mean over the compared texels of an instance of a, by channel and instance.
     """
 
     channel: dict[str, float | None]
@@ -36,7 +37,7 @@ class FlipMeans:
 
 
 def read(bake: StoredBake, geometry: Geometry, points: SurfacePoints, name: str) -> NDArray[np.float64]:
-    """Look a channel up bilinearly at n points of the surface, (n, C) float64."""
+    """Look up the map of channel `name` bilinearly at n surface points, (n, C) float64."""
     return look_up_uv(bake.maps[name], geometry.page[points.triangle], points.at(geometry, "uv"))
 
 
@@ -49,12 +50,21 @@ def page_flip(
     seed: int,
     progress: Progress,
 ) -> FlipMeans:
-    """Compute the FLIP error of all pages; means are over texels whose surface point is matched in b.
+    """Compute the FLIP error of all pages, and average it over texels with a matching surface point in b.
 
     Parameters
     ----------
+    a, b : StoredBake
+        The bakes. b is the reference.
+    sides : Sides
+        Their surfaces.
     compared : (P, H, W) bool
         Texels of a at which the bakes are compared.
+    names : list of str
+        The channels.
+    seed : int
+        Seed of the random point in each texel.
+    progress : Progress
     """
     size, pages = a.atlas.resolution, a.atlas.n_pages
     step = -(-size // _LARGEST)

@@ -8,12 +8,12 @@ from baker.core.settings_model import Settings, seed_setting, setting, threads_s
 
 
 class DiffSettings(Settings):
-    """Holds the settings of a comparison, checked."""
+    """Settings of a comparison of two bakes. Values are validated when an object is created."""
 
     table: ClassVar[str] = "diff"
     what: ClassVar[str] = "diff setting"
 
-    texels: int = setting(20000, "Texels of A to compare.", ge=1)
+    texels: int = setting(20000, "Number of texels of A to compare.", ge=1)
     flip: bool = setting(True, "Also compute the FLIP error of the pages.")
     fail_if: str | None = setting(None, 'Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".', metavar="EXPR")
     seed: int = seed_setting()

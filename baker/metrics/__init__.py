@@ -1,1 +1,1 @@
-"""Measures of error between maps, and limits on them."""
+"""Error metrics of lightmaps against reference values, and limits on these metrics."""

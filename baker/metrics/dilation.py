@@ -1,4 +1,4 @@
-"""Share of dilated texels whose values differ strongly from those at the border of the chart."""
+"""Share of dilated texels whose values differ strongly from their covered neighbours."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-# A dilated texel is wrong if it is outside the range of its covered neighbours by more than this factor ...
+# A dilated value is wrong if it is above `_FACTOR` times the largest covered neighbour plus the slack, or
+# below the smallest one divided by `_FACTOR` minus the slack. The slack is `_SLACK` times the mean of the
+# page.
 _FACTOR = 4.0
-# ... and by more than this share of the map's mean.
 _SLACK = 0.02
 
 
 def misfilled_share(
     maps: NDArray[np.float32], covered: NDArray[np.bool_], dilated: NDArray[np.bool_]
 ) -> float:
-    """Return the share of dilated texels next to covered ones that are far outside their range.
+    """Return the share of wrong texels among the dilated texels that have a covered neighbour.
+
+    A dilated texel is wrong if its value is far outside the range of its covered neighbours (3 x 3 texels).
 
     Parameters
     ----------

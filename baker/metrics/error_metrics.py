@@ -1,29 +1,34 @@
-"""Error metrics of a set of values against reference values, beside the noise of the reference.
+"""Error metrics of a set of values against reference values.
 
-With v and r the means over colours of value and reference at each point:
+v_c and r_c are the value and the reference value of colour c at a point, and v and r their means over
+colours. Means and medians are over all points, unless stated otherwise:
 
     relative error   |v - r| / max(r, floor)          floor = max(0.1 median(r), 0.01 mean(r))
     bias             mean(v - r) / mean(r)
-    rmse             sqrt(mean (v_c - r_c)^2)         over colours c, in the channel's unit
+    rmse             sqrt(mean (v_c - r_c)^2)         over points and colours, in the channel's unit
     nrmse            rmse / mean(r)
     relmse           mean (v - r)^2 / (r^2 + 0.01 mean(r)^2)
     z                (v_c - r_c) / standard error of r_c
     colour error     |v_c - r_c| / max(r_c, 0.1 r, floor)
     energy ratio     R = sum w v / sum w r            w: surface area, m2, that a point represents
-    its error        sqrt(sum w^2 (v - R r)^2) / sum w r
+    standard error of R   sqrt(sum w^2 (v - R r)^2) / sum w r
 
-`median`, `p95`, `p99`, `max` are of the relative error. Its floor prevents that dark points dominate: an
-error there is relative to a tenth of the median light or a hundredth of the mean, whichever is more.
-`colour_median` and `colour_p95` are of the colour error, each of the colour where it is largest: a mean over
-colours would not detect that red and blue are swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the
-colour where that is furthest from 0; the denominator is at least a tenth of mean(r).
-`noise_floor` is the median relative error that the reference alone would show, `noise_p95` its 95th
-percentile. Both are of half the difference of two independent halves of the reference: the error of their
-mean has that size.
-`energy_ratio`, the light of the maps over the light of the reference, detects gain or loss of energy as a
-furnace test does. `bias` gives all points the same weight, and small objects have more points than their area
-would give. `energy_ratio_se` is the standard error of a ratio estimator: it includes the noise of the
-reference and the random choice of points, since both change v - R r.
+`median`, `p95`, `p99` and `max` are statistics of the relative error. Its floor keeps dark points from
+dominating them.
+
+`colour_median` and `colour_p95` are the median and the 95th percentile of the colour error. They are computed
+for each colour, and the largest is returned. A mean over colours would not detect that red and blue are
+swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the colour where this ratio is farthest from 0. The
+denominator is at least a tenth of mean(r).
+
+`noise_floor` and `noise_p95` are the median and the 95th percentile of the relative error that the noise of
+the reference causes. This noise is estimated as half the difference of two independent halves of the
+reference, which has the same variance as the error of their mean.
+
+`energy_ratio` is the ratio R of the light of the maps to the light of the reference. It detects gain or loss
+of energy, as a furnace test does. `bias` does not weight points by area, and small objects have more points
+than their area would give. `energy_ratio_se` is the standard error of R as a ratio estimator. It includes the
+noise of the reference and the random choice of points, because both change v - R r.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
 2011 (relMSE); Cochran, Sampling Techniques, 1977, chapter 6 (ratios).
@@ -41,11 +46,12 @@ METRICS = (
     "texels", "bias", "rmse", "nrmse", "relmse", "median", "p95", "p99", "max", "noise_floor", "noise_p95",
     "z_rms", "energy_ratio", "energy_ratio_se", "colour_bias", "colour_median", "colour_p95",
 )  # fmt: skip
-# Shares of the median and of the mean, of which the larger is the level below which values count as dark.
+# The level below which values count as dark is the larger of `_DARK_MEDIAN` x median and `_DARK_MEAN` x mean.
 _DARK_MEDIAN, _DARK_MEAN = 0.1, 0.01
 # Share of mean(r)^2 in the denominator of relmse.
 _EPSILON = 0.01
-# Smallest value that the error of a colour is relative to, as a share of the mean over colours.
+# Lower limit of the denominator of the colour error and of `colour_bias`, as a share of the mean over
+# colours.
 _MIN_COLOUR = 0.1
 
 
@@ -59,7 +65,7 @@ def relative_error(
     value, reference : (n, C) float64
         Values and reference values.
     floor : float
-        Smallest light that errors are relative to, usually `dark_floor`.
+        Lower limit of the denominator, usually `dark_floor`.
 
     Returns
     -------
@@ -99,25 +105,26 @@ def error_metrics(
     floor: float | None = None,
     weight: NDArray[np.float64] | None = None,
 ) -> dict[str, float | int | None]:
-    """Compute the metrics that the head of this file defines.
+    """Compute the metrics that the docstring of this module defines.
 
     Parameters
     ----------
     value, reference : (n, C) float64
         Values and reference values.
     standard_error : (n, C) float64, optional
-        Of the reference; without it `z_rms` is None.
+        Standard error of the reference. Without it, `z_rms` is None.
     halves : two (n, C) float64, optional
-        Independent halves of the reference; without them `noise_floor` and `noise_p95` are None.
+        Two independent estimates whose mean is the reference. Without them, `noise_floor` and `noise_p95` are
+        None.
     floor : float, optional
-        Smallest light that errors are relative to; by default `dark_floor` of the reference.
+        Lower limit of the denominator of relative errors. The default is `dark_floor` of the reference.
     weight : (n,) float64, m2, optional
-        Surface area that each point represents; without it the energy ratio is None.
+        Surface area that each point represents. Without it, `energy_ratio` and `energy_ratio_se` are None.
 
     Returns
     -------
     dict of str to number or None
-        Keys are `METRICS`. Without points `texels` is 0 and all others are None.
+        Keys are `METRICS`. Without points, `texels` is 0 and all other metrics are None.
     """
     found: dict[str, float | int | None] = dict.fromkeys(METRICS)
     found["texels"] = len(value)
@@ -170,7 +177,7 @@ def beyond_noise(error: float, noise: float) -> float:
     error : float
         Error that includes the noise.
     noise : float
-        Size of the noise, in the same unit.
+        Standard deviation of the noise, in the same unit.
 
     Returns
     -------
@@ -183,9 +190,10 @@ def beyond_noise(error: float, noise: float) -> float:
 def energy_ratio(
     value: NDArray[np.float64], reference: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[float | None, float | None]:
-    """Return the energy ratio of colour means (n,) with weights (n,) in m2, and its standard error.
+    """Return the energy ratio R and its standard error.
 
-    Both are None if the reference is black; the standard error also for a single point.
+    `value` and `reference` (n,) are means over colours, and `weight` (n,) are areas, m2. Both results are
+    None if the reference is black. The standard error is also None for a single point.
     """
     total = float((weight * reference).sum())
     if not total > 0:
@@ -199,17 +207,18 @@ def energy_ratio(
 def z_scores(
     value: NDArray[np.float64], reference: NDArray[np.float64], standard_error: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return errors in standard errors of the reference.
+    """Return (value - reference) / standard_error, the errors in units of the reference's standard error.
 
     Parameters
     ----------
     value, reference, standard_error : (n, C) float64
-        Values, reference values and the standard errors of these.
+        Values, reference values and the standard errors of the reference values.
 
     Returns
     -------
     (m,) float64
-        Of all components where the reference is above 0 and its standard error is finite and above 0.
+        The errors of all components whose reference is above 0 and whose standard error is finite and above
+        0.
     """
     known = np.isfinite(standard_error) & (standard_error > 0) & (reference > 0)
     return np.asarray((value - reference)[known] / standard_error[known], np.float64)

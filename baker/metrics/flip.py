@@ -1,4 +1,4 @@
-"""FLIP: the perceived difference of two pictures that are shown in alternation.
+"""The FLIP error: the perceived difference between two pictures that are shown in alternation.
 
 Based on: Andersson et al., FLIP: A difference evaluator for alternating images, 2020; Andersson et al.,
 Visualizing errors in rendered high dynamic range images, 2021 (HDR-FLIP).
@@ -18,9 +18,9 @@ def flip_error(
     Parameters
     ----------
     reference : (H, W, C) float32, linear
-        C = 3 (Rec.709) or 1; determines the exposures.
+        The reference picture, from which the exposures are derived. C is 3 (Rec.709) or 1.
     picture : (H, W, C) float32, linear
-        The picture to compare.
+        The picture to compare, with the same C.
 
     Returns
     -------
