@@ -1,1 +1,1 @@
-"""Scene files, images and JUnit reports; importers are found here."""
+"""Reads and writes scene files, images and JUnit reports; `baker.io.importers` holds the importer plugins."""

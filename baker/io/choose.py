@@ -1,7 +1,7 @@
-"""Selects the objects of a bake by patterns of their names.
+"""Selects the objects of a bake by wildcard patterns of their names.
 
-A pattern (`*`, `?`, `[abc]`, case-sensitive) matches the name of a node, or its path from the root,
-such as `House/Floor 1/*`. A match applies to all nodes below the node as well.
+A case-sensitive pattern with `*`, `?` or `[abc]` is compared with the name of a node and with its path from
+the root, such as `House/Floor 1/*`. A pattern that matches a node also selects all nodes below it.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     scene : Scene
         The scene; not changed.
     include : sequence of str
-        Only objects that match one of these patterns are kept; all if it is empty. Lights are kept.
+        Only objects that match one of these patterns are kept; if there are no patterns, all objects are
+        kept. All lights are kept.
     exclude : sequence of str
         Objects and lights that match one of these patterns are left out.
 
     Returns
     -------
     Scene
-        With a warning for each pattern that matches nothing.
+        The selected scene, with a warning for each pattern that matches nothing.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
     used = sorted({i.mesh for i in instances})
     number = {old: new for new, old in enumerate(used)}
-    # Before `unused`: patterns may match instances that only the source scene has.
+    # Do this before `unused` is computed: a pattern may match an instance that only the source scene has.
     source = None if scene.source_scene is None else _choose_source(scene.source_scene, kept)
     unused = [p for p in (*include, *exclude) if p not in names.matched]
     return replace(
@@ -75,7 +76,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
 
 
 def _choose_source(source: SourceScene, kept: Callable[[int, str], bool]) -> SourceScene:
-    """Return the instances of a source scene whose node and name are kept, and the meshes that they show."""
+    """Return a source scene with those instances for which `kept(node, name)` is True."""
     shown = [i for i in source.instances if kept(i.node, i.name)]
     used = sorted({i.mesh for i in shown})
     number = {old: new for new, old in enumerate(used)}

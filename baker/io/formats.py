@@ -1,4 +1,4 @@
-"""The scene formats that importers read, in words for help texts."""
+"""Lists the suffixes of the scene files that importers read, for help texts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from baker.core.registry import names_in_source
 def scene_suffixes() -> list[str]:
     """Return the suffixes of scene files, sorted, each with its dot.
 
-    They are read from the source of the importers: help texts list them without importing any.
+    They are parsed from the source code of the importers, so that a help text imports none of them.
 
     Returns
     -------
     list of str
-        The names of `baker.io.load.IMPORTERS`.
+        The names in the registry `baker.io.load.IMPORTERS`.
     """
     return names_in_source("baker.io.importers", "IMPORTERS")
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
-# Largest side of an image, texels.
+# Largest width and height of an image that is read, texels.
 _LARGEST = 16384
 
 
 def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
-    """Return an image's pixels as stored: RGB sRGB-encoded, alpha linear, row 0 on top.
+    """Return an image's pixels as they are stored: sRGB-encoded colour, linear alpha, row 0 at the top.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     Returns
     -------
     (H, W, 4) uint8
-        Sixteen-bit images are rounded to eight.
+        RGBA, 0 to 255; 16-bit images are rounded to 8 bits.
 
     Raises
     ------
     InputError
-        If the data is not an image that can be decoded, or is larger than 16384 texels a side.
+        If the data is not an image that can be decoded, or if its width or height exceeds 16384 texels.
     """
     from PIL import Image
 

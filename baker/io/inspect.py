@@ -29,12 +29,13 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
     Returns
     -------
     dict
-        `kind` is "scene", "bake", "image" or "status" (a `status_0.png`); the other keys depend on it.
+        `kind` is "scene", "bake", "image" or "status" (a file such as `status_0.png`); the other keys depend
+        on `kind`.
 
     Raises
     ------
     InputError
-        If there is nothing at `path`, or it is none of these.
+        If `path` does not exist, or is neither a scene nor a bake nor an image.
     """
     path = Path(path)
     if not path.exists():
@@ -54,7 +55,7 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
 
 
 def _bake(folder: Path) -> dict[str, Any]:
-    """Summarise a manifest, and compare every file with its hash."""
+    """Return the main parts of a manifest, and the state of every file compared with its hash."""
     manifest = read_manifest(folder)
     files = [
         {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
@@ -81,10 +82,10 @@ def _bake(folder: Path) -> dict[str, Any]:
 
 
 def _status(path: Path) -> dict[str, Any] | None:
-    """Count the texels of each status in a `status_0.png`; None for another PNG."""
+    """Count the texels of each status in a file such as `status_0.png`; return None for any other PNG."""
     try:
         data = path.read_bytes()
-        # Recognise the file by the text chunk that the bake writes.
+        # Recognise the file by the text chunk `Legend`, which only status images have.
         if b"tEXtLegend\x00" not in data:
             return None
         index = decode_palette_png(data)

@@ -1,4 +1,4 @@
-"""JUnit XML, as build servers display it: named test cases that passed or failed, with a message.
+"""Writes JUnit XML for build servers: named test cases that passed, failed or could not run.
 
 Based on: the junit-10.xsd of the Jenkins xUnit plugin.
 """
@@ -21,12 +21,12 @@ class Case:
     ----------
     name : str
     group : str
-        Shown as the class: a scene or an object.
+        Value of the attribute `classname`, such as the name of a scene or an object.
     problem : str
-        Why it failed; empty if it passed.
+        Why the case failed; empty if it passed.
     seconds : float
     error : bool
-        Whether the check itself could not run.
+        True if the check could not run; then `problem` is written as an error and not as a failure.
     """
 
     name: str
@@ -37,14 +37,14 @@ class Case:
 
 
 def junit_text(suite: str, cases: Sequence[Case]) -> str:
-    """Return a JUnit document with one suite.
+    """Return the text of a JUnit XML document with one test suite.
 
     Parameters
     ----------
     suite : str
         Name of the suite.
     cases : sequence of Case
-        Its test cases.
+        Test cases of the suite.
 
     Returns
     -------
@@ -86,6 +86,6 @@ def write_text(path: Path, text: str) -> None:
     Raises
     ------
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     write_atomically(path, text.encode(), "report")

@@ -1,6 +1,6 @@
 """Loads a scene file of any known format as a `Scene`.
 
-An importer is one file of `baker.io.importers` that registers a function for its suffixes.
+Each file of `baker.io.importers` registers one function for the file suffixes that it reads.
 """
 
 from __future__ import annotations
@@ -22,23 +22,24 @@ from baker.io.choose import choose_objects
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The argument of an importer: a scene file and options.
+    """The argument of an importer: the content of a scene file, and options.
 
     Attributes
     ----------
     path : Path
     data : bytes
-        The file's content, never empty.
+        Content of the file, at least one byte.
     up : str
-        "y" or "z": the up axis, for formats that do not define one.
+        "y" or "z": the up axis of the file, for formats that do not define an up axis.
     scale : float
-        Metres per unit, for formats that do not define a unit.
+        Metres per unit of the file, for formats that do not define a unit.
     scene_index : int or None
         Number of the glTF scene; None for the default scene of the file.
     reflections : bool
         Also read metallic-roughness textures.
     lenient : bool
-        Report defects as warnings instead of raising, and keep the triangles as in the file.
+        Do not raise for the defects that `load_scene` lists, and store all triangles of the file in
+        `Scene.source_scene`.
     """
 
     path: Path
@@ -63,14 +64,14 @@ def load_scene(
     reflections: bool = False,
     lenient: bool = False,
 ) -> Scene:
-    """Read a scene file into metres, +Y up, linear Rec.709.
+    """Read a scene file, and convert it to metres, +Y up and linear Rec.709.
 
     Parameters
     ----------
     path : Path or str
         A file with a suffix that is registered in `IMPORTERS`.
     up : str
-        "y" or "z", the up axis of files whose format does not define one. glTF is always +Y up.
+        "y" or "z", the up axis of files whose format does not define an up axis. glTF is always +Y up.
     scale : float
         Metres per unit of files whose format does not define a unit. glTF is always in metres.
     scene_index : int or None
@@ -78,21 +79,22 @@ def load_scene(
     reflections : bool
         Also read metallic-roughness textures, which bakes do not use.
     lenient : bool
-        For checks of the file: indices out of range, negative or far too strong lights and a scene without
-        a valid triangle are no errors, and `Scene.source_scene` holds the triangles of the file.
+        Used for checks of the file. Three defects raise no error: indices out of range, negative or far too
+        strong lights, and a scene without a valid triangle. `Scene.source_scene` then contains the triangles
+        of the file, including invalid ones.
 
     Returns
     -------
     Scene
-        With at least one triangle, unless lenient. `Scene.warnings` lists the parts that were left out.
+        The scene, with at least one triangle unless `lenient`. `Scene.warnings` lists what was left out.
 
     Raises
     ------
     InputError
-        If the file, or one it refers to, is missing, unreadable, malformed, requires an unknown extension, or
-        holds nothing to bake.
+        If the file or a file that it refers to is missing, unreadable or malformed, if it requires an unknown
+        extension, or if it contains nothing to bake.
     SettingsError
-        If `up` or `scale` is out of range.
+        If `up` is neither "y" nor "z", or `scale` is not a positive number.
     ResourceError
         If the scene does not fit into memory.
     """
@@ -127,7 +129,7 @@ def _importer_of(path: Path) -> Importer:
 
 
 def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = False) -> Scene:
-    """Read a scene file with the settings of a bake: up axis, scale, patterns of objects.
+    """Read a scene file with a bake's settings for up axis, scale and the selection of objects.
 
     Parameters
     ----------
@@ -136,21 +138,21 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
     settings : BakeSettings
         `up`, `scale`, `include` and `exclude` are used.
     lenient : bool
-        As of `load_scene`.
+        As in `load_scene`.
 
     Returns
     -------
     Scene
-        With the objects that the patterns select.
+        The scene with the objects that the patterns select.
 
     Raises
     ------
     InputError
-        As `load_scene`; also if the patterns leave no object.
+        As in `load_scene`, and if the patterns select no object.
     SettingsError
-        As `load_scene`.
+        As in `load_scene`.
     ResourceError
-        As `load_scene`.
+        As in `load_scene`.
     """
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=lenient)
     return choose_objects(scene, settings.include, settings.exclude)

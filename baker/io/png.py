@@ -1,6 +1,6 @@
 """Encodes and decodes PNG files with Pillow.
 
-No time is stored, so that equal pixels give equal bytes.
+No time stamp is written, so that equal pixels give equal bytes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str]
 
 
 def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, str]]:
-    """Read the values of a PNG without a palette as they are stored, and its text chunks.
+    """Return the unconverted pixel values of a PNG without a palette, and its text chunks.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
     Raises
     ------
     InputError
-        If the file is missing, or is no such PNG.
+        If the file is missing, is no PNG, or has a palette or another unsupported pixel type.
     """
     from PIL import Image, PngImagePlugin, UnidentifiedImageError
 
@@ -78,19 +78,19 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
 def encode_palette_png(
     index: NDArray[np.uint8], colours: Mapping[int, tuple[int, int, int]], text: Mapping[str, str]
 ) -> bytes:
-    """Return a PNG whose pixels are palette numbers.
+    """Return the bytes of a PNG with a palette.
 
     Parameters
     ----------
     index : (H, W) uint8
-        Row 0 on top.
-    colours : mapping of palette number to sRGB red, green, blue (0 to 255)
+        Palette index of each pixel, row 0 at the top.
+    colours : mapping of palette index to sRGB red, green, blue (0 to 255)
     text : mapping of str to str
         Text chunks.
     """
     from PIL import Image
 
-    # Write all 256 entries: Pillow then stores eight bits for each texel, whose value is the index itself.
+    # Write all 256 palette entries: otherwise Pillow stores fewer than eight bits for each pixel.
     palette = np.zeros((256, 3), np.uint8)
     for number, colour in colours.items():
         palette[number] = colour
@@ -107,12 +107,12 @@ def grey_levels(value: NDArray[np.float32]) -> NDArray[np.uint8]:
     Parameters
     ----------
     value : array of float32, any shape
-        Values; limited to 0 to 1.
+        Values, clamped to 0 to 1.
 
     Returns
     -------
     array of uint8, same shape
-        0 to 255, rounded to nearest.
+        `round(255 * value)`.
     """
     rounded: NDArray[np.uint8] = np.rint(np.clip(value, 0.0, 1.0) * 255.0).astype(np.uint8)
     return rounded
@@ -124,7 +124,7 @@ def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     Parameters
     ----------
     linear : array of float32, any shape
-        Values; limited to 0 to 1.
+        Values, clamped to 0 to 1.
 
     Returns
     -------
@@ -137,12 +137,12 @@ def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def decode_palette_png(data: bytes) -> NDArray[np.uint8]:
-    """Return (H, W) uint8: the palette numbers of a PNG with a palette, row 0 on top.
+    """Return (H, W) uint8: the palette index of each pixel of a PNG with a palette, row 0 at the top.
 
     Raises
     ------
     ValueError
-        If the data is no such image.
+        If the data is no image with a palette.
     """
     from PIL import Image, UnidentifiedImageError
 

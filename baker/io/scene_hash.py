@@ -1,6 +1,8 @@
-"""The hash of a scene file and of all files that it refers to, without decoding them.
+"""Computes the hash of a scene file and of all files that it refers to, for most formats without decoding
+them.
 
-It equals `Scene.sha256`, which batches compare to find whether a bake is up to date.
+The hash equals `Scene.sha256`. A batch compares it with the manifest to find out whether a bake is up to
+date.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from baker.io.load import load_scene, read_scene_file
 
 
 def scene_sha256(path: Path) -> str:
-    """Return the hash of a scene file and of every file that it refers to, in the order of the references.
+    """Return the hash of a scene file followed by the files that it refers to.
 
     Parameters
     ----------
@@ -27,7 +29,7 @@ def scene_sha256(path: Path) -> str:
     Raises
     ------
     InputError
-        If the file, or one it refers to, is missing or unreadable, or malformed.
+        If the file or a file that it refers to is missing, unreadable or malformed.
     """
     suffix = path.suffix.lower()
     if suffix in (".glb", ".gltf"):
@@ -40,5 +42,5 @@ def scene_sha256(path: Path) -> str:
         return obj_sha256(path, read_scene_file(path))
     if suffix in (".ply", ".stl", ".off"):
         return hashlib.sha256(read_scene_file(path)).hexdigest()
-    # Other formats are loaded as a whole: only their importers can list the files that they refer to.
+    # Load scenes of other formats completely, because only their importers can list the files that they use.
     return load_scene(path).sha256

@@ -1,8 +1,8 @@
-"""Temporary folders that output is written to before it is moved to its final path, and their names.
+"""Creates and finds the temporary folders that output is written to before it is moved to its final path.
 
-The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or
-`.baker-{process}-{random hex digits}` in it where `out` is a folder that cannot be moved. What the output
-replaces is kept in a folder of the same name with the suffix `-old` until the new files are in place.
+The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or, if `out` is
+a folder that cannot be moved, `.baker-{process}-{random hex digits}` inside it. The old files that the output
+replaces are kept in a folder of the same name with the suffix `-old` until the new files are in place.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _NAME = re.compile(r"\.baker-(\d+)-[0-9a-f]+(-old)?")
 
 @dataclass(frozen=True)
 class Temporary:
-    """A temporary folder that was found.
+    """A temporary folder that exists.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Temporary:
     process : int
         Id of the process that created it.
     old : bool
-        Whether it holds the files that are being replaced.
+        Whether it contains the old files that the output replaces.
     """
 
     path: Path
@@ -40,18 +40,18 @@ class Temporary:
 
 
 def temporary_path(out: Path, *, inside: bool = False) -> Path:
-    """Return the name of a new temporary folder for `out`, an absolute path; `inside` of it or beside it."""
+    """Return an unused path for a temporary folder beside `out` (absolute) or, if `inside`, in `out`."""
     suffix = f".baker-{os.getpid()}-{secrets.token_hex(4)}"
     return out / suffix if inside else out.with_name(f".{out.name}{suffix}")
 
 
 def old_path(temporary: Path) -> Path:
-    """Return the folder of the files that those in `temporary` replace."""
+    """Return the folder for the old files that the files in `temporary` replace."""
     return temporary.with_name(temporary.name + "-old")
 
 
 def temporaries(out: Path) -> list[Temporary]:
-    """List the temporary folders for an output, of any process.
+    """List the temporary folders that any process has left for an output.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def temporaries(out: Path) -> list[Temporary]:
 
 @contextlib.contextmanager
 def atomic_path(path: Path, what: str) -> Iterator[Path]:
-    """Yield the path of a file to write, which replaces `path` at the end of the `with` block.
+    """Yield a temporary path to write to; at the end of the `with` block, that file replaces `path`.
 
     Parameters
     ----------
@@ -90,17 +90,18 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     Yields
     ------
     Path
-        A path with the same suffix, in a temporary folder beside `path`; `path` itself if that is a device.
+        A path with the same name in a temporary folder beside `path`. If `path` is a device or a pipe, it is
+        yielded itself.
 
     Raises
     ------
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     try:
         target = path.resolve()
         if target.exists() and not target.is_file():
-            # Write to a device or a pipe instead of replacing it.
+            # Write directly to a device or a pipe instead of replacing it by a file.
             yield target
             return
         folder = temporary_path(target)
@@ -114,12 +115,12 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
     except OSError as error:
         raise ResourceError(f"the {what} cannot be written ({error.strerror})", file=str(path)) from None
     except ResourceError as error:
-        # Name the final path: the temporary file of the error is removed.
+        # Name the final path in the message, because the temporary file that the error names is removed.
         raise ResourceError(error.message, file=str(path)) from error
 
 
 def write_atomically(path: Path, data: bytes, what: str) -> None:
-    """Write a file atomically: it is either complete or unchanged; see `atomic_path`.
+    """Write a file atomically: after an error, the old file is unchanged; see `atomic_path`.
 
     Parameters
     ----------

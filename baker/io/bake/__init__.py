@@ -1,1 +1,1 @@
-"""The output folder of a bake: replaced as a whole, locked, read back; its manifest."""
+"""Writes, locks, replaces and reads the output folder of a bake and its manifest `bake.json`."""

@@ -1,7 +1,8 @@
 """A lock that prevents two runs from baking into one output folder at the same time.
 
-It is a file lock of the operating system on a small file beside the folder, which is released when the
-process that holds it ends for any reason. The incomplete output of killed runs is removed here, too.
+The lock is an operating-system lock on the file `.<folder>.baker.lock` beside the output folder. The
+operating system releases it when the process that holds it ends, even after a crash. `sweep` removes the
+incomplete output of killed runs.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from baker.io.temporary import temporaries
 
 
 class OutputLock:
-    """The lock of an output folder.
+    """The lock of one output folder.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ class OutputLock:
         self._file: int | None = None
 
     def acquire(self) -> bool:
-        """Try to take the lock; False if another run holds it.
+        """Try to take the lock without waiting; return False if another run holds it.
 
         Raises
         ------
@@ -47,19 +48,20 @@ class OutputLock:
         try:
             file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
         except FileNotFoundError:
-            return False  # the other run has just removed an empty parent
+            return False  # another run has just removed an empty parent folder
         if _lock(file) and _is_at(file, self.path):
             self._file = file
             return True
-        # Another run holds it, or removed the file after it was opened and before it was locked here.
+        # Another run holds the lock, or it deleted the lock file between `os.open` and `_lock`.
         os.close(file)
         return False
 
     def release(self) -> None:
-        """Release the lock, and remove its file and the empty parents that were created."""
+        """Release the lock; delete the lock file and those parent folders that `acquire` created."""
         if self._file is None:
             return
-        # Remove the file before the release, so that no other run can have locked it.
+        # Delete the file while the lock is held: after the release, another run could already have locked the
+        # file.
         with contextlib.suppress(OSError):
             self.path.unlink()
         os.close(self._file)
@@ -75,7 +77,8 @@ class OutputLock:
 def held(out: Path) -> Iterator[None]:
     """Hold the lock of an output folder within a `with` block, without waiting for other runs.
 
-    Where no lock file can be created beside the folder (a mount point, for example), no lock is held.
+    If no lock file can be created beside the folder, for example because it is a mount point, the `with`
+    block runs without a lock.
 
     Parameters
     ----------
@@ -85,16 +88,16 @@ def held(out: Path) -> Iterator[None]:
     Yields
     ------
     None
-        While the lock is held.
+        Once; the lock is held until the `with` block ends.
 
     Raises
     ------
     ResourceError
-        If another run is baking into it.
+        If another run holds the lock of this folder.
     """
     lock = OutputLock(out)
     try:
-        # Try twice: the run that held it may have removed the file in between.
+        # Try twice: the first attempt also fails if the other run deletes the lock file in the meantime.
         free = lock.acquire() or lock.acquire() or not lock.path.exists()
     except OSError:
         free = True
@@ -108,7 +111,7 @@ def held(out: Path) -> Iterator[None]:
 
 
 def sweep(out: Path) -> None:
-    """Remove the incomplete output of killed runs; call it with the lock held.
+    """Restore the old files after killed runs and remove their temporary folders; the caller holds the lock.
 
     Parameters
     ----------
@@ -120,7 +123,7 @@ def sweep(out: Path) -> None:
 
 
 def dead_writers(out: Path) -> set[int]:
-    """Return the processes that have ended and left temporary folders.
+    """Return the ids of ended processes whose temporary folders for `out` still exist.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Builds `bake.json`, the manifest of a bake: its files, the page of each object, settings and versions.
 
-Equal bakes have equal manifests, except for `created` and `timings`.
+Repeating a bake gives an equal manifest, except for `created` and `timings`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from baker.core.settings import BakeSettings
 # Version of the manifest's layout; it changes when the name or the meaning of a key changes.
 VERSION = 1
 
-# Distributions whose version can change the numbers of a bake, by their common name.
+# Key in `versions` of the manifest -> installed distribution, for libraries that can change texel values.
 _LIBRARIES = {
     "baker": "baker", "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
     "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
@@ -48,17 +48,18 @@ def make_manifest(
     result : BakeResult
         The bake.
     out : Path
-        The folder that the input's path is relative to.
+        The output folder; `input.path` in the manifest is relative to it.
     pages : list of dict
-        An entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of a channel.
+        One entry {channel, page, file, sha256, width, height, unit, clipped, ...} for each page of each
+        channel.
     files : list of dict
-        An entry {file, sha256} for every file of the folder except the manifest.
+        One entry {file, sha256} for each file of the folder except the manifest.
     instance_mesh : tuple of int
-        Mesh of each instance in `scene.glb`.
+        For each instance, the index of its mesh in `scene.glb`.
     warnings : tuple of SceneWarning
-        Warnings from writing the maps.
+        Warnings about clipping and banding in the written maps.
     created : datetime or None
-        Time of writing; None is now.
+        Value of `created`; None uses the current time.
 
     Returns
     -------
@@ -107,7 +108,9 @@ def manifest_schema() -> dict[str, Any]:
 
 
 def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
-    """Return every setting with its default value resolved, without `threads`, which changes no result.
+    """Return all settings, with each sample count that was left at its default replaced by the number used.
+
+    `threads` is left out because it does not affect the result.
 
     Parameters
     ----------
@@ -117,7 +120,7 @@ def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
     Returns
     -------
     dict
-        Plain JSON values by name.
+        Name of each setting to its value, as plain JSON.
     """
     values = settings.model_dump(mode="json", exclude={"threads"})
     samples = settings.hemisphere_samples
@@ -157,7 +160,7 @@ def library_versions() -> dict[str, str | None]:
     Returns
     -------
     dict of str to str or None
-        None for libraries that are not installed.
+        Name to version; None if the library is not installed.
     """
     versions: dict[str, str | None] = {}
     for name, distribution in _LIBRARIES.items():
@@ -174,7 +177,7 @@ def _relative(path: Path | None, out: Path) -> str | None:
     try:
         return Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
     except ValueError:
-        # There is no relative path between drives.
+        # On Windows there is no relative path from one drive to another.
         return path.resolve().as_posix()
 
 
@@ -197,7 +200,7 @@ def _instances(result: BakeResult, instance_mesh: tuple[int, ...]) -> list[dict[
 
 
 def _lights(result: BakeResult) -> list[dict[str, Any]]:
-    """List punctual lights, emissive materials in use and the sky."""
+    """List the punctual lights, the emissive materials of the scene's instances, and the sky."""
     lights: list[dict[str, Any]] = []
     for light in result.scene.lights:
         kind = kind_of(light)
@@ -219,7 +222,7 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
 
 
 def _statistics(result: BakeResult, channel: str) -> dict[str, Any]:
-    """Return the statistics of a channel: those of the bake, or those of the covered texels."""
+    """Return a channel's entry of `result.statistics`, or compute it from the covered texels."""
     if channel in result.statistics:
         return result.statistics[channel]
     covered = np.isin(result.status, (1, 3, 4))

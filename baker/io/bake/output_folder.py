@@ -1,8 +1,9 @@
 """Atomic replacement of an output folder: it holds either the old bake or the new one.
 
-All files are written to a temporary folder beside the output folder, which replaces it by renaming at the
-end. Renames are recorded in a journal and undone after an error. Where the output folder itself cannot be
-renamed (a mount point, the current folder) its files are exchanged one by one with the same journal.
+All files are first written to a temporary folder beside the output folder. At the end, the temporary folder
+is renamed to the name of the output folder. Renames are recorded in a journal and undone after an error. If
+the output folder itself cannot be renamed (a mount point, the current folder), its files are exchanged one by
+one, with the same journal.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from baker.io.temporary import Temporary, old_path, temporary_path
 
 MANIFEST_NAME = "bake.json"
 AS_BAKED = "as baked"
-# Components without separators and drive letters, none of them "." or "..".
+# Relative path with forward slashes. No component is "." or "..", or contains a backslash or a colon.
 _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
-    """Check, before the long work, that a bake may be written to a folder.
+    """Check that a bake may be written to a folder; call it before the bake starts.
 
     Parameters
     ----------
@@ -35,14 +36,15 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     force : bool
         Accept a folder with files that baker did not write (they are kept).
     scene_path : Path or None
-        The input, which must not be among the replaced files.
+        The input scene file; it is an error if the bake would replace it.
 
     Raises
     ------
     SettingsError
-        If `out` is a file, a folder that baker did not write, or holds the input.
+        If `out` is a file, if it contains files that baker did not write and `force` is False, or if the bake
+        would replace the input.
     ResourceError
-        If nothing can be written there.
+        If the folder cannot be read or written to.
     """
     folder = out.resolve()
     if not folder.name:
@@ -71,7 +73,7 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
 
 
 def own_files(folder: Path) -> set[str] | None:
-    """List the files of a bake.
+    """Return the files that the manifest in a folder lists, and the manifest itself.
 
     Parameters
     ----------
@@ -81,8 +83,8 @@ def own_files(folder: Path) -> set[str] | None:
     Returns
     -------
     set of str or None
-        Paths relative to the folder; None if it has no manifest of baker. A manifest that names a file
-        outside of the folder, by its path or through a link, is not accepted.
+        Paths relative to the folder. None if the folder has no manifest of baker, or if the manifest names a
+        file outside the folder, by its path or through a symbolic link.
     """
     try:
         manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
@@ -94,7 +96,7 @@ def own_files(folder: Path) -> set[str] | None:
 
 
 def _lies_inside(folder: Path, name: object) -> bool:
-    """Return whether a name with forward slashes is of a file below `folder`, no parent of it a link."""
+    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link."""
     if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
         return False
     parents = name.split("/")[:-1]
@@ -102,7 +104,7 @@ def _lies_inside(folder: Path, name: object) -> bool:
 
 
 def is_file(path: Path) -> bool:
-    """Return whether a file exists; False for a name that is too long for any."""
+    """Return whether a file exists; False also if the name is too long for the file system."""
     try:
         return path.is_file()
     except OSError:
@@ -117,7 +119,7 @@ def file_state(path: Path, sha256: str) -> str:
     path : Path
         The file.
     sha256 : str
-        Its hash in the manifest.
+        The file's SHA-256 in the manifest.
 
     Returns
     -------
@@ -131,10 +133,10 @@ def file_state(path: Path, sha256: str) -> str:
 
 
 class OutputFolder:
-    """A temporary folder, `path`, for the files of a bake, which `commit` moves to the output folder.
+    """A temporary folder for the files of a bake; `commit` moves the files to the output folder.
 
-    Use it as a context manager: leaving it without `commit` removes the temporary folder. `abort` may be
-    called more than once.
+    Use it as a context manager. If the `with` block ends without `commit`, the temporary folder is removed.
+    `abort` may be called more than once.
 
     Parameters
     ----------
@@ -179,7 +181,7 @@ class OutputFolder:
         Raises
         ------
         OSError
-            If a file cannot be moved; the old folder is unchanged.
+            If a file cannot be moved; the old files are then restored.
         """
         try:
             if self._in_place:
@@ -220,7 +222,8 @@ class OutputFolder:
     def _exchange_files(self) -> None:
         new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
         old = {Path(name) for name in own_files(self.out) or ()} | set(new)
-        # Move the old manifest first and the new one last: a folder with a manifest is complete.
+        # Move the old manifest out first and the new one in last, so that a folder with a manifest is
+        # complete.
         for name in sorted(old, key=lambda n: (n.as_posix() != MANIFEST_NAME, n)):
             if (self.out / name).exists():
                 (self._aside / name).parent.mkdir(parents=True, exist_ok=True)
@@ -230,7 +233,8 @@ class OutputFolder:
             self._rename(self.path / name, self.out / name)
 
     def _rename(self, source: Path, target: Path) -> None:
-        # Record the rename before it is done, so that an interruption in between is undone as well.
+        # Record the rename first, so that `abort` also undoes it if the process is interrupted right after
+        # it.
         self._journal.append((source, target))
         try:
             source.rename(target)
@@ -240,14 +244,14 @@ class OutputFolder:
 
 
 def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
-    """Restore the old files after a process was killed while it wrote, and remove its temporary folders.
+    """After a process was killed while writing, restore the old files and remove its temporary folders.
 
     Parameters
     ----------
     out : Path
         The output folder or file of the process.
     left : iterable of Temporary
-        Its temporary folders, from `temporaries`.
+        The temporary folders of the process, as `temporaries` returns them.
     """
     target, left = out.resolve(), list(left)
     for temporary in left:
@@ -258,12 +262,12 @@ def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
 
 
 def _put_back(aside: Path, target: Path) -> None:
-    """Move the old files from the folder `aside` back to the output folder."""
+    """Move the old files from the folder `aside` back to the output folder `target`."""
     if aside.parent != target:
         if not target.exists():
             aside.rename(target)
     elif not (target / MANIFEST_NAME).exists():
-        # The manifest is moved last: without it the new files are incomplete.
+        # The new manifest is moved in last, so without a manifest the new files are incomplete.
         for path in sorted(path for path in aside.rglob("*") if path.is_file()):
             name = path.relative_to(aside).as_posix()
             if _lies_inside(target, name):
@@ -271,7 +275,7 @@ def _put_back(aside: Path, target: Path) -> None:
 
 
 def _cannot_move(folder: Path) -> bool:
-    """Return whether a folder cannot be renamed: mounted, in a read-only parent, or the current folder."""
+    """Return whether a folder is a mount point, is in a read-only folder, or contains the current one."""
     if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
         return True
     try:
@@ -289,7 +293,7 @@ def _check_writable(folder: Path, out: Path) -> None:
 
 
 def _carry_over(old: Path, new: Path, own: set[str], prefix: str = "") -> None:
-    """Link or copy the files that are not baker's from the old folder to the new one."""
+    """Hard-link or copy all files that are not in `own` from the folder `old` to the folder `new`."""
     for entry in sorted(os.scandir(old), key=lambda e: e.name):
         name, target = prefix + entry.name, new / entry.name
         if name in own or (os.path.lexists(target) and not entry.is_dir(follow_symlinks=False)):

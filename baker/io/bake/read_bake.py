@@ -1,6 +1,6 @@
 """Reads a finished output folder: scene, lightmap uv, maps, status, manifest.
 
-Verification, comparison and the viewer use it: they read the files, not the data of the bake in memory.
+Verification, comparison and the viewer use it, so they work on the files and not on arrays in memory.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SCENE_NAME = "scene.glb"
 
 @dataclass(frozen=True)
 class StoredBake:
-    """A bake as its folder holds it.
+    """A bake that was read from its output folder.
 
     Attributes
     ----------
@@ -36,14 +36,15 @@ class StoredBake:
     manifest : dict
         The content of `bake.json`.
     scene : Scene
-        `scene.glb`; the sky is in `manifest["settings"]`.
+        The content of `scene.glb`; the sky is in `manifest["settings"]`.
     atlas : Atlas
-        From TEXCOORD_1, with page numbers from the manifest; `chart` is the index of the instance.
+        Lightmap uv from TEXCOORD_1 of `scene.glb`, page numbers from the manifest. All triangles of an
+        instance form one chart, whose number is the index of the instance.
     maps : dict of str to (P, H, W, C) float32
-        Pages of each channel.
+        For each channel, P pages of H x W texels with C components.
     status : (P, H, W) uint8, `core.lightmap.TexelStatus`
     warnings : tuple of SceneWarning
-        Files that changed since the bake.
+        One warning for each file that changed or disappeared since the bake.
     """
 
     folder: Path
@@ -56,7 +57,7 @@ class StoredBake:
 
     @property
     def sky(self) -> tuple[float, float, float]:
-        """Return the radiance of the sky that it was baked under, cd/m2."""
+        """Return the radiance of the sky in this bake, linear RGB, cd/m2."""
         baked = self.manifest.get("settings", {})
         known = {key: baked[key] for key in ("sky", "sky_strength") if baked.get(key) is not None}
         return make_settings(known).sky_radiance
@@ -73,12 +74,13 @@ def read_bake(folder: Path | str) -> StoredBake:
     Returns
     -------
     StoredBake
-        The bake, with warnings about files that changed.
+        The bake.
 
     Raises
     ------
     InputError
-        If the folder holds no bake, a file of it is missing or unreadable, or its parts are inconsistent.
+        If the folder holds no bake, if a needed file is missing or unreadable, or if the manifest contradicts
+        the maps or `scene.glb`.
     """
     folder = Path(folder)
     if folder.name == MANIFEST_NAME:

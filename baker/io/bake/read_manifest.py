@@ -1,7 +1,7 @@
-"""Reads and validates `bake.json` of a finished folder.
+"""Reads `bake.json` of an output folder and validates it.
 
-Its numbers are used as sizes and indices and its names as paths. Therefore the manifest is validated against
-the schema and checked for contradictions first.
+The numbers in a manifest are used as array sizes and indices, and its names as paths. Therefore it is first
+validated against the schema and checked for contradictions.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from baker.core.errors import InputError
 from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 
-# Largest file that is read, bytes; the manifest of a million instances is far smaller.
+# Size above which a manifest is not read, bytes.
 _LONGEST = 1 << 30
-# Largest width and height of a page, texels.
+# Largest accepted width and height of a page, texels.
 _WIDEST = 1 << 16
-# Characters at the beginning and at the end of a long text in messages.
+# Number of characters that a message shows from each end of a long text.
 _SHORT = 60
 
 
@@ -33,8 +33,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Valid by the schema; page numbers of instances and channels exist, nodes and names are unique, every
-        file name is a path inside the folder, numbers are finite.
+        The manifest, valid by the schema. All page numbers exist, no node and no file is named twice, every
+        file name is a path inside the folder, and the numbers of instances are finite.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def _no_number(name: str) -> NoReturn:
 
 def _check_schema(manifest: dict[str, Any]) -> None:
     """Raise ValueError for the first violation of the schema."""
-    # Import here: it is slow, and only needed where a bake is read.
+    # Import here, because importing `jsonschema` is slow and most runs read no manifest.
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match
 
@@ -84,7 +84,7 @@ def _short(text: str) -> str:
 
 
 def _check_consistency(manifest: dict[str, Any]) -> None:
-    """Raise ValueError if parts of a manifest that is valid by the schema contradict each other."""
+    """Raise ValueError if a manifest that is valid by the schema contradicts itself."""
     _finite(manifest["instances"], "instances")
     by_channel: dict[str, list[int]] = {}
     sizes = set()
@@ -111,7 +111,7 @@ def _check_consistency(manifest: dict[str, Any]) -> None:
 
 
 def _finite(value: Any, where: str) -> None:
-    """Raise ValueError if a number exceeds the range of float32."""
+    """Raise ValueError if a number in nested lists and dicts is NaN, or 1e38 or larger in magnitude."""
     queue = [value]
     while queue:
         part = queue.pop()

@@ -1,4 +1,4 @@
-"""Writes a finished bake to its folder: maps, status, scene, manifest."""
+"""Writes a finished bake to its folder: maps, status images, `scene.glb`, exports and `bake.json`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from baker.io.png import encode_palette_png, encode_png, grey_levels
 
 __all__ = ["check_out", "write_bake"]
 
-# Colours that differ in luminance and can be distinguished with red-green colour blindness.
+# Palette colours of `status_<page>.png`, 8-bit sRGB. They differ in luminance and remain distinguishable with
+# red-green colour blindness.
 STATUS_COLOURS = {
     TexelStatus.EMPTY: (16, 16, 16),
     TexelStatus.COVERED: (86, 180, 233),
@@ -32,7 +33,7 @@ STATUS_COLOURS = {
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
 
-# Share of banded texels of a page above which there is a warning; the manifest lists all.
+# Share of a page's surface texels, 0 to 1: a warning is given if more texels are banded.
 BANDED_SHARE = 0.01
 
 
@@ -53,11 +54,11 @@ def write_bake(
     out : Path
         The output folder. A bake there is replaced; files that baker did not write are kept.
     force : bool
-        Also write into a folder that is not a bake.
+        Also write into a folder with files that baker did not write.
     progress : Progress
         Called with stage, fraction and file name after each file; a truthy return value cancels.
     created : datetime or None
-        Time to write into the manifest; None is now.
+        Time to write into the manifest; None uses the current time.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def write_bake(
     Raises
     ------
     SettingsError
-        If `out` may not be written to, see `check_out`.
+        If `check_out` refuses `out`.
     ResourceError
         If the disk is full or not writable; the folder is unchanged.
     Cancelled
@@ -83,7 +84,7 @@ def write_bake(
         message = f"the bake cannot be written ({why}); free some space or name another folder"
         raise ResourceError(message, file=str(out)) from error
     except ResourceError as error:
-        # Name the output folder: the temporary file of the error is removed.
+        # Name the output folder in the message, because the temporary file that the error names is removed.
         raise ResourceError(error.message, file=str(out)) from error
     return manifest
 
@@ -124,7 +125,7 @@ def _write_files(
         created=created,
     )
     _write_manifest(folder.path, manifest)
-    # Exports read the folder, which is complete except for exports.
+    # Write exports last, because exporters read the other files from the folder.
     for name in result.settings.export:
         report(progress, Stage.WRITE, 1.0, f"export {name}")
         manifest["files"] += _write_export(folder.path, name)
@@ -138,7 +139,7 @@ def _write_manifest(folder: Path, manifest: dict[str, Any]) -> None:
 
 
 def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Write an export into a folder of its name; return its files for the manifest."""
+    """Write an export into the subfolder `name`; return an entry {file, sha256} for each of its files."""
     export = EXPORTS.require(name, "export", setting="export")
     target = folder / name
     target.mkdir()
@@ -154,7 +155,7 @@ def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
 def _write_page(
     result: BakeResult, lightmap: Lightmap, page: int, folder: Path
 ) -> tuple[dict[str, Any], list[SceneWarning]]:
-    """Write one page of a channel in all formats; return its manifest entry and the warnings about losses."""
+    """Write one page of a channel in all chosen formats; return its manifest entry and the loss warnings."""
     value, described = lightmap.value[page], lightmap.description
     height, width, _ = value.shape
     header = {
@@ -212,7 +213,7 @@ def encoding_named(name: str) -> Encoding[Any]:
     SettingsError
         If no encoding has this name.
     """
-    # The error message does not list EXR: it is always written, so it is no value of `encode`.
+    # Leave EXR out of the message's list of names: EXR is always written and is no value of `encode`.
     return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 
@@ -237,7 +238,7 @@ def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescri
     names : tuple of str
         Names of encodings.
     channels : mapping of channel to its description
-        All that is baked.
+        The channels of the bake.
 
     Raises
     ------
@@ -256,7 +257,7 @@ def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescri
 
 
 def _loss_warnings(loss: Loss, file: str, channel: str, encoding: Encoding[Any]) -> list[SceneWarning]:
-    """Return a warning for clipped texels, and one if more than `BANDED_SHARE` of the texels are banded."""
+    """Return a warning about clipped texels, and one if the banded share exceeds `BANDED_SHARE`."""
     warnings = []
     if loss.clipped:
         message = f"{file}: {loss.clipped} texels are outside the range of the format and were clipped"

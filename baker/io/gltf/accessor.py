@@ -1,4 +1,4 @@
-"""Reads glTF accessors into arrays: strided, normalised, sparse, or without data (zeros).
+"""Reads glTF accessors into arrays; they may be strided, normalised, sparse, or zeros without a buffer view.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.6.2.
 """
@@ -17,7 +17,7 @@ _DTYPE = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 FLOAT = 5126
 UNSIGNED = (5121, 5123, 5125)
-# Largest count of an accessor without data.
+# Largest `count` accepted for an accessor without a buffer view, elements.
 _MAX_ZEROS = 1 << 26
 
 
@@ -36,12 +36,12 @@ def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...])
     Returns
     -------
     (N, width) float32
-        The elements.
+        The N elements; `width` is the number of components, 1 to 4.
 
     Raises
     ------
     InputError
-        For a type that is not allowed, or data outside its view.
+        If the element type is not allowed, or the data lies outside its buffer view.
     """
     accessor = document.root.children("accessors")[index]
     raw = _rows(document, accessor, types)
@@ -71,7 +71,7 @@ def read_indices(document: GltfDocument, index: int) -> NDArray[np.int64]:
     Raises
     ------
     InputError
-        If the accessor does not hold unsigned scalars, or its data lies outside its view.
+        If the accessor does not hold unsigned scalars, or its data lies outside its buffer view.
     """
     accessor = document.root.children("accessors")[index]
     if accessor.integer("componentType") not in UNSIGNED:
@@ -113,7 +113,7 @@ def _dtype(holder: JsonObject) -> np.dtype[Any]:
 def _strided(
     document: GltfDocument, holder: JsonObject, dtype: np.dtype[Any], count: int, width: int
 ) -> NDArray[Any]:
-    """Return a view (count, width) of the elements, without a copy; raise if they exceed the buffer view."""
+    """Return the elements, (count, width), without copying them; raise if they exceed the buffer view."""
     n_views = len(document.root.children("bufferViews"))
     data, view_offset, length, stride = document.view(holder.index("bufferView", n_views, "bufferViews"))
     offset, element = holder.integer("byteOffset", 0), dtype.itemsize * width

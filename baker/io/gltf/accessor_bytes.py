@@ -18,7 +18,7 @@ _MATRIX = {"MAT2": 2, "MAT3": 3, "MAT4": 4}
 
 
 def element_size(accessor: Json) -> int:
-    """Return the size of an element in bytes; matrix columns start at multiples of four bytes."""
+    """Return the size of an element in bytes; each matrix column is padded to a multiple of four bytes."""
     component = COMPONENT[accessor["componentType"]].itemsize
     if accessor["type"] in _MATRIX:
         side = _MATRIX[accessor["type"]]
@@ -29,7 +29,7 @@ def element_size(accessor: Json) -> int:
 def gather_rows(
     document: Json, buffers: tuple[bytes, ...], index: int, rows: NDArray[np.int32]
 ) -> NDArray[np.uint8]:
-    """Return the bytes of some elements of an accessor, which may be sparse.
+    """Return the bytes of chosen elements of an accessor; the accessor may be sparse.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def gather_rows(
     index : int
         Index of the accessor.
     rows : (N,) int32
-        Numbers of the elements, possibly with repetitions.
+        Indices of the chosen elements; an index may occur more than once.
 
     Returns
     -------
     (N, B) uint8
-        Bytes of each element.
+        The B bytes of each chosen element.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def gather_rows(
 
 
 def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int) -> InputError | None:
-    """Return the error of an accessor that has no `n_rows` readable elements, or None.
+    """Return the error that reading the first `n_rows` elements of an accessor raises, or None.
 
     Parameters
     ----------
@@ -89,10 +89,10 @@ def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int
     Returns
     -------
     InputError or None
-        None if they can be read.
+        None if the elements can be read.
     """
     try:
-        # Read the first and the last element: `_elements` checks the whole range.
+        # Reading the first and last element is enough, because `_elements` checks the range of all bytes.
         gather_rows(document, buffers, index, np.array([0, max(n_rows - 1, 0)], np.int32))
     except InputError as error:
         return error
@@ -102,7 +102,7 @@ def fault_of(document: Json, buffers: tuple[bytes, ...], index: Any, n_rows: int
 def _elements(
     document: Json, buffers: tuple[bytes, ...], view_index: int, offset: int, count: int, size: int
 ) -> NDArray[np.uint8]:
-    """Return a read-only view (count, size) of the elements in a buffer view."""
+    """Return the elements of a buffer view as bytes, (count, size), read-only and without copying them."""
     view = document["bufferViews"][view_index]
     stride = view.get("byteStride", size)
     start = view.get("byteOffset", 0) + offset
@@ -121,7 +121,7 @@ def _substitute(
     rows: NDArray[np.int32],
     data: NDArray[np.uint8],
 ) -> None:
-    """Overwrite the rows of `data` that sparse values replace."""
+    """Overwrite rows of `data` (row i is element `rows[i]`) for which there is a sparse value."""
     sparse: dict[str, Any] = accessor["sparse"]
     count, size = sparse["count"], element_size(accessor)
     dtype = COMPONENT[sparse["indices"]["componentType"]]

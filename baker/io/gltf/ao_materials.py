@@ -1,6 +1,7 @@
-"""Adds the AO pages to materials, and adjusts textures that read a renumbered uv set.
+"""Adds the AO pages to materials as occlusion textures, and updates `texCoord` if a uv set was renumbered.
 
-A material of primitives with different pages or uv sets is copied; existing indices stay valid.
+If primitives that share a material need different pages or uv sets, the material is copied. Copies are
+appended, so existing indices stay valid.
 
 Based on: Khronos Group, glTF 2.0 specification, 5.19 Material; KHR_texture_transform; KHR_materials_variants.
 """
@@ -25,7 +26,7 @@ class BakedUse:
     page : int
         Page of its lightmap.
     moved : int or None
-        New number of the old TEXCOORD_1, if a material reads it.
+        New TEXCOORD number of the uv set that was TEXCOORD_1 in the input; None if it was not renumbered.
     """
 
     primitive: Json
@@ -34,7 +35,7 @@ class BakedUse:
 
 
 def add_ao_textures(packer: Packer, ao_png: dict[int, bytes]) -> dict[int, int]:
-    """Embed the AO pages (PNG by page number), and return the texture index of each page."""
+    """Embed the AO pages, given as PNG by page number, and return the texture index by page number."""
     document = packer.document
     if not ao_png:
         return {}
@@ -52,7 +53,7 @@ def add_ao_textures(packer: Packer, ao_png: dict[int, bytes]) -> dict[int, int]:
 
 
 def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> bool:
-    """Return whether a material of the primitive has a texture on TEXCOORD_1.
+    """Return whether a material of the primitive has a texture that reads TEXCOORD_1.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
     primitive : dict
         A primitive of the document.
     occlusion : bool
-        Whether the occlusion texture counts; False if the baked AO replaces it.
+        Whether to include the occlusion texture; pass False if the baked AO replaces it.
 
     Returns
     -------
@@ -99,14 +100,14 @@ def reads_texture(document: Json, primitive: Json) -> bool:
 
 
 def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int, int]) -> None:
-    """Assign the AO of its page to every baked primitive, with copies of materials where needed.
+    """Add the AO texture to the materials of baked primitives; copy a material if its primitives differ.
 
     Parameters
     ----------
     document : dict
         Changed in place: materials, and the `material` of baked primitives.
     uses : list of BakedUse
-        All baked primitives; the materials of others are not changed.
+        All baked primitives. Other primitives keep their materials unchanged.
     ao_texture : dict of int to int
         Texture index by page; empty if AO was not baked.
     """
@@ -123,7 +124,7 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
                 wanted.setdefault(index, {}).setdefault(need, []).append(holder)
     for index, needs in sorted(wanted.items()):
         pristine = {} if index == _NONE else copy.deepcopy(document["materials"][index])
-        # Change the material itself for the first need, unless a primitive that is not baked uses it, too.
+        # Apply the first change to the material itself, unless another primitive uses it unchanged.
         free = index != _NONE and _UNCHANGED not in needs
         for need in sorted(needs.keys() - {_UNCHANGED}):
             if free:
@@ -141,13 +142,13 @@ _UNCHANGED = (-1, -1)
 
 
 def _names_material(document: Json, index: object) -> bool:
-    """Return whether an index refers to a material; objects that are not baked may be malformed."""
+    """Return whether `index`, which may be any JSON value, is the index of a material."""
     materials = document.get("materials", [])
     return is_index(index) and index < len(materials) and isinstance(materials[index], dict)
 
 
 def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> tuple[int, int]:
-    """Return the change that a use needs of a material: (AO texture or -1, new number of uv set 1 or -1)."""
+    """Return a material's change for one primitive: (AO texture or -1, new number of uv set 1 or -1)."""
     if use is None:
         return _UNCHANGED
     texture = ao_texture.get(use.page, -1)
@@ -169,7 +170,7 @@ def _apply(material: Json, texture: int, moved: int) -> None:
 
 
 def _texcoord(info: Json) -> int:
-    """Return the uv set that a texture reads; KHR_texture_transform takes precedence."""
+    """Return the TEXCOORD number that a texture info reads; KHR_texture_transform takes precedence."""
     transform = info.get("extensions", {}).get("KHR_texture_transform", {})
     return int(transform.get("texCoord", info.get("texCoord", 0)))
 

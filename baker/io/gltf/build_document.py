@@ -1,7 +1,7 @@
-"""Builds a glTF document for a scene of another format.
+"""Builds a glTF document for a scene that was not read from glTF.
 
-Node i is instance i of the scene, in the order of `Instance.node`, followed by the lights. Nodes have world
-matrices, colours are linear, textures are embedded as PNG.
+The nodes are the instances, sorted by `Instance.node`, followed by the lights. Each node is a root, so its
+matrix is its world matrix. Colour factors are linear, and textures are embedded as PNG.
 
 Based on: Khronos Group, glTF 2.0 specification; KHR_lights_punctual, KHR_materials_emissive_strength,
 KHR_texture_transform.
@@ -42,7 +42,7 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     packer : Packer
         The document.
     uses : list of BakedUse
-        Its primitives with lightmap uv.
+        The document's primitives, which all have lightmap uv.
     instance_mesh : list of int
         Index of each instance's mesh in the document.
     """
@@ -91,7 +91,7 @@ def _mirrors(instance: Instance) -> bool:
 
 
 def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
-    """Return the node of an instance, and its mesh, transformed to world space if the node cannot do that."""
+    """Return the node of an instance and its mesh; a sheared mesh is in world space."""
     matrix = np.asarray(instance.world_from_object, np.float64)
     if np.array_equal(matrix, np.eye(4)):
         return {"name": instance.name}, mesh
@@ -99,7 +99,7 @@ def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
     product = linear.T @ linear
     if np.abs(product - np.diag(np.diag(product))).max() <= 1e-6 * np.abs(product).max():
         return {"name": instance.name, "matrix": matrix.T.ravel().tolist()}, mesh
-    # Nodes should not shear, since T R S cannot represent it: transform the mesh to world space.
+    # T R S cannot represent shear, so transform the mesh to world space.
     position = mesh.position.astype(np.float64) @ linear.T + matrix[:3, 3]
     normal = mesh.normal.astype(np.float64) @ np.linalg.inv(linear)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
@@ -140,9 +140,9 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     material : Material
         The material.
     images : dict of int to int
-        Index of each embedded image by the identity of its array; added to.
+        `id` of the pixel array to index of the embedded image; new images are added.
     extensions : set of str
-        Extensions in use; added to.
+        Names of the extensions in use; those of this material are added.
 
     Returns
     -------
@@ -158,7 +158,8 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     if material.base_colour_texture is not None:
         surface["baseColorTexture"] = _texture(packer, material.base_colour_texture, images, extensions)
     if any(material.emission):
-        # Factors are at most 1: normalise, and write the maximum as strength.
+        # `emissiveFactor` must not exceed 1: divide by the largest component, and write it as
+        # emissiveStrength.
         strength = max(1.0, *map(float, material.emission))
         result["emissiveFactor"] = [max(float(v), 0.0) / strength for v in material.emission]
         if strength > 1.0:
@@ -205,7 +206,7 @@ def _texture(packer: Packer, texture: Texture, images: dict[int, int], extension
 
 
 def _texture_transform(matrix: NDArray[np.float64]) -> Json:
-    """Decompose (2, 3) into offset, rotation and scale: the matrix is T R S with R = [[c, s], [-s, c]]."""
+    """Decompose a (2, 3) matrix T R S, with R = [[c, s], [-s, c]], into offset, rotation and scale."""
     (a, b, x), (c, d, y) = matrix.tolist()
     angle = math.atan2(-c, a)
     scale = [math.hypot(a, c), d * math.cos(angle) + b * math.sin(angle)]
@@ -232,6 +233,6 @@ def _turn_from_minus_z(direction: tuple[float, float, float]) -> list[float]:
     x, y, z = (float(v) for v in np.asarray(direction) / np.linalg.norm(direction))
     if z > 1.0 - 1e-12:
         return [0.0, 1.0, 0.0, 0.0]
-    # Half-way quaternion: (u x v, 1 + u.v) with u = (0, 0, -1), normalised.
+    # Half-way quaternion (u x v, 1 + u.v), normalised, with u = (0, 0, -1) and v = `direction`.
     quaternion = np.array([y, -x, 0.0, 1.0 - z])
     return [float(v) for v in quaternion / np.linalg.norm(quaternion)]

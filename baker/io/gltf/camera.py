@@ -16,7 +16,7 @@ from baker.io.gltf.node import Placed
 
 
 def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning]) -> list[Camera]:
-    """Return the perspective cameras of the scene's nodes, in their order; others are left out.
+    """Return the perspective cameras of the scene, in the order of the nodes; other cameras are left out.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[Sc
     document : GltfDocument
         The document.
     warnings : list of SceneWarning
-        A warning is added for each broken camera, since bakes do not use cameras.
+        A warning is added for each broken camera. It is no error, because bakes do not use cameras.
 
     Returns
     -------

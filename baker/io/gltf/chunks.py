@@ -44,12 +44,12 @@ def split_glb(data: bytes, file: str) -> Chunks:
     Returns
     -------
     Chunks
-        The JSON chunk, the first BIN chunk, and others.
+        The JSON chunk, the first BIN chunk, and the chunks of other types.
 
     Raises
     ------
     InputError
-        For another version than 2, and chunks that are truncated, missing or in the wrong order.
+        If the version is not 2, or a chunk is truncated, missing or in the wrong order.
     """
 
     def fail(message: str) -> NoReturn:

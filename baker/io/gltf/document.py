@@ -1,4 +1,4 @@
-"""Opens glTF 2.0 documents: JSON, buffers, and the bytes of images.
+"""Opens glTF 2.0 documents: JSON, buffers, and the bytes of external images.
 
 A buffer or image that cannot be read is an error only when its data is needed.
 
@@ -32,7 +32,7 @@ UNDERSTOOD = frozenset(
         "EXT_texture_webp",
     }
 )
-# Extensions that change neither geometry nor base colour nor emission: they may be ignored.
+# Extensions that are ignored without a warning: they change neither geometry nor base colour nor emission.
 IRRELEVANT = frozenset(
     {
         "KHR_animation_pointer",
@@ -47,9 +47,9 @@ IRRELEVANT = frozenset(
         "KHR_xmp_json_ld",
     }
 )
-# Lists to which the writer of scene.glb may append.
+# Top-level members that must be lists, because the writer of scene.glb may append to them.
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
-# Extensions that are ignored with a warning for each material that has them.
+# Ignored extensions that `material.py` reports for each material, so that `_check_extensions` does not.
 _REPORTED = frozenset({"KHR_materials_transmission"})
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -62,17 +62,17 @@ class GltfDocument:
     ----------
     root : JsonObject
     buffers : tuple of bytes
-        Each truncated to its `byteLength`; those in `buffer_faults` may be shorter.
+        The bytes of each buffer, truncated to `byteLength`; a buffer in `buffer_faults` may be shorter.
     image_files : dict of int to bytes
         Content of the images that have a URI, by image index.
     buffer_faults, image_faults : dict of int to InputError
-        Errors of buffers and image files that cannot be read.
+        By index, the errors of buffers and image files that cannot be read.
     chunks : tuple of (int, bytes)
         Type and content of GLB chunks other than JSON and BIN.
     folder : Path
         Folder that relative URIs refer to.
     sha256 : str
-        Hash of the scene file, then its external buffers, then its external images.
+        SHA-256 of the bytes of the scene file, followed by its external buffers and its external images.
     warnings : tuple of SceneWarning
     """
 
@@ -126,12 +126,12 @@ def open_document(path: Path, data: bytes) -> GltfDocument:
     Returns
     -------
     GltfDocument
-        The document; external files that cannot be read are in its faults.
+        The document; `buffer_faults` and `image_faults` list external files that cannot be read.
 
     Raises
     ------
     InputError
-        For a broken container, malformed JSON, another version than 2.x, or an unknown required extension.
+        For a broken container, malformed JSON, a version other than 2.x, or an unknown required extension.
     """
     file, folder = str(path), path.parent
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
@@ -215,7 +215,7 @@ def _check_extensions(root: JsonObject) -> list[SceneWarning]:
 def _read_buffer(
     buffer: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash
 ) -> tuple[bytes, InputError | None]:
-    """Return the available bytes of a buffer, and the error if they cannot be used."""
+    """Return the available bytes of a buffer, and the error if the buffer cannot be read completely."""
     data = b""
     try:
         length = buffer.integer("byteLength", minimum=1)
@@ -238,7 +238,7 @@ def _read_buffer(
 
 
 def _read_file(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
-    """Return the bytes of `holder`'s "uri"; those of a file are also added to `digest`."""
+    """Return the bytes that `holder`'s "uri" refers to; if they come from a file, add them to `digest`."""
     uri = holder.string("uri")
     try:
         data = read_uri(uri, folder)

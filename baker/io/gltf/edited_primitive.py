@@ -1,4 +1,4 @@
-"""The result of editing a primitive: its vertices in a new order, or a new surface."""
+"""The result of editing a glTF primitive: copies of its old vertices, or new vertices."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class EditedPrimitive:
     Attributes
     ----------
     row : (V,) int64
-        The old vertex that each new vertex is a copy of.
+        For each new vertex, the index of the old vertex that it copies.
     triangle : (T, 3) int64, indices into the new vertices
     normal : (V, 3) float32, unit, object space, or None
-        None keeps the bytes of NORMAL.
+        None copies NORMAL from the old vertices.
     turned : (V,) bool
-        Vertices whose normal was reversed, so that the handedness of their tangent is reversed as well.
+        True for vertices whose normal was reversed; the handedness of their tangent is reversed as well.
     uv : (V, 2) float32 or None
         New TEXCOORD_1; None keeps the old one.
     """
@@ -34,7 +34,7 @@ class EditedPrimitive:
 
 @dataclass(frozen=True)
 class ReplacedPrimitive:
-    """A primitive with new vertices, which have these attributes only.
+    """A primitive with new vertices, which have no attributes except those listed here.
 
     Attributes
     ----------

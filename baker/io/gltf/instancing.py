@@ -1,6 +1,7 @@
-"""Expands EXT_mesh_gpu_instancing: each instance becomes a node, since each has its own texels.
+"""Expands EXT_mesh_gpu_instancing: each instance becomes a node, because each instance has its own texels.
 
-The nodes are appended to the document as children of the node that has the extension; no index changes.
+The new nodes are appended to the document, as children of the node that has the extension. Existing indices
+do not change.
 
 Based on: EXT_mesh_gpu_instancing.
 """
@@ -25,7 +26,7 @@ _MEMBERS = {
 
 
 def spread_instances(document: GltfDocument) -> None:
-    """Replace the extension by child nodes, in the document itself; nodes with broken data keep it.
+    """Replace the extension by child nodes; a node whose instance data is broken keeps the extension.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def refuse_broken(document: GltfDocument, node: JsonObject) -> None:
 
 
 def _members(document: GltfDocument, node: JsonObject) -> list[dict[str, Any]]:
-    """Return the translation, rotation and scale of each instance of a node, as members of nodes."""
+    """For each instance of a node, return a dict with the translation, rotation and scale of a glTF node."""
     extension = node.extension(INSTANCING)
     assert extension is not None
     attributes, accessors = extension.child("attributes"), document.root.children("accessors")
@@ -89,7 +90,7 @@ def _members(document: GltfDocument, node: JsonObject) -> list[dict[str, Any]]:
 
 
 def _count(document: GltfDocument, attributes: JsonObject) -> int:
-    """Return the number of instances that only have application-specific attributes."""
+    """Return the number of instances if all their attributes are application-specific."""
     accessors = document.root.children("accessors")
     for key in attributes.value:
         return accessors[attributes.index(key, len(accessors), "accessors")].integer("count", minimum=1)

@@ -15,11 +15,11 @@ class JsonObject:
     Parameters
     ----------
     value : dict
-        Any other type is an error when a member is read.
+        The members. A value of another type raises an error when a member is read.
     where : str
         Path such as "accessors[3].sparse"; empty for the root.
     file : str
-        The file concerned, for messages.
+        Name of the file, for messages.
     """
 
     def __init__(self, value: Any, where: str, file: str) -> None:
@@ -57,7 +57,7 @@ class JsonObject:
         """Return an integer of at least `minimum`; without a default the member is required."""
         value = self._get(key, default)
         if isinstance(value, float) and value.is_integer():
-            # Store the integer: the writer of the document uses it as an index, too.
+            # Store the integer in the document, because the writer of scene.glb uses it as an index.
             value = self.value[key] = int(value)
         if not isinstance(value, int) or isinstance(value, bool):
             self.fail(f"expected an integer, found {_show(value)}", key)
@@ -68,7 +68,7 @@ class JsonObject:
         return value
 
     def index(self, key: str, count: int, what: str, default: int | None = None) -> int:
-        """Return an index into `count` things called `what` (plural)."""
+        """Return an index below `count`; `what` is the plural noun for the indexed items in messages."""
         value = self.integer(key, default)
         if value >= count:
             self.fail(f"{value} is out of range: the file has {count} {what}", key)
@@ -92,7 +92,7 @@ class JsonObject:
         return tuple(self._number(v, f"{key}[{i}]") for i, v in enumerate(value))
 
     def indices(self, key: str, count: int, what: str) -> list[int]:
-        """Return a list (empty if absent) of indices into `count` things called `what`."""
+        """Return a list of indices below `count` (empty if absent); `what` is the plural noun."""
         value = self.value.get(key, [])
         if not isinstance(value, list):
             self.fail(f"expected a list of integers, found {_show(value)}", key)

@@ -1,7 +1,7 @@
 """Reads KHR_lights_punctual: lights without area, positioned by their nodes.
 
-A light shines along the -Z axis of its node. Its intensity is in the unit of its kind; the node's scale does
-not change intensity and range.
+A light shines along the -Z axis of its node. Its intensity is in candela (point, spot) or lux (directional).
+The scale of the node changes neither intensity nor range.
 
 Based on: Khronos Group, KHR_lights_punctual.
 """
@@ -18,8 +18,9 @@ from baker.core.scene import PunctualLight, SceneWarning
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed
 
-# Smallest length of the transformed axis, as a share of the largest singular value of the node's matrix.
-# Below it the direction is rounding noise, since exporters write single precision.
+# Length of the node's -Z axis in world space, divided by the largest singular value of the node's matrix: a
+# spot or directional light below it is left out. Its direction would be rounding noise, because exporters
+# write single precision.
 _FLATTEST = 1e-6
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -43,7 +44,7 @@ def read_light(
     Returns
     -------
     PunctualLight or None
-        In world space; None if the node's matrix maps its direction to 0.
+        The light in world space; None if the node's matrix maps its direction to almost 0.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def read_light(
 
 
 def _axis(node: Placed) -> tuple[NDArray[np.float64], float]:
-    """Return the node's -Z axis in world space, unit, and its length over the largest singular value."""
+    """Return the node's unit -Z axis in world space, and its unnormalised length / largest singular value."""
     linear = node.matrix[:3, :3]
     # Divide by the largest element, so that squares neither overflow nor underflow.
     linear = linear / max(float(np.abs(linear).max()), _TINY)

@@ -1,6 +1,7 @@
 """Reads glTF materials: base colour, emission, metallic and roughness, sidedness, alpha, and textures.
 
-uv_image = T R S uv, KHR_texture_transform; L = emissiveFactor x texture x emissiveStrength.
+A texture is read at `T R S uv` (KHR_texture_transform). The emitted radiance is `emissiveFactor x texture x
+emissiveStrength`, cd/m2.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9; KHR_texture_transform; KHR_materials_unlit.
 """
@@ -21,7 +22,7 @@ from baker.io.gltf.unread import image_bytes, unreadable_textures
 from baker.io.images import decode_image
 
 DEFAULT_MATERIAL = Material(name="default")
-# Number of TEXCOORD sets that are read.
+# Number of TEXCOORD sets that are read: TEXCOORD_0 to TEXCOORD_15.
 MAX_TEXCOORDS = 16
 _WRAP = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 # Values of a sampler's magFilter.
@@ -30,7 +31,7 @@ _ALPHA = ("OPAQUE", "MASK", "BLEND")
 
 
 class MaterialReader:
-    """Reads the materials of a file when a surface needs them.
+    """Reads the materials of a file, each at the first call of `need` for it.
 
     Parameters
     ----------
@@ -42,11 +43,11 @@ class MaterialReader:
     Attributes
     ----------
     materials : list of Material
-        In the file's order. Those that no surface has needed so far have default values.
+        In the file's order. A material for which `need` was not called has default values.
     warnings : list of SceneWarning
         Warnings about the materials that were read.
     reported : set of int
-        Images that these warnings name.
+        Indices of the images that these warnings name.
     """
 
     def __init__(self, document: GltfDocument, *, reflections: bool = False) -> None:
@@ -60,7 +61,7 @@ class MaterialReader:
         self.reported: set[int] = set()
 
     def need(self, number: int) -> Material:
-        """Return a material; the number after the last one is glTF's default material.
+        """Return a material; the number of materials in the file stands for glTF's default material.
 
         Raises
         ------
@@ -85,7 +86,7 @@ class MaterialReader:
             material.fail("a colour factor is negative")
         factor = material.extension("KHR_materials_emissive_strength")
         strength = factor.number("emissiveStrength", 1.0, low=0.0) if factor is not None else 1.0
-        # The base colour of an unlit material is taken as its reflectance; it emits nothing.
+        # An unlit material reflects its base colour and emits nothing.
         strength = 0.0 if unlit else strength
         mode = material.string("alphaMode", "OPAQUE")
         if mode not in _ALPHA:
@@ -130,7 +131,7 @@ class MaterialReader:
 
 
 def _name(material: JsonObject, number: int) -> str:
-    """Return the name of a material, the default name if it is malformed."""
+    """Return the name of a material, or `material_<number>` if its name is malformed."""
     try:
         return material.string("name", f"material_{number}")
     except InputError:
@@ -176,12 +177,12 @@ def texture_transform(
     Returns
     -------
     (2, 3) float64
-        Image uv from mesh uv.
+        The matrix that maps mesh uv to image uv.
 
     Notes
     -----
-    The text of the extension, its example of a rotated quadrant and its test model agree on
-    u' = u cos + v sin, v' = -u sin + v cos; its GLSL code, read as column-major, rotates the other way.
+    The text of the extension, its example of a rotated quadrant and its test model agree on u' = u cos + v
+    sin, v' = -u sin + v cos. The GLSL code in its text, read as column-major, rotates the other way.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     return np.array(
@@ -190,7 +191,7 @@ def texture_transform(
 
 
 def _sampler(document: GltfDocument, texture: JsonObject) -> tuple[tuple[str, str], bool]:
-    """Return the wrap modes along u and v, and whether magnification takes the nearest texel."""
+    """Return the wrap modes along u and v, and whether magnification uses nearest-texel filtering."""
     if "sampler" not in texture:
         return ("repeat", "repeat"), False
     samplers = document.root.children("samplers")

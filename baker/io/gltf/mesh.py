@@ -1,7 +1,7 @@
 """Reads the primitives of a glTF mesh: triangles, strips and fans, with or without indices.
 
-Positions are in object space, with the winding of the file. A node whose matrix has a negative determinant
-reverses the winding in world space (glTF 2.0, section 3.7.4), see `core.geometry`.
+Positions are in object space, and triangles have the winding of the file. A node whose matrix has a negative
+determinant reverses the winding in world space (glTF 2.0, section 3.7.4); `core.geometry` does that.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def read_primitives(
     materials : MaterialReader
         Reads the materials of the primitives.
     lenient : bool
-        Accept indices out of range.
+        Accept indices out of range, and also read the attributes that baking does not use.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def _primitive(
 
 
 def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) -> NDArray[np.uint8] | None:
-    """Return the bytes of all other attributes, (V, B) uint8, or None if there are none."""
+    """Return the bytes of the attributes that `_primitive` does not read, (V, B) uint8, or None."""
     known = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in range(MAX_TEXCOORDS))}
     root = document.root.value
     row = np.arange(n_vertices, dtype=np.int32)
@@ -242,7 +242,7 @@ def triangles_of(corner: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     corner : (N,) int64
         Vertex of each corner, in the order of the file.
     mode : int
-        4 triangles, 5 strip, 6 fan. Spare corners at the end of mode 4 are left out.
+        4 triangles, 5 strip, 6 fan. In mode 4, one or two corners left over at the end are dropped.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def triangles_of(corner: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
         return corner[: n - n % 3].reshape(-1, 3)
     i = np.arange(max(0, n - 2))
     if mode == _STRIP:
-        # Reverse every second triangle of a strip.
+        # Reverse every second triangle of a strip, so that all triangles have the same winding.
         odd = i % 2
         return np.stack([corner[i], corner[i + 1 + odd], corner[i + 2 - odd]], axis=1)
     return np.stack([corner[i + 1], corner[i + 2], np.full(len(i), corner[0] if n else 0)], axis=1)

@@ -14,7 +14,7 @@ from baker.io.gltf.json import JsonObject
 
 @dataclass(frozen=True)
 class Placed:
-    """A node of the chosen scene.
+    """A node of the loaded scene, with its world matrix.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Placed:
 
 
 def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Placed]:
-    """Return all nodes below `roots`, parents first, in the file's order of children.
+    """Return `roots` and all nodes below them: parents before children, children in the file's order.
 
     Nodes that KHR_node_visibility hides are left out together with their descendants.
 
@@ -76,7 +76,7 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
 def _refuse_second_parent(
     nodes: Sequence[JsonObject], parent: dict[int, int | None], index: int, above: int | None
 ) -> NoReturn:
-    """Raise for a node that is reached twice: nodes form a cycle, or two nodes have it as a child."""
+    """Raise for a node that is reached twice, either through a cycle or because it has two parents."""
     ring: list[int] = []
     at = above
     while at is not None:
@@ -93,7 +93,7 @@ def _refuse_second_parent(
 
 
 def local_matrix(node: JsonObject) -> NDArray[np.float64]:
-    """Return a node's local matrix, from `matrix` or from T R S.
+    """Return a node's local matrix, from `matrix` or from translation, rotation and scale.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def local_matrix(node: JsonObject) -> NDArray[np.float64]:
     Returns
     -------
     (4, 4) float64
-        Parent from node.
+        The matrix that maps node space to the parent's space.
 
     Raises
     ------
     InputError
-        For a rotation of no length, or a matrix that is not affine.
+        If the length of the rotation quaternion is outside 1e-6 to 1e6, or the matrix is not affine.
     """
     if "matrix" in node:
         matrix = np.array(node.numbers("matrix", 16), np.float64).reshape(4, 4).T

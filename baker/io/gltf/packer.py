@@ -1,7 +1,7 @@
 """Packs a glTF document and all its data into one GLB file.
 
-Accessors and buffer views keep their index, because unknown extensions may refer to them. Entries of replaced
-data are free; new data takes free entries first.
+Accessors and buffer views keep their indices, because unknown extensions may refer to them. New accessors and
+views first reuse the list entries of replaced data, then they are appended.
 
 Based on: Khronos Group, glTF 2.0 specification, 3.6 Binary Data Storage and 4 GLB File Format.
 """
@@ -41,12 +41,12 @@ _NO_DATA = (
 
 
 def is_index(value: object) -> TypeGuard[int]:
-    """Return whether a JSON value may be an index."""
+    """Return whether a JSON value is a non-negative integer."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 def objects(document: Json, key: str) -> Iterator[tuple[int, Json]]:
-    """Yield the objects in the list under `key` with their indices; skip anything malformed."""
+    """Yield the objects in the list under `key` with their indices; skip elements that are no objects."""
     items = document.get(key)
     if isinstance(items, list):
         yield from ((number, item) for number, item in enumerate(items) if isinstance(item, dict))
@@ -58,13 +58,14 @@ class Packer:
     Parameters
     ----------
     document : dict
-        glTF JSON; changed in place. Its primitives no longer refer to the accessors in `replaced`.
+        glTF JSON; changed in place. Rewritten primitives must no longer refer to the accessors in `replaced`.
     buffers : tuple of bytes
         The buffers of the document.
     replaced : set of int
-        Accessors that primitives used before; those that nothing else may use are dropped.
+        Accessors that the rewritten primitives used before. Those that nothing else in the document may refer
+        to are dropped.
     missing : set of int
-        Buffers that cannot be read: they stay in the document, after the single buffer.
+        Indices of buffers that cannot be read. Their entries stay in the document, after the single buffer.
 
     Attributes
     ----------
@@ -98,7 +99,7 @@ class Packer:
         return _place(self._views, self._free_views, view)
 
     def add_rows(self, rows: NDArray[np.uint8], like: Json, *, bounds: bool = False) -> int:
-        """Add a vertex attribute and return its accessor.
+        """Add a vertex attribute and return the index of its accessor.
 
         Parameters
         ----------
@@ -131,10 +132,10 @@ class Packer:
         return self.add_rows(data.view(np.uint8).reshape(len(data), -1), like, bounds=bounds)
 
     def add_indices(self, triangle: NDArray[np.integer[Any]]) -> int:
-        """Add triangle corners (T, 3) in the smallest type that all engines read; return the accessor.
+        """Add triangle corners (T, 3) as 16-bit or 32-bit indices, and return the index of the accessor.
 
-        8-bit indices are valid but slow or unsupported in current graphics APIs. The highest value of a type
-        is the primitive restart index, so 16-bit indices are used up to 65534.
+        8-bit indices are valid but slow or unsupported in current graphics APIs. The 16-bit index 65535 means
+        primitive restart, so 16-bit indices are used only up to 65534.
         """
         kind = 5123 if int(triangle.max(initial=0)) < 65535 else 5125
         data = triangle.ravel().astype(COMPONENT[kind]).tobytes()
@@ -147,7 +148,7 @@ class Packer:
         Raises
         ------
         ResourceError
-            If it is too large for the format.
+            If the file would have 4 GiB or more.
         """
         _tidy(self._accessors, self._free_accessors, {"componentType": 5126, "count": 1, "type": "SCALAR"})
         _tidy(self._views, self._free_views, {"buffer": 0, "byteOffset": 0, "byteLength": 4})
@@ -180,7 +181,7 @@ class Packer:
         return struct.pack("<III", 0x46546C67, 2, total) + b"".join(parts)
 
     def _add(self, data: bytes, accessor: Json, keys: Json) -> int:
-        """Add an accessor with a new view, or return the index of an equal one added before."""
+        """Add an accessor with a new view; if an equal one was added before, return the index of that one."""
         name = (hashlib.sha256(data).digest(), json.dumps([accessor, keys], sort_keys=True))
         if name not in self._cache:
             view = self.add_bytes(data, **keys)
@@ -224,7 +225,7 @@ def primitive_accessors(primitive: Json) -> Iterator[int]:
 
 
 def _bounds(rows: NDArray[np.uint8], dtype: np.dtype[Any]) -> Json:
-    """Return the accessor's min and max; nothing if a value is not finite, which JSON cannot represent."""
+    """Return min and max of an accessor; return {} if a value is not finite, which JSON cannot represent."""
     values = np.ascontiguousarray(rows).view(dtype)
     if not len(values) or not np.isfinite(values).all():
         return {}
@@ -242,7 +243,7 @@ def _place(items: list[Json], free: list[int], item: Json) -> int:
 
 
 def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
-    """Remove free entries from the end of the list, and set the remaining ones to `blank`."""
+    """Remove free entries from the end of the list, and overwrite all other free entries with `blank`."""
     while free and free[-1] == len(items) - 1:
         free.pop()
         items.pop()
@@ -251,7 +252,7 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 
 
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
-    """Return the replaced accessors, and the views of these, that nothing else may refer to."""
+    """Return the replaced accessors that nothing else may refer to, and their views that are then unused."""
     used: set[int] = set()
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
@@ -311,15 +312,17 @@ def _numbers(node: Any, collect: bool) -> Iterator[int]:
 def _merge(
     views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
 ) -> tuple[list[bytes], int]:
-    """Concatenate all buffers without the bytes that only free views cover, and adjust the views.
+    """Concatenate all buffers without the bytes that only free views cover; return the chunks and their
+    length.
 
-    Missing buffers follow the concatenated one; their views are adjusted as well.
+    The views are changed in place: `buffer` becomes 0 and `byteOffset` is updated. Missing buffers get the
+    indices 1, 2, ..., which are written to their views.
     """
     gone = set(free)
     chunks: list[bytes] = []
     length = 0
     holders = [(index, view) for index, view in enumerate(views) if isinstance(view, dict)]
-    # Extensions of compressed views refer to bytes of a buffer as well.
+    # The compression extensions of views have `buffer` and `byteOffset` as well, so update them like views.
     holders += [
         (-1, extension)
         for _, view in holders

@@ -1,7 +1,7 @@
 """Reads the vertices of glTF primitives as bytes, and finds the primitives that must not be rewritten.
 
-A primitive is rewritten only if all its data is known, so that its vertices can be reordered, and nothing
-else in the file depends on their order.
+A primitive is rewritten only if all its vertex data can be reordered and nothing else in the file depends on
+the order of its vertices.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mes
 
 
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
-    """Return the bytes of each vertex attribute of a primitive, for comparison.
+    """Return the bytes of each vertex attribute of a primitive, so that vertices can be compared.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     Returns
     -------
     dict of str to (V, B) uint8
-        The bytes of the file by name of the attribute, except that -0 in floats is replaced by 0. An
-        attribute with fewer elements than POSITION is left out.
+        Attribute name to the bytes of its V elements. In float attributes of glTF itself (no leading `_`), -0
+        is replaced by 0. An attribute with fewer elements than POSITION is left out.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
     Returns
     -------
     str
-        The end of a sentence; empty if it may be rewritten.
+        The end of a sentence, such as "it is skinned"; empty if the primitive may be rewritten.
     """
     document = source.json
     holder = document["meshes"][mesh]

@@ -1,6 +1,6 @@
 """Poses skinned meshes by the joint matrices of the file; the matrix of the mesh's own node does not apply.
 
-world position = sum over joints of weight x joint's world matrix x inverse bind matrix x position
+world position = sum over joints of (weight x world matrix of the joint x inverse bind matrix) x position
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.7.3.
 """
@@ -21,9 +21,10 @@ from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed, local_matrix
 
-# Largest number of sets of four joints of a vertex.
+# Number of attribute sets JOINTS_k / WEIGHTS_k that are read; each has four joints for each vertex.
 _MAX_SETS = 4
-# Ratio of distance from the world's origin to size above which a posed mesh gets an object space of its own.
+# Largest coordinate of the centre of a posed mesh's bounding box / longest edge of the box. Above this ratio,
+# positions are stored relative to the centre, and the matrix of the mesh contains the translation.
 _FAR = 8.0
 
 
@@ -44,9 +45,9 @@ class Poser:
         ----------
         mesh : JsonObject
         arrays : sequence of SourcePrimitive
-            As `read_primitives` returns them.
+            The primitives of the mesh, as `read_primitives` returns them.
         node : Placed
-            Refers to the skin; its matrix applies to primitives without joints.
+            The node with the mesh and the skin. Its matrix applies only to primitives without joints.
 
         Raises
         ------
@@ -121,7 +122,7 @@ class Poser:
     def _blend(
         self, primitive: JsonObject, matrices: NDArray[np.float64], n_vertices: int
     ) -> NDArray[np.float64]:
-        """Return each vertex's matrix, (V, 4, 4) float64."""
+        """Return the weighted sum of joint matrices for each vertex, (V, 4, 4) float64."""
         attributes = primitive.child("attributes")
         accessors = self._document.root.children("accessors")
         joints: list[NDArray[np.float64]] = []
@@ -138,7 +139,7 @@ class Poser:
         joint, weight = np.concatenate(joints, axis=1).astype(np.int64), np.concatenate(weights, axis=1)
         weight = np.nan_to_num(weight, nan=0.0, posinf=0.0, neginf=0.0)
         total = weight.sum(axis=1, keepdims=True)
-        # A vertex without weights follows its first joint.
+        # A vertex without positive weights gets weight 1 for its first joint.
         weight = np.where(total > 0, weight / np.where(total > 0, total, 1.0), np.eye(1, weight.shape[1]))
         joint = np.where(weight != 0, joint, 0)
         if len(joint) and joint.max() >= len(matrices):
@@ -152,14 +153,14 @@ class Poser:
 def _moved(
     part: SourcePrimitive, blend: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32] | None]:
-    """Return positions in the world, (V, 3) float64, and normals, (V, 3) float32 or None."""
+    """Return world positions, (V, 3) float64, and world normals of any length, (V, 3) float32 or None."""
     with np.errstate(over="ignore", invalid="ignore"):
         position = (
             np.einsum("vij,vj->vi", blend[:, :3, :3], part.position.astype(np.float64)) + blend[:, :3, 3]
         )
         if part.normal is None:
             return position, None
-        # Transform normals by the cofactor matrix, without division by a determinant that may be 0.
+        # Transform normals by the cofactor matrix: unlike the inverse, it exists if the determinant is 0.
         a, b, c = (blend[:, :3, k] for k in range(3))
         cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)
         normal = np.einsum("vij,vj->vi", cofactor, part.normal.astype(np.float64))

@@ -1,7 +1,7 @@
 """Reads the base colour of a glTF material: metallic-roughness, specular-glossiness, or neither.
 
-base colour = baseColorFactor x baseColorTexture, or diffuseFactor x diffuseTexture where the material has
-KHR_materials_pbrSpecularGlossiness, which takes precedence over pbrMetallicRoughness.
+The base colour is `baseColorFactor x baseColorTexture`. With KHR_materials_pbrSpecularGlossiness, which takes
+precedence over pbrMetallicRoughness, it is `diffuseFactor x diffuseTexture`.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9.2; KHR_materials_pbrSpecularGlossiness.
 """
@@ -14,10 +14,11 @@ from baker.core.scene import SceneWarning
 from baker.io.gltf.document import IRRELEVANT, UNDERSTOOD
 from baker.io.gltf.json import JsonObject
 
-# Albedo of a material of an unknown model.
+# Albedo of a material whose reflection model is unknown, 0 to 1.
 UNKNOWN_ALBEDO = 0.5
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-# Extensions that extend pbrMetallicRoughness: a material with them and without base colour is white.
+# Extensions that add to pbrMetallicRoughness. A material with no other extensions and no base colour is
+# white, the default of glTF.
 _LAYERS = (
     UNDERSTOOD
     | IRRELEVANT
@@ -39,13 +40,13 @@ _LAYERS = (
 
 
 class Surface(NamedTuple):
-    """Base colour and reflection of a material.
+    """Base colour, metallic and roughness of a material.
 
     Attributes
     ----------
     colour : (4,) tuple, linear RGB and alpha
     holder : JsonObject
-        The object with the base colour texture.
+        The JSON object that contains the base colour texture, if there is one.
     texture : str
         Key of the texture in that object.
     metallic, roughness : float
@@ -59,7 +60,7 @@ class Surface(NamedTuple):
 
 
 def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) -> Surface:
-    """Read base colour and reflection of a material; an unknown model gets albedo 0.5 and a warning.
+    """Read base colour, metallic and roughness; an unknown reflection model gets albedo 0.5 and a warning.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
     name : str
         Its name, for the warning.
     warnings : list of SceneWarning
-        A warning is added for a material of an unknown model.
+        A warning is added if the reflection model is unknown.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Warnings about data of a glTF file that is missing or broken and not needed for baking.
 
-Examples are normal maps and unused files. They do not stop a bake, but are missing where `scene.glb` is
-shown.
+Examples are normal maps and unused files. They do not stop a bake, but they are missing when another program
+displays `scene.glb`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from baker.core.scene import SceneWarning
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 
-# First bytes of the image formats of glTF and its extensions, and of others that loaders accept.
+# First bytes of PNG, JPEG, WebP, KTX2, DDS, Basis, BMP, GIF and TIFF files.
 _HEADS = (
     b"\x89PNG", b"\xff\xd8\xff", b"RIFF", b"\xabKTX", b"DDS ", b"sB", b"BM", b"GIF8", b"II*\0", b"MM\0*",
 )  # fmt: skip
@@ -54,7 +54,7 @@ def image_bytes(document: GltfDocument, number: int) -> bytes:
 def unreadable_textures(
     document: GltfDocument, material: JsonObject, name: str, read: Set[tuple[str, str]], reported: set[int]
 ) -> list[SceneWarning]:
-    """Return a warning for each texture of a material that is not read for baking and cannot be read.
+    """Among the textures of a material that baking does not use, return a warning for each unreadable one.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def unreadable_textures(
     name : str
         Its name.
     read : set of (str, str)
-        Path of the holder and key of the textures that are read for baking.
+        The textures that are read for baking, each as (path of the JSON object that contains it, its key).
     reported : set of int
-        Indices of the images that the warnings name are added.
+        Indices of images; those that the warnings name are added.
 
     Returns
     -------
     list of SceneWarning
-        Code `missing-texture`.
+        Warnings with the code `missing-texture`.
     """
     found = []
     for holder, key in _texture_infos(material):
@@ -99,12 +99,12 @@ def unneeded_faults(document: GltfDocument, reported: Set[int]) -> list[SceneWar
     document : GltfDocument
         The document, after all data for baking is read.
     reported : set of int
-        Images that other warnings name.
+        Indices of images that other warnings name already.
 
     Returns
     -------
     list of SceneWarning
-        Code `missing-file`.
+        Warnings with the code `missing-file`.
     """
     images = {k: fault for k, fault in document.image_faults.items() if k not in reported}
     found = []
@@ -116,7 +116,7 @@ def unneeded_faults(document: GltfDocument, reported: Set[int]) -> list[SceneWar
 
 
 def _texture_infos(holder: JsonObject) -> Iterator[tuple[JsonObject, str]]:
-    """Yield the texture references of a material and its extensions, as holder and key."""
+    """Yield (holder, key) of each texture of a material; `holder.child(key)` is the texture info."""
     for key, value in holder.value.items():
         if key == "extras" or not isinstance(value, dict):
             continue
@@ -127,7 +127,7 @@ def _texture_infos(holder: JsonObject) -> Iterator[tuple[JsonObject, str]]:
 
 
 def _check_texture(document: GltfDocument, info: JsonObject) -> None:
-    """Raise `InputError` if the texture's image is missing, truncated, or no image by its first bytes."""
+    """Raise `InputError` if the texture's image is missing or truncated, or starts like no known format."""
     textures, images = document.root.children("textures"), document.root.children("images")
     texture = textures[info.index("index", len(textures), "textures")]
     extensions = texture.child_or_empty("extensions")

@@ -10,7 +10,7 @@ import binascii
 from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
-# Characters of a URI that a message shows.
+# Number of characters of a URI that a message shows.
 _LONGEST = 80
 _URL_SAFE = bytes.maketrans(b"-_", b"+/")
 
@@ -63,7 +63,7 @@ def read_uri(uri: str, folder: Path) -> bytes:
 
 def file_names(uri: str) -> list[str]:
     """Return the file names that a URI may refer to, the most likely first."""
-    # Try the literal name as well: some exporters do not encode % signs.
+    # Try the undecoded name as well, because some exporters do not encode % signs.
     names = [unquote(uri), uri]
     return list(dict.fromkeys([*names, *(name.replace("\\", "/") for name in names)]))
 

@@ -1,6 +1,6 @@
-"""Writes a baked scene as GLB: the input with TEXCOORD_1 and AO, otherwise unchanged.
+"""Writes a baked scene as GLB: the input document plus lightmap uv (TEXCOORD_1) and AO textures.
 
-All indices of the input stay valid: nodes, meshes, materials, accessors. New objects are appended.
+The indices of the input's nodes, meshes, materials and textures stay valid; new ones are appended.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class _Piece:
     uv : (V, 2) float32, lightmap uv
     triangle : (T, 3) int64
     kept : bool
-        Whether the primitive has this uv already and is not rewritten.
+        Whether TEXCOORD_1 of the primitive equals `uv` already, so that the primitive is not rewritten.
     """
 
     primitive: Json
@@ -108,7 +108,7 @@ def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None)
 def _rewrite(
     scene: Scene, source: SourceDocument, atlas: Atlas, *, ao: bool
 ) -> tuple[Packer, list[BakedUse], list[int]]:
-    """Return the source's document with lightmap uv, without AO, its baked primitives and instance meshes."""
+    """Return a copy of the source document with lightmap uv, its baked primitives and the instance meshes."""
     document = copy.deepcopy(source.json)
     _decompress_views(document, source)
     instance_mesh = _own_meshes(document, source.json, scene.instances)
@@ -145,7 +145,7 @@ def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -
     """Assign a separate mesh to every baked node, and return the mesh index of each instance.
 
     The first instance of a mesh keeps its index; the others get appended copies. If a node that is not baked
-    (in another scene) uses the mesh, all baked instances get copies.
+    (for example in another scene) uses the mesh, all baked instances get copies.
     """
     baked = {instance.node for instance in instances}
     if len(baked) < len(instances):
@@ -165,7 +165,7 @@ def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -
 
 
 def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[Json]) -> list[_Piece]:
-    """Split an instance's lightmap mesh by source primitive."""
+    """Split the lightmap mesh of an instance into one piece for each source primitive."""
     pieces = []
     for number in np.unique(mesh.primitive).tolist():
         used, corner = np.unique(layout.triangle[mesh.primitive == number], return_inverse=True)
@@ -179,7 +179,7 @@ def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[
 
 
 def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *, ao: bool) -> int | None:
-    """Write a primitive's vertices in lightmap order; return the new set number of an old TEXCOORD_1."""
+    """Write the vertices in lightmap order; return the new number of an old TEXCOORD_1, or None."""
     attributes = dict(piece.source["attributes"])
     moved = None
     old = attributes.pop("TEXCOORD_1", None)
@@ -199,7 +199,7 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
             if name in ("POSITION", "NORMAL", "COLOR_0"):
                 raise
     written["TEXCOORD_1"] = packer.add_floats(piece.uv)
-    # glTF requires consecutive numbers of the sets: without TEXCOORD_0 write the lightmap uv twice.
+    # TEXCOORD numbers must be consecutive: if there is no TEXCOORD_0, use the lightmap uv for it as well.
     written.setdefault("TEXCOORD_0", written["TEXCOORD_1"])
     piece.primitive["attributes"] = written
     piece.primitive["indices"] = packer.add_indices(piece.triangle)
@@ -232,7 +232,7 @@ def _rewrite_accessor(
 def _rewrite_target(
     packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], name: str
 ) -> int:
-    """Write an attribute of a morph target; zeros if it cannot be read."""
+    """Write an attribute of a morph target; write zeros if it cannot be read."""
     bounds = name == "POSITION"
     try:
         return _rewrite_accessor(packer, source, index, row, bounds, False)
@@ -241,7 +241,7 @@ def _rewrite_target(
 
 
 def _decompress_views(document: Json, source: SourceDocument) -> None:
-    """Remove meshopt compression from the views that have an uncompressed fallback buffer."""
+    """Remove the meshopt extension from views whose buffer contains the uncompressed data."""
     for _, view in objects(document, "bufferViews"):
         for name in _COMPRESSED_VIEW:
             if name in view.get("extensions", {}):
@@ -265,7 +265,7 @@ def embed_images(packer: Packer, source: SourceDocument) -> None:
     packer : Packer
         The document; changed in place.
     source : SourceDocument
-        The document that it was copied from.
+        The document that `packer.document` was copied from.
 
     Raises
     ------
@@ -294,7 +294,7 @@ def _mime_type(data: bytes) -> str | None:
 
 
 def _write_version(document: Json) -> None:
-    """Write the version to `asset.extras.baker`, if extras is an object."""
+    """Write the version of baker to `asset.extras.baker`, unless `extras` exists and is no object."""
     extras = document.setdefault("asset", {"version": "2.0"}).setdefault("extras", {})
     if isinstance(extras, dict):
         extras["baker"] = {"version": version("baker")}

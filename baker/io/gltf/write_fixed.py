@@ -18,14 +18,14 @@ from baker.io.gltf.write_baked import embed_images
 def write_fixed(
     source: SourceDocument, edits: Mapping[tuple[int, int], EditedPrimitive | ReplacedPrimitive]
 ) -> bytes:
-    """Return the document with edited primitives as GLB.
+    """Return a copy of the document with edited or replaced primitives, as GLB.
 
     Parameters
     ----------
     source : SourceDocument
         The document; not changed.
     edits : mapping of (int, int) to EditedPrimitive or ReplacedPrimitive
-        New primitives by index of the mesh and of the primitive in the mesh.
+        (index of the mesh, index of the primitive in the mesh) to the new primitive.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def _rewrite(
     if new.uv is not None:
         own["TEXCOORD_1"] = new.uv
         if "TEXCOORD_0" not in old["attributes"]:
-            # glTF requires consecutive numbers of the sets.
+            # TEXCOORD numbers must be consecutive, so write the uv as TEXCOORD_0 as well.
             own["TEXCOORD_0"] = new.uv
     row = new.row.astype(np.int32)
     attributes = {}
@@ -99,14 +99,14 @@ def _replace(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
 
 
 def _turn_handedness(data: NDArray[np.uint8], accessor: Json, turned: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Negate w of tangents (V, B) whose normals were reversed (V,), which keeps their bitangents.
+    """Negate w of the tangents, (V, B) bytes, whose normals were reversed; their bitangents stay the same.
 
     The bitangent is cross(normal, tangent.xyz) * tangent.w (glTF 2.0, section 3.7.2.1).
     """
     tangent = (
         np.ascontiguousarray(data).view(COMPONENT[accessor["componentType"]]).reshape(len(data), 4).copy()
     )
-    # Replace the lowest integer, which has no negative, by the next one; both have the same normalised value.
+    # The lowest integer has no negative: replace it by the next one, which has the same normalised value.
     lowest = -1.0 if tangent.dtype.kind == "f" else -np.iinfo(tangent.dtype).max
     tangent[turned, 3] = -np.maximum(tangent[turned, 3], lowest)
     return tangent.view(np.uint8).reshape(len(data), -1)

@@ -1,7 +1,7 @@
-"""Writes a scene of another format as GLB with all its triangles, including invalid ones.
+"""Writes a scene that was not read from glTF as GLB, with all its triangles, including invalid ones.
 
-So repairs of glTF files apply to it as well. Colour, emission, transparency and their textures are written;
-data that the importer does not read (bump maps, reflection) is lost.
+The repairs of glTF files can then be applied to that GLB. Base colour, emission, alpha and their textures are
+written. Data that the importer does not read (bump maps, reflection) is lost.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Plugins: one scene format a file."""
+"""Importer plugins: each file reads one scene format."""

@@ -1,6 +1,6 @@
 """Imports glTF 2.0 scenes (.glb, .gltf): nodes, instances, lights.
 
-world_from_object = product of the node matrices from the root down; M = T R S.
+`world_from_object` is the product of the local matrices `T R S` from the root node down to the node.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctual.
 """
@@ -30,24 +30,24 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.build import build_mesh
 from baker.topology.triangle_check import LARGEST_COORDINATE
 
-# Smallest ratio of the singular values of a node's matrix; below it the mesh is flat.
+# Smallest / largest singular value of a node's matrix: below this ratio the instance is left out as flat.
 _FLATTEST = 1e-7
 
-# Mesh, and node if it is skinned.
+# Index of the mesh; index of the node if the node has a skin, else None.
 _Key = tuple[int, int | None]
 
 
 @dataclass(frozen=True)
 class _Built:
-    """A mesh of the file, posed if it has a skin.
+    """A mesh of the file; if its node has a skin, in the pose of the skin.
 
     Attributes
     ----------
-    number : int, index of the source mesh
-    mesh : int or None, index of the mesh that is baked
+    number : int, index of `source` in the meshes of the source scene
+    mesh : int or None, index in the meshes of the scene; None without a valid triangle
     source : SourceMesh
-    extent : (3,) float64, largest absolute coordinate of that mesh along each axis
-    world_from_posed : (4, 4) float64 or None
+    extent : (3,) float64, largest absolute object-space coordinate along each axis
+    world_from_posed : (4, 4) float64, or None without a skin
     """
 
     number: int
@@ -65,7 +65,7 @@ def import_gltf(source: SceneFile) -> Scene:
     Parameters
     ----------
     source : SceneFile
-        `up` and `scale` do not apply: glTF is +Y up and in metres.
+        The file. `up` and `scale` have no effect, because glTF is +Y up and in metres.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def import_gltf(source: SceneFile) -> Scene:
 def _choose_scene(
     document: GltfDocument, asked: int | None, warnings: list[SceneWarning], *, lenient: bool
 ) -> tuple[int | None, list[Placed]]:
-    """Return the number of the chosen scene (None if the file has none) and its nodes."""
+    """Return the index of the chosen scene, or None if the file has no scenes, and the scene's nodes."""
     root = document.root
     scenes, nodes = root.children("scenes"), root.children("nodes")
     if asked is not None and not 0 <= asked < len(scenes):
@@ -143,7 +143,7 @@ def _instances(
     *,
     lenient: bool,
 ) -> tuple[list[Mesh], list[Instance], SourceScene | None]:
-    """Return the meshes in use, each once, their instances, and the source scene if read leniently."""
+    """Return the meshes in use, each once, their instances, and the source scene (None unless lenient)."""
     sources = document.root.children("meshes")
     poser = Poser(document)
     built: dict[_Key, _Built] = {}
@@ -156,7 +156,7 @@ def _instances(
         refuse_broken(document, node.json)
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
-        # A skinned mesh is transformed by its joints; the matrix of its own node does not apply.
+        # A skinned mesh is transformed by its joints, not by its node's matrix: build a mesh for each node.
         key = number, node.index if "skin" in node.json else None
         if key not in built:
             arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
@@ -187,7 +187,7 @@ def _instances(
 
 
 def _is_usable(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:
-    """Return whether an instance can be baked; `extent` (3,) has its mesh's largest coordinates."""
+    """Return whether an instance can be baked; `extent` is that of its mesh, see `_Built`."""
     singular = np.linalg.svd(node.matrix[:3, :3], compute_uv=False)
     if not singular[2] > _FLATTEST * singular[0]:
         message = "the node's scale is zero along an axis; the instance is left out"

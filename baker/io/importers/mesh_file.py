@@ -1,6 +1,6 @@
-"""Imports single meshes: PLY, STL and OFF, with the parsers of trimesh.
+"""Imports PLY, STL and OFF files with the parsers of trimesh.
 
-Its mesh class is not used: it would merge, reorder and drop vertices.
+The mesh class of trimesh is not used, because it would merge, reorder and drop vertices.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from baker.core.source_mesh import SourcePrimitive
 from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
-# trimesh logs errors with a traceback, which Python prints to stderr unless a handler is set.
+# trimesh logs errors with a traceback. Without a handler, Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
@@ -35,7 +35,7 @@ def import_mesh_file(source: SceneFile) -> Scene:
     Parameters
     ----------
     source : SceneFile
-        `up` and `scale` bring the positions to metres, +Y up.
+        The file; `up` and `scale` are used to convert positions to metres, +Y up.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
     else:
         found = load_off(stream)
     if found.get("geometry") == {} and b"facet" not in data:
-        # The parser takes a truncated binary file for a text file without a solid.
+        # The parser treats a truncated binary file as a text file without a solid.
         raise ValueError("it is neither text nor as long as its header says; it may be cut off")
     # A text STL with several solids is returned as a dictionary of them.
     return list(found["geometry"].values()) if "geometry" in found else [found]
@@ -107,7 +107,7 @@ def _arrays(
 
 
 def _colour(value: Any, count: int) -> NDArray[np.float32] | None:
-    """Return vertex colours (V, 4), linear Rec.709 and alpha, or None if there are none for each vertex."""
+    """Return vertex colours (V, 4), linear Rec.709 and alpha, or None unless each vertex has a colour."""
     if value is None or len(value) != count:
         return None
     stored = np.array(value)

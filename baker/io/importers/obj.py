@@ -1,7 +1,7 @@
 """Imports Wavefront OBJ scenes with their MTL libraries, with the parser of tinyobjloader.
 
-Each object or group becomes a mesh with one instance, and each of its materials a primitive. In OBJ v = 0 is
-the last image row; v is flipped here, so that v = 0 is the first row as everywhere in baker.
+Each object or group becomes a mesh with one instance; the mesh has one primitive for each material. v = 0 is
+the last image row in OBJ, and the first in glTF and here, so the importer replaces v by 1 - v.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.mtl import read_mtl
 from baker.io.mesh.scene import scene_of_meshes, to_world
 
-# Albedo 0.8 instead of the white of glTF, which would absorb no light.
+# Albedo 0.8, not glTF's default of 1, because a white surface absorbs no light.
 GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
 _NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
@@ -38,7 +38,7 @@ def import_obj(source: SceneFile) -> Scene:
     Parameters
     ----------
     source : SceneFile
-        `up` and `scale` bring the positions to metres, +Y up.
+        The file; `up` and `scale` are used to convert positions to metres, +Y up.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def import_obj(source: SceneFile) -> Scene:
 
 
 def obj_sha256(path: Path, data: bytes) -> str:
-    """Return the hash that `import_obj` computes, without parsing geometry or decoding images.
+    """Compute the hash that `import_obj` stores in the scene, without parsing geometry or decoding images.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _read_libraries(
     warnings: list[SceneWarning],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
-    """Return the materials of all libraries; adds the bytes of their files to `digest`."""
+    """Return the materials of all MTL files; add the bytes of the MTL files and images to `digest`."""
 
     def read_file(file: Path) -> bytes:
         data = file.read_bytes()
@@ -120,12 +120,12 @@ def _read_libraries(
         return data
 
     materials: list[Material] = []
-    # After usemtl the parser takes the first word; some exporters use the rest of the line as the name.
+    # The parser reads one word after usemtl as the name, but some exporters write names with blanks.
     named = re.findall(r"^[ \t]*usemtl[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
     used = {*named, *(name.split()[0] for name in named if name)}
     lines = re.findall(r"^[ \t]*mtllib[ \t]+([^\r\n]*?)[ \t]*$", text, re.MULTILINE)
     for line in dict.fromkeys(lines):
-        # The rest of the line is either one name with blanks, or several names.
+        # The text after mtllib is either one name with blanks, or several names.
         names = [line] if (path.parent / line).is_file() else line.split()
         for name in names:
             file = path.parent / name.replace("\\", "/")
@@ -147,8 +147,8 @@ def _read_libraries(
 
 
 def _parse(text: str, materials: list[Material], file: str) -> Any:
-    """Return the parser with triangulated faces; all indices are in range."""
-    # Check the indices before triangulation: the parser's ear clipping crashes on an index out of range.
+    """Return the tinyobjloader reader after parsing: faces are triangulated, and all indices are in range."""
+    # Check the indices before triangulation, because the parser's ear clipping crashes on invalid indices.
     reader = _run_parser(text, materials, file, triangulate=False)
     attributes = reader.GetAttrib()
     counts = tuple(
@@ -168,7 +168,7 @@ def _run_parser(text: str, materials: list[Material], file: str, *, triangulate:
     config = tinyobjloader.ObjReaderConfig()
     config.triangulate = triangulate
     reader = tinyobjloader.ObjReader()
-    # Pass the names of the materials only: the binding does not provide `Ke`, so `read_mtl` reads the values.
+    # Pass only the material names. `read_mtl` reads the values, because the Python binding lacks `Ke`.
     names = "".join(f"newmtl {material.name}\n" for material in materials)
     if not reader.ParseFromString(text, names, config):
         why = " ".join(reader.Error().split()).rstrip(".") or "it is not an OBJ file"
@@ -178,7 +178,7 @@ def _run_parser(text: str, materials: list[Material], file: str, *, triangulate:
 
 def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) -> None:
     """Raise if an index is out of range."""
-    # Use lists: the numpy_* calls of the binding return arrays of stride 0 (2.0.0rc13).
+    # Use lists, because the binding's numpy_* calls return arrays of stride 0 (tinyobjloader 2.0.0rc13).
     kinds = (
         (mesh.vertex_indices(), "vertex"),
         (mesh.normal_indices(), "normal"),
@@ -193,7 +193,7 @@ def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) ->
 
 
 def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Set positions to NaN where a `v` line holds no numbers; the parser silently reads such words as 0."""
+    """Set a position to NaN if its `v` line contains a word that is no number; the parser reads 0 there."""
     if _NOT_NUMBERS.search(data) is None:
         return position
     position = position.copy()
@@ -211,7 +211,7 @@ def _is_number(word: bytes) -> bool:
 
 
 def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
-    """Return vertex colours (V, 4), or None if all are white, as the parser returns where there are none."""
+    """Return vertex colours (V, 4), or None if all are white, as for a file without vertex colours."""
     colour = np.array(attributes.colors, np.float32).reshape(-1, 3)
     if len(colour) != count or (colour == 1).all():
         return None
@@ -219,7 +219,7 @@ def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
 
 
 class _Corners:
-    """The arrays that the indices of all shapes refer to."""
+    """The arrays of an OBJ file that the face corners of all shapes index."""
 
     def __init__(
         self,
@@ -236,7 +236,7 @@ class _Corners:
 
 
 def _primitives(mesh: Any, corners: _Corners, default: int) -> list[SourcePrimitive]:
-    """Split a shape by material; `default` is the material of faces without a known one."""
+    """Split a shape by material; faces without a known material get the material index `default`."""
     vertex, normal, texcoord = (
         np.array(values, np.int64)
         for values in (mesh.vertex_indices(), mesh.normal_indices(), mesh.texcoord_indices())
@@ -268,8 +268,8 @@ def _primitive(
     texcoord: NDArray[np.int64],
     corners: _Corners,
 ) -> SourcePrimitive:
-    """Return the primitive of corners (3 T,) with indices of position, normal and texture coordinate."""
-    # Create one vertex for each combination of indices; two steps keep the keys within 64 bits.
+    """Return a primitive from the (3 T,) position, normal and texcoord indices of its corners."""
+    # Create one vertex for each distinct index triple. Two steps keep the keys within 64 bits.
     _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
     _, row, index = np.unique(
         first * (len(corners.normal) + 1) + normal + 1, return_index=True, return_inverse=True

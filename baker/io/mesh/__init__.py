@@ -1,1 +1,1 @@
-"""Scenes of plain meshes, for formats without nodes; materials of OBJ files."""
+"""Builds meshes, and scenes for formats without nodes; reads the materials of OBJ files."""

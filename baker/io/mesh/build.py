@@ -1,6 +1,6 @@
-"""Builds a `Mesh` from source primitives: drops invalid triangles, computes normals, compacts vertices.
+"""Builds a `Mesh` from source primitives: drops invalid triangles and unused vertices, computes normals.
 
-All importers use it, so that the same rules apply to all formats.
+All importers use `build_mesh`, so that the same rules apply to all formats.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from baker.topology.triangle_check import duplicates, face_normal, in_range, usa
 def build_mesh(
     name: str, primitives: Sequence[SourcePrimitive], materials: Sequence[Material]
 ) -> tuple[Mesh | None, list[SceneWarning]]:
-    """Concatenate primitives to a mesh with valid triangles only.
+    """Concatenate the valid triangles of primitives into one mesh.
 
     Parameters
     ----------
@@ -27,15 +27,15 @@ def build_mesh(
     primitives : sequence of SourcePrimitive
         The primitives of the file.
     materials : sequence of Material
-        Materials of the scene: sidedness, and texture coordinate sets that they read.
+        Materials of the scene. Whether they are double-sided and which TEXCOORD sets they read is used.
 
     Returns
     -------
     mesh : Mesh or None
-        None if no valid triangle is left. A texture coordinate set that only some primitives have, or
-        that a material reads and its primitive lacks, is 0 there.
+        None if no valid triangle is left. If some primitives lack a TEXCOORD set that other primitives have
+        or that their material reads, their uv in that set is 0.
     warnings : list of SceneWarning
-        One for each kind of defect, with its count.
+        One for each kind of defect, with the number of triangles or vertices.
     """
     primitives = [p for p in primitives if len(p.triangle)]
     if not primitives:
@@ -77,7 +77,7 @@ def _valid_triangles(
     materials: Sequence[Material],
     warnings: list[SceneWarning],
 ) -> list[NDArray[np.int64]]:
-    """Return the valid triangles of each primitive; add a warning for each kind of others, with its count."""
+    """Return the valid triangles of each primitive; add a warning with a count for each kind of defect."""
     start = np.cumsum([0] + [len(p.position) for p in primitives])
     position = np.concatenate([p.position for p in primitives])
     triangle = np.concatenate([p.triangle + s for p, s in zip(primitives, start, strict=False)])
@@ -116,12 +116,12 @@ def _valid_triangles(
 
 
 class _Part:
-    """The valid triangles of a primitive, and the rows of its arrays that they use."""
+    """The valid triangles of a primitive, and the indices `row` of the source vertices that they use."""
 
     def __init__(self, source: SourcePrimitive, triangle: NDArray[np.int64]) -> None:
         self.source = source
         if source.normal is None:
-            # Flat normals (glTF 2.0, section 3.7.2.1): each corner gets a vertex of its own.
+            # Flat normals (glTF 2.0, section 3.7.2.1) need a separate vertex for each corner.
             self.row = triangle.reshape(-1)
             self.triangle = np.arange(len(self.row)).reshape(-1, 3)
             return
@@ -150,7 +150,7 @@ class _Part:
                 smooth[:, axis] = np.bincount(
                     self.triangle.reshape(-1), np.repeat(face[:, axis], 3), minlength=len(smooth)
                 )
-            # Where the face normals cancel out, take the normal of the vertex's first face.
+            # If the face normals at a vertex add up to 0, use the normal of the vertex's first face.
             lost = bad & (np.abs(smooth).max(axis=1) == 0)
             first = np.zeros(len(smooth), np.int64)
             first[self.triangle.reshape(-1)[::-1]] = np.repeat(np.arange(len(face)), 3)[::-1]
@@ -167,14 +167,14 @@ class _Part:
     def colour(self) -> NDArray[np.float32]:
         if self.source.colour is None:
             return np.ones((len(self.row), 4), np.float32)
-        # glTF clamps vertex colours to 0..1 (section 3.7.2.1); NaN counts as white.
+        # glTF clamps vertex colours to 0..1 (section 3.7.2.1). Replace NaN by 1.
         return np.clip(np.nan_to_num(self.source.colour[self.row], nan=1.0), 0.0, 1.0)
 
 
 def _texcoord_sets(
     name: str, parts: Sequence[_Part], materials: Sequence[Material], warnings: list[SceneWarning]
 ) -> set[int]:
-    """Return the numbers of the texture coordinate sets of the mesh."""
+    """Return the TEXCOORD numbers that the mesh needs; add warnings about missing or unusable uv."""
     sets: set[int] = set()
     for part in parts:
         sets.update(part.source.texcoord)

@@ -1,4 +1,4 @@
-"""Reads Wavefront material libraries: the statements for diffuse reflection, emission and opacity.
+"""Reads Wavefront material libraries (MTL): the statements for diffuse reflection, emission and opacity.
 
 Reflectance = Kd x map_Kd, emission = Ke x map_Ke (cd/m2), opacity = d or 1 - Tr.
 
@@ -18,7 +18,7 @@ from baker.core.errors import InputError
 from baker.core.scene import Material, Texture
 from baker.io.images import decode_image
 
-# Number of values after each option of a map statement.
+# Option of a map statement -> number of words after it that belong to the option.
 _OPTION_VALUES = {
     "-blendu": 1,
     "-blendv": 1,
@@ -51,13 +51,13 @@ def read_mtl(
     text : str
         The library's content.
     file : str
-        Its name, for messages.
+        Name of the library, for messages.
     folder : Path
         Folder that image names are relative to.
     read_file : callable
-        Returns the content of a file; raises OSError or ValueError if it cannot.
+        Returns the content of a file; raises OSError or ValueError if the file cannot be read.
     used : container of str
-        Names of the materials that faces use; errors in others are ignored.
+        Names of the materials that faces use. Errors in other materials are ignored.
     decode : callable
         Decodes the content of an image file; see `decode_image`.
 
@@ -93,7 +93,7 @@ def read_mtl(
 
 
 def _parse(text: str) -> list[dict[str, list[str]]]:
-    """Return the statements of each material: the words after each keyword, and its name under "name"."""
+    """Return a dict for each material: keyword -> words after it, and "name" -> words of its name."""
     materials: list[dict[str, list[str]]] = []
     for line in text.splitlines():
         words = line.split("#", 1)[0].split()
@@ -123,7 +123,7 @@ class _Images:
         self._pixels: dict[str, NDArray[np.uint8]] = {}
 
     def find(self, material: str, words: list[str], names: list[str]) -> NDArray[np.uint8]:
-        """Return the pixels of the first file that exists among `names`; `words` is the statement."""
+        """Return the pixels of the first existing file of `names`; `words` is the map statement."""
         for name in names:
             if name in self._pixels:
                 return self._pixels[name]
@@ -145,7 +145,7 @@ class _Images:
 def _material(
     words: dict[str, list[str]], file: str, texture: Callable[[str, list[str] | None], Texture | None]
 ) -> Material:
-    """Return the material of some statements; `texture` returns the texture of a map statement."""
+    """Return the material that `words` (keyword -> words) describes; `texture` reads a map statement."""
     name = " ".join(words["name"])
 
     def colour(key: str, default: float) -> tuple[float, float, float]:
@@ -176,7 +176,7 @@ def _material(
 
 
 def _map_options(words: list[str], file: str, material: str) -> tuple[list[str], NDArray[np.float64], bool]:
-    """Return the possible file names, (2, 3) image uv from mesh uv, and `-clamp` of a map statement."""
+    """Return a map statement's possible file names, (2, 3) matrix image uv from mesh uv, and `-clamp`."""
     shift, stretch, clamp = [0.0, 0.0], [1.0, 1.0], False
     k = 0
     while k < len(words) - 1 and words[k].lower() in (*_OPTION_VALUES, *_VECTOR_OPTIONS):
@@ -194,12 +194,12 @@ def _map_options(words: list[str], file: str, material: str) -> tuple[list[str],
             shift[: len(values[:2])] = values[:2]
         elif option == "-s":
             stretch[: len(values[:2])] = values[:2]
-    # v points up in OBJ and down here, both from 0 to 1: v' = 1 - (s (1 - v) + o).
+    # In OBJ v = 0 is the last image row, here the first: v' = 1 - (s (1 - v) + o).
     transform = np.array(
         [[stretch[0], 0.0, shift[0]], [0.0, stretch[1], 1.0 - stretch[1] - shift[1]]], np.float64
     )
     rest = words[k:]
-    # Names may contain blanks. Of an absolute path of another machine the file name is tried as well.
+    # Names may contain blanks. Also try the bare file name, for absolute paths of another computer.
     name = " ".join(rest)
     return list(dict.fromkeys((name, name.replace("\\", "/").rsplit("/", 1)[-1]))), transform, clamp
 

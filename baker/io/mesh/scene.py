@@ -22,7 +22,7 @@ def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.f
     vector : (N, 3) float64
         Positions or directions in the axes of the file.
     up : str
-        "z" rotates by -90 degrees about x: (x, y, z) becomes (x, z, -y).
+        "y" leaves the axes as they are. "z" rotates by -90 degrees about x: (x, y, z) becomes (x, z, -y).
     scale : float
         Metres per unit.
 
@@ -44,25 +44,25 @@ def scene_of_meshes(
     warnings: Sequence[SceneWarning],
     sha256: str,
 ) -> Scene:
-    """Build a scene with one mesh and one instance for each named group, nodes numbered from 0.
+    """Build a scene with one mesh, one instance and one node for each named group of primitives.
 
     Parameters
     ----------
     source : SceneFile
-        The file; gives name and path.
+        The file. Name and path of the scene come from it.
     groups : sequence of (str, sequence of SourcePrimitive)
         Name and primitives of each mesh, in world space.
     materials : sequence of Material
         Materials that the primitives refer to by index.
     warnings : sequence of SceneWarning
-        Warnings about the file so far.
+        Warnings to put before those about the meshes.
     sha256 : str
         Hash of the file and of all files that it refers to.
 
     Returns
     -------
     Scene
-        Meshes without a valid triangle are left out, with a warning.
+        The scene. Meshes without a valid triangle are left out with a warning.
 
     Raises
     ------
