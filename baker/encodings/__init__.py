@@ -1,1 +1,1 @@
-"""Plugins: one image format a file."""
+"""Encoding plugins: each file writes and reads one image format."""

@@ -1,4 +1,4 @@
-"""OpenEXR: half or float numbers, ZIP or PIZ, scanlines, channels R G B, Y, or named layers.
+"""Writes and reads OpenEXR scanline images: half or float, ZIP or PIZ, channels R G B, Y, or named layers.
 
 Every engine and viewer reads ZIP and PIZ; PXR24, B44 and DWA are less widely read. Files carry no time stamp,
 so the same pixels give the same bytes.
@@ -19,13 +19,13 @@ from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptio
 from baker.core.errors import InputError, ResourceError
 from baker.core.settings_model import setting
 
-# The largest finite half.
+# Largest finite value of a 16-bit half float.
 HALF_MAX = 65504.0
 
-# Rec.709 primaries and the D65 white point as CIE xy: red, green, blue, white.
+# Header attribute `chromaticities`: CIE xy of the Rec.709 primaries red, green and blue, and of D65 white.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
-# Components of one image; a spherical harmonic of order 1 in three colours has 12.
+# Largest number of components of an image. Spherical harmonics up to order 1 in three colours have 12.
 MAX_COMPONENTS = 16
 
 _NAMES = {1: ("Y",), 3: ("R", "G", "B")}
@@ -40,31 +40,33 @@ def encode_exr(
     header: Mapping[str, str] | None = None,
     names: tuple[str, ...] | None = None,
 ) -> int:
-    """Write one image and read it back to check that all of it is on the disk.
+    """Write one image, and read it back to check that the file is complete.
 
     Parameters
     ----------
     path : Path
     pixels : (H, W, C) float32, row 0 on top, 1 to 16 components
     half : bool
-        16 bit numbers; otherwise 32 bit.
+        True for 16-bit floats, False for 32-bit floats.
     compression : str
         "zip" or "piz"; both are lossless.
     header : mapping of str to str
-        Further attributes, like quantity and unit.
+        Additional header attributes, such as quantity and unit.
     names : tuple of str, optional
-        Channel of each component: "R", "G", "B", or "layer.R" for one of a named layer. By default Y for one
-        component and R G B, linear Rec.709, for three; other numbers of components need names.
+        Channel name of each component, such as "R", or "albedo.R" for channel R of the layer "albedo". By
+        default, one component is Y and three components are R, G, B in linear Rec.709. Other numbers of
+        components need names.
 
     Returns
     -------
     int
-        Texels with a channel outside the range of the number format; they are stored at its end.
+        Number of texels with a component outside the range of the number format. Such components are clamped
+        to the range.
 
     Raises
     ------
     ValueError
-        If a pixel is not a number, or the number of `names` does not match the shape.
+        If a pixel is not a number, or there is not one distinct name for each component.
     ResourceError
         If the file cannot be written.
     """
@@ -86,16 +88,17 @@ def encode_exr(
 def encode_layers(
     path: Path, layers: Mapping[str, NDArray[np.float32]], *, header: Mapping[str, str] | None = None
 ) -> None:
-    """Write named planes as one EXR of 32 bit numbers.
+    """Write named channels as one EXR with 32-bit floats.
 
     Parameters
     ----------
     path : Path
         File to write; replaced if it exists.
     layers : mapping of channel name to (H, W) float32
-        "R", "G", "B" are the main layer; others have names such as "albedo.R" and "depth.Z".
+        "R", "G", "B" form the main layer. Channels of other layers have names such as "albedo.R" and
+        "depth.Z".
     header : mapping of str to str
-        Further attributes.
+        Additional header attributes.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def encode_layers(
 
 
 def decode_exr(path: Path) -> DecodedImage:
-    """Read an EXR of one part.
+    """Read an EXR file with one part.
 
     Parameters
     ----------
@@ -116,12 +119,12 @@ def decode_exr(path: Path) -> DecodedImage:
     Returns
     -------
     DecodedImage
-        Channels R, G, B, A first if there, then the others by name.
+        Those of the channels R, G, B, A that exist come first, then the other channels sorted by name.
 
     Raises
     ------
     InputError
-        If the file is absent, damaged, or holds channels of several sizes.
+        If the file is missing, damaged, or has channels of different sizes.
     """
     import OpenEXR
 
@@ -131,7 +134,7 @@ def decode_exr(path: Path) -> DecodedImage:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
             header = {str(key): _text(value) for key, value in file.header().items() if key != "channels"}
-    # OpenEXR reports every damage as a RuntimeError or ValueError with its own sentence.
+    # OpenEXR reports damaged files as RuntimeError or ValueError.
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(f"this is not a readable EXR image ({_first_line(error)})", file=str(path)) from None
     names = sorted(planes, key=lambda name: ("RGBA".find(name) if name in "RGBA" else 4, name))
@@ -160,20 +163,20 @@ class ExrEncoding(Encoding[ExrOptions]):
     when_banded = "use `dtype='float'`"
 
     def options_of_image(self, image: DecodedImage) -> ExrOptions:
-        """Return the number format of the image."""
+        """Return options with the number format of the image."""
         return ExrOptions(dtype="half" if image.dtype == "half" else "float")
 
     def limits(self, options: ExrOptions) -> tuple[float, float]:
-        """Return the ends of the number format."""
+        """Return the lowest and highest finite value of the number format."""
         return -_top(options.dtype == "half"), _top(options.dtype == "half")
 
     def stored(self, pixels: NDArray[np.float32], options: ExrOptions) -> NDArray[np.float32]:
-        """Return pixels rounded to the number format."""
+        """Return pixels clamped and rounded to the number format."""
         clipped = np.clip(pixels, *self.limits(options))
         return clipped.astype(np.float16).astype(np.float32) if options.dtype == "half" else clipped
 
     def tolerance(self, pixels: NDArray[np.float32], options: ExrOptions) -> NDArray[np.float64]:
-        """Return half the step of a half: 2^-11 of the value, 2^-25 near zero; 0 for 32 bit."""
+        """Return the rounding error: for half, 2^-11 of the value but at least 2^-25; for float, 0."""
         size = np.abs(pixels.astype(np.float64))
         return np.maximum(size * 2.0**-11, 2.0**-25) if options.dtype == "half" else np.zeros_like(size)
 
@@ -214,10 +217,10 @@ def _write(
     if "R" in planes:
         header["chromaticities"] = REC709
     try:
-        # Pass a copy, since OpenEXR keeps and empties the dictionary.
+        # Pass a copy, because OpenEXR keeps the dictionary and empties it later.
         with OpenEXR.File(header, dict(planes)) as file:
             file.write(str(path))
-        # OpenEXR raises no error if the disk is full when it closes the file: read it back.
+        # Read the file back, because OpenEXR raises no error if the disk is full when the file is closed.
         with OpenEXR.File(str(path), separate_channels=True) as file:
             back = file.channels()
             complete = all(np.array_equal(back[name].pixels, plane) for name, plane in planes.items())

@@ -1,4 +1,4 @@
-"""Values from 0 to 1 as a grey PNG of 8 or 16 bits: linear, 0 is black, row 0 on top.
+"""Encodes values from 0 to 1 as a grey PNG with 8 or 16 bits: linear, 0 is black, row 0 at the top.
 
 `png8` and `png16` register instances of this encoding.
 """
@@ -18,14 +18,14 @@ from baker.io.png import decode_png, encode_png
 
 
 class GreyPng(Encoding[EncodingOptions]):
-    """Writes and reads grey PNG files of 8 or 16 bits a texel.
+    """Writes and reads grey PNG files with 8 or 16 bits per texel.
 
     Parameters
     ----------
     bits : int
         8 or 16.
     remedy : str
-        Advice about texels that are clipped or have visible steps.
+        Advice in the warnings about clipped texels and visible steps between grey levels.
     """
 
     components: tuple[int, ...] = (1,)
@@ -42,11 +42,11 @@ class GreyPng(Encoding[EncodingOptions]):
         return 0.0, 1.0
 
     def stored(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float32]:
-        """Return pixels rounded to the nearest step."""
+        """Return pixels clamped to 0 to 1 and rounded to the nearest grey level."""
         return self._value(self._code(pixels))
 
     def tolerance(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float64]:
-        """Return half a step and the rounding of single precision."""
+        """Return half the distance of two grey levels, plus 1e-7 for rounding to float32."""
         return np.full(pixels.shape, 0.5 / self._steps + 1e-7)
 
     def encode(
@@ -63,7 +63,7 @@ class GreyPng(Encoding[EncodingOptions]):
         Raises
         ------
         ValueError
-            If a pixel is not a number or the shape is another.
+            If a pixel is not a number, or the shape is not (H, W, 1).
         ResourceError
             If the file cannot be written.
         """
@@ -76,7 +76,7 @@ class GreyPng(Encoding[EncodingOptions]):
         Raises
         ------
         InputError
-            If the file is absent, no PNG, or not grey with this many bits.
+            If the file is missing, no PNG, or not a grey image with this number of bits.
         """
         code, header = decode_png(path)
         if code.dtype != self._dtype or code.ndim != 2:

@@ -1,7 +1,8 @@
-"""Radiance HDR: three 8-bit mantissas that share an exponent, run-length coded, row 0 on top.
+"""Writes and reads Radiance HDR: three 8-bit mantissas with a shared exponent, run-length coded, row 0 at the
+top.
 
-value = mantissa * 2^(exponent - 136), as current readers decode; Ward's original code adds half a step.
-Mantissas are rounded to the nearest, so that rule has no bias.
+`value = mantissa * 2^(exponent - 136)`, as current readers decode it; Ward's original code decodes `mantissa
++ 0.5`. Mantissas are rounded to nearest, so decoding without the 0.5 has no bias.
 
 Based on: G. Ward, Real Pixels, Graphics Gems II, 1991; the Radiance picture file format.
 """
@@ -17,31 +18,31 @@ from numpy.typing import NDArray
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.errors import InputError
 
-# The largest mantissa with the largest exponent.
+# Largest value: the largest mantissa, 255, with the largest stored exponent, 255.
 HDR_MAX = 255.0 * 2.0 ** (255 - 136)
-# Shorter lines and longer ones cannot be run-length coded.
+# Image widths, texels, whose rows can be run-length coded; rows of other widths are stored flat.
 _CODED = range(8, 32768)
-# A run shorter than this takes no less room than the bytes themselves.
+# Shortest run of equal bytes that is coded as a run, bytes.
 _SHORTEST = 4
 
 
 class HdrEncoding(Encoding[EncodingOptions]):
-    """Files Radiance HDR under the name `hdr`."""
+    """Radiance HDR files; registered as `hdr`."""
 
     suffix = ".hdr"
     components: tuple[int, ...] = (3,)
     options_type = EncodingOptions
 
     def limits(self, options: EncodingOptions) -> tuple[float, float]:
-        """Return the range: no negative light, and 2^127 at the top."""
+        """Return 0 and the largest value, about 2^127."""
         return 0.0, HDR_MAX
 
     def stored(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float32]:
-        """Return pixels as their shared exponent lets them be."""
+        """Return pixels after encoding and decoding."""
         return _from_rgbe(_to_rgbe(pixels))
 
     def tolerance(self, pixels: NDArray[np.float32], options: EncodingOptions) -> NDArray[np.float64]:
-        """Half a step: 1/256 of the brightest channel; everything below 2^-127 is zero."""
+        """Return the largest rounding error: 1/256 of the texel's brightest channel, at least 2^-127."""
         brightest = pixels.max(axis=-1, keepdims=True).astype(np.float64)
         return np.broadcast_to(np.maximum(brightest / 256.0, 2.0**-127), pixels.shape)
 
@@ -59,14 +60,15 @@ class HdrEncoding(Encoding[EncodingOptions]):
         Raises
         ------
         ValueError
-            If a pixel is not a number or the shape is another.
+            If a pixel is not a number, or the shape is not (H, W, 3).
         ResourceError
             If the file cannot be written.
         """
         check_pixels(pixels, self.components, path.name)
         height, width = pixels.shape[:2]
         lines = [f"# {key}: {text}" for key, text in sorted(header.items())]
-        # Primaries of Rec.709 and the white point D65 as CIE xy; an exposure of 1.
+        # PRIMARIES has CIE xy of the Rec.709 primaries and of D65 white. EXPOSURE 1 leaves the values
+        # unscaled.
         about = ["#?RADIANCE", *lines, "FORMAT=32-bit_rle_rgbe", "EXPOSURE=1.0"]
         about += ["PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.3290"]
         head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"
@@ -80,7 +82,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
         Raises
         ------
         InputError
-            If the file is absent, damaged or not Radiance RGBE.
+            If the file is missing, damaged or not Radiance RGBE.
         """
         try:
             data = path.read_bytes()
@@ -99,11 +101,11 @@ ENCODINGS.register("hdr")(HdrEncoding())
 
 
 def _to_rgbe(pixels: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return (..., 4) uint8 of (..., 3) pixels."""
+    """Return the mantissas and exponent, (..., 4) uint8, of pixels (..., 3)."""
     value = np.clip(pixels.astype(np.float64), 0.0, HDR_MAX)
     brightest = value.max(axis=-1)
     exponent = np.frexp(brightest)[1]
-    # Rounding may lift the brightest mantissa to 256, which is 128 at the next exponent.
+    # If the brightest mantissa is rounded to 256, increase the exponent; the mantissa is then 128.
     exponent = exponent + (np.rint(np.ldexp(brightest, 8 - exponent)) > 255.0)
     mantissa = np.rint(np.ldexp(value, (8 - exponent)[..., None]))
     code = np.concatenate([mantissa, (exponent + 128)[..., None]], axis=-1)
@@ -118,7 +120,7 @@ def _from_rgbe(rgbe: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _coded(row: NDArray[np.uint8]) -> bytes:
-    """Return one line (W, 4), its four planes run-length coded one after the other."""
+    """Return one row (W, 4) as bytes: its four channels, run-length coded one after the other."""
     width = len(row)
     parts = [bytes((2, 2, width >> 8, width & 255))]
     for plane in np.ascontiguousarray(row.T):
@@ -160,7 +162,7 @@ def _read_head(data: bytes) -> tuple[dict[str, str], int, int, int]:
 
 
 def _decoded(data: bytes, at: int, height: int, width: int) -> NDArray[np.uint8]:
-    """Return (H, W, 4) uint8."""
+    """Return the mantissas and exponents, (H, W, 4) uint8, from the file's bytes starting at offset `at`."""
     if data[at : at + 2] != b"\x02\x02" or width not in _CODED:
         flat = np.frombuffer(data, np.uint8, height * width * 4, at)
         return flat.reshape(height, width, 4)
@@ -175,7 +177,7 @@ def _decoded(data: bytes, at: int, height: int, width: int) -> NDArray[np.uint8]
 
 
 def _decode_plane(data: bytes, at: int, plane: NDArray[np.uint8]) -> int:
-    """Fill one plane of a line from `data` and return where the next begins."""
+    """Fill one channel of a row from `data` at offset `at`, and return the offset of the next channel."""
     done = 0
     while done < len(plane):
         count = data[at]

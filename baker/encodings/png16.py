@@ -1,4 +1,4 @@
-"""Ambient occlusion and other shares as a 16-bit grey PNG: 0 is closed, 65535 is open, no curve."""
+"""Registers `png16`: values from 0 to 1, such as ambient occlusion, as a linear 16-bit grey PNG."""
 
 from __future__ import annotations
 

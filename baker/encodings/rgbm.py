@@ -1,9 +1,10 @@
 """RGBM: high dynamic range in an 8-bit RGBA PNG, for engines and phones without float textures.
 
-value = top * (rgb * a)^GAMMA, with rgb and a from 0 to 1 as stored (no sRGB decoding). a is the brightest
-channel, rounded up, so that rgb never exceeds 1. `top` and the gamma are in the file's text chunks.
+`value = top * (rgb * a)^GAMMA`, where rgb and a are the stored bytes / 255, without sRGB decoding. The alpha
+channel `a` is the largest of the three `(value / top)^(1 / GAMMA)`, rounded up, so that rgb never exceeds 1.
+`top` and GAMMA are in the file's text chunks.
 
-Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, whose gamma of 2.2 this has.
+Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, which also use a gamma of 2.2.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ GAMMA = 2.2
 
 
 class RgbmOptions(EncodingOptions):
-    """The value stored as all ones."""
+    """The irradiance that is stored as R = G = B = A = 255."""
 
     rgbm_range: Text = setting(
-        "auto", "Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.", unit="lx"
+        "auto", "Largest irradiance that RGBM can store, lx; `auto` uses the brightest texel.", unit="lx"
     )
 
     def check(self) -> None:
@@ -42,17 +43,17 @@ class RgbmOptions(EncodingOptions):
 
     @property
     def is_auto(self) -> bool:
-        """Return whether the value depends on the map."""
+        """Return whether `rgbm_range` is "auto", so that the largest value of the map is used."""
         return self.rgbm_range.strip() == "auto"
 
     @property
     def top(self) -> float:
-        """Return the value stored as all ones."""
+        """Return the irradiance stored as R = G = B = A = 255, lx."""
         return float(self.rgbm_range)
 
 
 class RgbmEncoding(Encoding[RgbmOptions]):
-    """Files RGBM under the name `rgbm`."""
+    """RGBM files; registered as `rgbm`."""
 
     suffix = ".rgbm.png"
     components: tuple[int, ...] = (3,)
@@ -67,15 +68,15 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         return RgbmOptions(rgbm_range=repr(brightest if brightest > 0 else 1.0))
 
     def limits(self, options: RgbmOptions) -> tuple[float, float]:
-        """Return 0 and the top."""
+        """Return 0 and `options.top`."""
         return 0.0, options.top
 
     def stored(self, pixels: NDArray[np.float32], options: RgbmOptions) -> NDArray[np.float32]:
-        """Return pixels after rounding multiplier and colour to 8 bits."""
+        """Return pixels after encoding and decoding, with `a` and rgb rounded to 8 bits."""
         return _from_rgbm(_to_rgbm(pixels, options.top), options.top)
 
     def tolerance(self, pixels: NDArray[np.float32], options: RgbmOptions) -> NDArray[np.float64]:
-        """Half a step of the colour at the multiplier chosen, through the power."""
+        """Return a bound of the error: half an 8-bit step of rgb, times `a`, propagated through the power."""
         root = _root(pixels, options.top)
         multiplier = root.max(axis=-1, keepdims=True) + 1.0 / 255.0
         upper = (root + multiplier * (0.5 / 255.0)) ** GAMMA
@@ -97,7 +98,7 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         Raises
         ------
         ValueError
-            If a pixel is not a number or the shape is another.
+            If a pixel is not a number, or the shape is not (H, W, 3).
         ResourceError
             If the file cannot be written.
         """
@@ -107,12 +108,12 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         write_image(path, data)
 
     def decode(self, path: Path) -> DecodedImage:
-        """Read a file whose text chunks contain `top` and the gamma.
+        """Read a file whose text chunks contain `top` and `gamma`.
 
         Raises
         ------
         InputError
-            If the file is absent, no PNG, or has no such text chunks.
+            If the file is missing, no PNG, or lacks these text chunks.
         """
         pixels, header = decode_png(path)
         try:
@@ -135,7 +136,7 @@ def _root(pixels: NDArray[np.float32], top: float) -> NDArray[np.float64]:
 
 def _to_rgbm(pixels: NDArray[np.float32], top: float) -> NDArray[np.uint8]:
     root = _root(pixels, top)
-    # Black keeps a multiplier of one step, so that nothing is divided by zero.
+    # The multiplier is at least 1, so that black texels cause no division by zero.
     multiplier = np.maximum(np.ceil(root.max(axis=-1, keepdims=True) * 255.0 - 1e-9), 1.0)
     colour = np.rint(np.minimum(root * 255.0 / multiplier, 1.0) * 255.0)
     return np.concatenate([colour, multiplier], axis=-1).astype(np.uint8)

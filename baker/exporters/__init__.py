@@ -1,1 +1,1 @@
-"""Plugins: one engine a file; an export reads a finished folder and nothing else."""
+"""Exporter plugins: each file writes the files for one engine, from a finished output folder."""

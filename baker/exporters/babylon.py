@@ -1,4 +1,4 @@
-"""Babylon.js: scene.glb, the EXR pages, and a module that puts the two together."""
+"""Export for Babylon.js: scene.glb, the EXR pages, and a module that loads both."""
 
 from __future__ import annotations
 
@@ -9,28 +9,29 @@ from baker.exporters.common import place_bake, template, write_readme, write_tex
 
 
 class BabylonExport:
-    """Files the export `babylon`."""
+    """The export `babylon`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         place_bake(bake, target)
         write_text(target / "lightmap.js", template("babylon", "lightmap.js"))
         write_readme(
             target,
             "Lightmaps for Babylon.js",
             steps=(
-                "Serve this folder and load it with the module beside this file (Babylon.js 7 or newer with",
-                "its glTF loader): `import { loadBake } from './babylon/lightmap.js';`",
-                "`await loadBake(BABYLON, 'babylon/', scene);` The file's lights are baked in, so off.",
-                "ZIP pages need fflate, which Babylon.js fetches from a CDN: serve it yourself with",
-                "`{ fflate: 'URL of fflate/umd/index.js' }`, or bake with `exr_compression='piz'`.",
+                "Serve this folder, and load it with lightmap.js (Babylon.js 7 or newer, glTF loader):",
+                "`import { loadBake } from './babylon/lightmap.js';`",
+                "`await loadBake(BABYLON, 'babylon/', scene);`",
+                "The lights of the file are switched off, because the pages contain their light. For ZIP",
+                "pages, Babylon.js fetches fflate from a CDN; `{ fflate: URL }` names your copy of its",
+                "umd/index.js.",
             ),
-            scale="EXR holds irradiance E in lx; unlit materials show albedo x E / pi, in cd/m2. "
-            "`{ exposure: x }` multiplies all of it.",
+            scale="The pages contain irradiance E in lx; materials show albedo x E / pi in cd/m2. "
+            "The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `coordinatesIndex = 1`.",
-            rows="v = 0 is the EXR's first row, but Babylon.js hands rows out from below: v is turned over.",
+            rows="v = 0 is the first row of the EXR. Babylon.js stores the rows bottom-up, so 1 - v is used.",
         )
 
 

@@ -1,4 +1,4 @@
-"""Blender: scene.glb, the EXR pages, and a script that imports both and wires the second uv map."""
+"""Export for Blender: scene.glb, the EXR pages, and a script that imports both and sets up materials."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from baker.exporters.common import place_named_bake, template, write_readme, wri
 
 
 class BlenderExport:
-    """Files the export `blender`."""
+    """The export `blender`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         place_named_bake(bake, target)
         write_text(target / "import_lightmaps.py", template("blender", "import_lightmaps.py"))
         write_readme(
             target,
             "Lightmaps for Blender",
             steps=(
-                "`blender --python import_lightmaps.py`, or open the script in the text editor and run it.",
-                "Materials become emission of what their surface sends out; the file's lights are left out.",
-                "Set the view transform to Standard, or pictures go through Blender's film curve.",
-                "Node i is named `..._n<i>`; the custom property `baker_node` says i, too.",
+                "Run `blender --python import_lightmaps.py`, or run the script in Blender's text editor.",
+                "Materials are replaced by emission of the baked radiance; the file's lights are hidden.",
+                "Set the view transform to Standard, because Blender's default applies a film curve.",
+                "Node i is named `..._n<i>`, and its custom property `baker_node` is i.",
             ),
-            scale="EXR holds irradiance E in lx; shown is base colour x E / pi as emission, in cd/m2.",
+            scale="The pages contain irradiance E in lx; the materials emit base colour x E / pi, in cd/m2.",
             uv="the second uv map (`UVMap.001`), which is TEXCOORD_1.",
-            rows="Blender turns v over when it imports glTF, and its images begin below: nothing else to do.",
+            rows="Blender replaces v by 1 - v on import and stores images bottom-up, so no flip is needed.",
         )
 
 

@@ -1,4 +1,4 @@
-"""Shared code of exports: the description of a bake, copies of its files, and the README of a folder."""
+"""Code shared by the exports: `lightmap.json`, copies of a bake's files, unique node names, and README.md."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def read_manifest(bake: Path) -> dict[str, Any]:
 
 
 def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the manifest's entries of the irradiance pages, in order."""
+    """Return the manifest entries of the irradiance pages, sorted by page number."""
     pages = [page for page in manifest["pages"] if page["channel"] == "irradiance"]
     return sorted(pages, key=lambda page: int(page["page"]))
 
 
 def describe(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return the description of a bake for loaders: pages, and the uv transform of each object.
+    """Return the content of `lightmap.json`: the pages, and the page and uv transform of each object.
 
-    page uv = TEXCOORD_1 * uv_scale + uv_offset, v = 0 is the first image row.
+    The uv in a page is `TEXCOORD_1 * uv_scale + uv_offset`; v = 0 is the first image row.
     """
     return {
         "version": 1,
@@ -50,17 +50,17 @@ def describe(manifest: dict[str, Any]) -> dict[str, Any]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text with the same line ends everywhere."""
+    """Write text as UTF-8, with line feeds as line ends on every system."""
     path.write_text(text, "utf-8", newline="\n")
 
 
 def write_json(path: Path, value: dict[str, Any]) -> None:
-    """Write JSON for people and programs."""
+    """Write indented JSON."""
     write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def link_file(source: Path, target: Path) -> None:
-    """Put a file of the bake into another folder as well, as a hard link where that is possible."""
+    """Create `target` as a hard link to the file `source`, or as a copy if that is not possible."""
     try:
         os.link(source, target)
     except OSError:
@@ -69,7 +69,7 @@ def link_file(source: Path, target: Path) -> None:
 
 
 def place_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Put scene, irradiance pages and their description into `target`; return the description."""
+    """Put scene, irradiance pages and `lightmap.json` into `target`; return the content of the latter."""
     description = describe(read_manifest(bake))
     link_file(bake / SCENE_NAME, target / SCENE_NAME)
     for page in description["pages"]:
@@ -79,21 +79,21 @@ def place_bake(bake: Path, target: Path) -> dict[str, Any]:
 
 
 def template(export: str, name: str) -> str:
-    """Return a file that an export ships."""
+    """Return the text of the file `name` in the templates of an export."""
     return resources.files("baker.exporters").joinpath("templates", export, name).read_text("utf-8")
 
 
 def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, steps: tuple[str, ...]) -> None:
-    """Write a folder's README: steps for the user, and the conventions that engines differ in.
+    """Write README.md of an export: steps for the user, and conventions in which engines differ.
 
     Parameters
     ----------
     target : Path
     title : str
     scale, uv, rows : str
-        Quantity of the numbers, uv set of lookups, and order of the image rows.
+        Quantity and unit of the pages, uv set of the lookups, and order of the image rows.
     steps : tuple of str
-        Steps for the user, a line each.
+        Instructions for the user, line by line.
     """
     lines = [f"# {title}", "", *steps, ""]
     lines += [f"- Scale: {scale}", f"- UV set: {uv}", f"- Row order: {rows}"]
@@ -101,15 +101,15 @@ def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, st
 
 
 def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
-    """Write scene.glb with a unique name for every node, for engines that identify nodes by name.
+    """Write scene.glb with a unique name for each node, for engines that identify nodes by name.
 
-    The name of node i is the old one, without characters and suffixes that engines interpret, followed by
-    `_n<i>`. Its mesh has the same name, and `extras.baker_node` is i.
+    The name of node i is its old name, with characters that engines interpret replaced by `_`, followed by
+    `_n<i>`. The mesh of a baked node gets the same name, and `extras.baker_node` is i.
 
     Returns
     -------
     dict
-        The description of the bake with the new names.
+        The content of `lightmap.json` with the new names.
     """
     description = describe(read_manifest(bake))
     document, binary = _read_glb(bake / SCENE_NAME)
@@ -129,7 +129,7 @@ def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
 
 
 def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Write pages, description and the scene with unique names into `target`; return the description."""
+    """Write pages, `lightmap.json` and the scene with unique names into `target`; return the JSON content."""
     description = place_named_scene(bake, target)
     for page in description["pages"]:
         link_file(bake / page["file"], target / page["file"])
@@ -138,9 +138,9 @@ def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
 
 
 def unique_name(name: str, node: int) -> str:
-    """Return a name that engines leave as it is and that no other node has."""
+    """Return a name that engines do not change and that no other node has."""
     safe = re.sub(r"[^0-9A-Za-z_]+", "_", name).strip("_") or "node"
-    # Blender cuts names at 63 bytes.
+    # Keep names short, because Blender truncates them to 63 bytes.
     return f"{safe[:48]}_n{node}"
 
 
@@ -152,7 +152,7 @@ def _read_glb(path: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def _glb(document: dict[str, Any], binary: bytes) -> bytes:
-    """Return a GLB of a document and its binary chunk with the chunk's head."""
+    """Return a GLB of a document; `binary` is the binary chunk with its 8-byte header."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text) + len(binary), len(text), 0x4E4F534A)

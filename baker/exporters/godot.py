@@ -1,4 +1,4 @@
-"""Godot 4 and 3: pages, scene, a shader, and a script that puts the shader on the objects."""
+"""Export for Godot 4 and 3: pages, scene, a shader, and a script that assigns the shader to the objects."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from baker.exporters.common import place_named_bake, template, write_readme, wri
 
 FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
 FILES_3 = ("lightmap.shader", "lightmaps.gd")
-# For both versions: stored as they are, linear, without mip levels that would mix charts, and not compressed
-# when they are first used in 3D. In version 3 mode 3 is "uncompressed", in 4 "VRAM uncompressed".
+# Import settings of the pages for Godot 3 and 4: linear, without mip levels, which would mix charts, and
+# uncompressed even when a page is used in 3D. `compress/mode=3` is "uncompressed" in Godot 3 and "VRAM
+# uncompressed" in Godot 4.
 _IMPORT = """\
 [remap]
 
@@ -34,12 +35,12 @@ detect_3d/compress_to=0
 
 
 class GodotExport:
-    """Files the export `godot`."""
+    """The export `godot`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         description = place_named_bake(bake, target)
         for page in description["pages"]:
             write_text(target / f"{page['file']}.import", _IMPORT)
@@ -55,13 +56,13 @@ class GodotExport:
             "Lightmaps for Godot",
             steps=(
                 "Copy the folder into the project. Godot 4: attach lightmaps.gd to the root of the imported",
-                "scene.glb, or set import_scene.gd as its import script (it attaches it). Godot 3 (GLES3;",
-                "GLES2 ends at 1.0): move godot3/* up, delete import_scene.gd, attach lightmaps.gd.",
-                "Exporting a game: add *.json to the filter of non-resource files.",
+                "scene.glb, or set import_scene.gd as its import script. Godot 3 (GLES3 only,",
+                "as GLES2 clamps at 1.0): move godot3/* up, delete import_scene.gd, attach lightmaps.gd.",
+                "When you export a game, add *.json to the filter of non-resource files.",
             ),
-            scale="EXR holds irradiance E in lx; the shader shows albedo x E / pi x `exposure`.",
+            scale="The pages contain irradiance E in lx; the shader shows albedo x E / pi x `exposure`.",
             uv="TEXCOORD_1, which is UV2.",
-            rows="v = 0 is the first row in Godot, too: nothing is turned over.",
+            rows="v = 0 is the first row of the image, as in Godot; v is not flipped.",
         )
 
 

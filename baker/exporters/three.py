@@ -1,4 +1,4 @@
-"""three.js: scene.glb, the EXR pages, and a module that puts the two together."""
+"""Export for three.js: scene.glb, the EXR pages, and a module that loads both."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from baker.exporters.common import place_bake, template, write_readme, write_tex
 
 
 class ThreeExport:
-    """Files the export `three`."""
+    """The export `three`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         place_bake(bake, target)
         write_text(target / "lightmap.js", template("three", "lightmap.js"))
         write_readme(
             target,
             "Lightmaps for three.js",
             steps=(
-                "Serve this folder and load it with the module beside this file (three.js r151 or newer):",
+                "Serve this folder and load it with lightmap.js (three.js r151 or newer):",
                 "`const { gltf } = await loadBake('three/'); scene.add(gltf.scene);`",
-                "The lights of the file are baked in and so are hidden; AO is in the light and so is off.",
-                "Materials become matte; with `{ matte: false }` they stay what they are (1.5 % darker).",
+                "The file's lights and AO maps are switched off, because the pages contain their effect.",
+                "Materials become MeshLambertMaterial; `{ matte: false }` keeps them, 1.5 % darker.",
             ),
-            scale="EXR holds irradiance E in lx, `lightMap` takes just that: shown is albedo x E / pi, in "
-            "cd/m2. `{ exposure: x }` multiplies all of it.",
+            scale="The pages contain irradiance E in lx; used as `lightMap`, they give albedo x E / pi "
+            "in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `uv1`; a texture needs `channel = 1`.",
-            rows="v = 0 is the EXR's first row, but EXRLoader hands rows out from below: v is turned over.",
+            rows="v = 0 is the first row of the EXR. EXRLoader stores the rows bottom-up, so 1 - v is used.",
         )
 
 

@@ -1,7 +1,8 @@
-"""Unity: pages in Unity's scale, and scripts that import them and assign them to renderers.
+"""Export for Unity: pages that hold E / pi, and scripts that import them and assign them to renderers.
 
-Unity multiplies a lightmap by the albedo only, so pages hold E / pi. glTF importers flip v (v' = 1 - v), and
-image rows start at the bottom, so pages need no flip; scale and offset of an object become
+Unity multiplies a lightmap by the albedo and not by 1 / pi, so the pages are divided by pi. Unity's glTF
+importers replace v by 1 - v, and Unity stores image rows bottom-up, so pages need no flip. The scale (su, sv)
+and offset (ou, ov) of an object become
 
     lightmapScaleOffset = (su, sv, ou, 1 - sv - ov)     with page uv = uv * (su, sv) + (ou, ov) in glTF.
 
@@ -27,19 +28,19 @@ from baker.exporters.common import (
     write_text,
 )
 
-# Entries of a page's header that are still valid after division by pi.
+# Header attributes of a page that are copied, because they stay valid after the division by pi.
 _KEPT = ("colourSpace", "software")
 
 SCRIPTS = ("Editor/BakerLightmapImporter.cs", "BakerLightmaps.cs")
 
 
 class UnityExport:
-    """Files the export `unity`."""
+    """The export `unity`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         description = place_named_scene(bake, target)
         for page in description["pages"]:
             _write_page(bake / page["file"], target / page["file"])
@@ -51,14 +52,14 @@ class UnityExport:
             target,
             "Lightmaps for Unity",
             steps=(
-                "Copy the folder into Assets; scene.glb needs a glTF importer (glTFast or UnityGLTF).",
+                "Copy the folder into Assets. To import scene.glb, install glTFast or UnityGLTF.",
                 "Put scene.glb into the open scene, select it, and choose Baker > Apply lightmaps.",
-                "The component BakerLightmaps keeps the pages with the scene. Delete the baked lights.",
-                "Leave occlusion maps off: what is open or closed is in the light.",
+                "The component BakerLightmaps stores the pages in the scene. Delete the baked lights.",
+                "Do not use occlusion maps, because the pages already contain occlusion.",
             ),
-            scale="EXR holds E / pi, what a white surface sends out in cd/m2; Unity multiplies by albedo.",
+            scale="Pages contain E / pi, the radiance of a white surface in cd/m2; Unity multiplies by albedo.",
             uv="TEXCOORD_1, which is Unity's `uv2` (Mesh.uv2).",
-            rows="v = 0 is the first row; importers turn v over and Unity's images begin below: they agree.",
+            rows="v = 0 is the first row. Importers flip v and Unity stores images bottom-up, so both agree.",
         )
 
 
@@ -66,7 +67,7 @@ EXPORTS.register("unity")(UnityExport())
 
 
 def unity_description(description: dict[str, Any]) -> dict[str, Any]:
-    """Return the description in Unity's terms."""
+    """Return the content of `lightmap.json` with Unity's quantity, unit and `scaleOffset`."""
     return {
         **description,
         "quantity": "irradiance / pi",
@@ -82,12 +83,12 @@ def unity_description(description: dict[str, Any]) -> dict[str, Any]:
 
 
 def scale_offset(scale: list[float], offset: list[float]) -> list[float]:
-    """Return Unity's lightmapScaleOffset of an object: v runs upwards there."""
+    """Return Unity's lightmapScaleOffset of an object; v = 0 is the bottom of the image in Unity."""
     return [scale[0], scale[1], offset[0], 1.0 - scale[1] - offset[1]]
 
 
 def _write_page(source: Path, target: Path) -> None:
-    """Write a page divided by pi, in the number format of its source."""
+    """Write a page divided by pi, with the same number format as its source."""
     encoding = encoding_of(source.name)
     assert encoding is not None, "the bake wrote this file itself"
     image = encoding.decode(source)

@@ -1,8 +1,8 @@
-"""One GLB without lightmaps: the radiance of each surface as an unlit texture on the first uv set.
+"""Export as one GLB without lightmaps: the radiance of each surface is an unlit texture on TEXCOORD_0.
 
-For viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each page
-becomes an sRGB PNG of (albedo x E / pi + emission) x exposure, clipped at 1; the exposure is chosen so that
-99 % of the texels are not clipped.
+It is for viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each page
+becomes an sRGB PNG of `(albedo x E / pi + emission) x exposure`, clipped at 1. The exposure is chosen so that
+99 % of the covered texels are not clipped.
 
 Based on: Khronos Group, KHR_materials_unlit.
 """
@@ -31,17 +31,17 @@ from baker.io.png import encode_png, grey_levels, srgb_levels
 from baker.radiosity.texels import build_texels
 from baker.shading.materials import resolve_materials
 
-# The share of texels that must not be clipped.
+# Share of the covered texels that must not be clipped, 0 to 1.
 SHOWN = 0.99
 
 
 class UnlitExport:
-    """Files the export `unlit`."""
+    """The export `unlit`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         stored = read_bake(bake)
         page, covered = radiance(stored)
         exposure = exposure_for(page[..., :3], covered)
@@ -51,12 +51,12 @@ class UnlitExport:
             target,
             "One unlit GLB",
             steps=(
-                "scene.glb stands alone: light and colour are one texture (KHR_materials_unlit).",
-                "The scene is flat: nodes at their places in the world, no animation, skins or lights.",
-                "Viewers without the extension light it again; most know it.",
+                "scene.glb needs no other file: light and colour are one texture (KHR_materials_unlit).",
+                "All nodes are roots with world matrices; there are no animations, skins and lights.",
+                "Viewers that do not support the extension light the scene a second time.",
             ),
-            scale=f"sRGB of (albedo x E / pi + emission) x {exposure:.6g}; 1 % of texels may clip at white.",
-            uv="TEXCOORD_0 is the lightmap uv; there is no other.",
+            scale=f"sRGB of (albedo x E / pi + emission) x {exposure:.6g}; 1 % of texels may be clipped.",
+            uv="TEXCOORD_0 is the lightmap uv, the only uv set.",
             rows="v = 0 is the first row of the image, as everywhere in glTF.",
         )
 
@@ -65,12 +65,12 @@ EXPORTS.register("unlit")(UnlitExport())
 
 
 def radiance(bake: StoredBake) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return the radiance of surfaces, cd/m2, with alpha, and the mask of covered texels.
+    """Return the radiance (cd/m2) and alpha of each texel, and the mask of covered texels.
 
     Returns
     -------
     page : (P, H, W, 4) float32
-        Dilated as far as the lightmap is.
+        Radiance in linear RGB, and alpha, dilated into the padding.
     covered : (P, H, W) bool
     """
     texels, albedo = _texel_colour(bake, bake.scene)
@@ -91,14 +91,14 @@ def radiance(bake: StoredBake) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
 
 
 def exposure_for(light: NDArray[np.float32], covered: NDArray[np.bool_]) -> float:
-    """Return the factor that lets 99 % of the covered texels through; 1 for a black scene."""
+    """Return the factor with which 99 % of the covered texels are at most 1; 1 for a black scene."""
     brightest = light[covered].max(axis=1)
     top = float(np.quantile(brightest, SHOWN)) if len(brightest) else 0.0
     return 1.0 / top if top > 0.0 else 1.0
 
 
 def unlit_glb(bake: StoredBake, page: NDArray[np.float32], exposure: float) -> bytes:
-    """Return the GLB: every surface with its page's texture on TEXCOORD_0.
+    """Return the GLB in which each surface has the texture of its page on TEXCOORD_0.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def unlit_glb(bake: StoredBake, page: NDArray[np.float32], exposure: float) -> b
     for use in uses:
         del use.primitive["attributes"]["TEXCOORD_1"]
     document = packer.document
-    # Without mip levels, which would mix charts.
+    # Filter linearly, without mip levels, which would mix charts.
     document["samplers"] = [{"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071}]
     document["images"], document["textures"] = [], []
     for number, value in enumerate(page):
@@ -151,7 +151,7 @@ def _unlight(material: Json, page: int) -> None:
 
 
 def _kind(material: Material) -> Material:
-    """Return a material without colours and textures; the page's texture replaces them."""
+    """Return a white material that keeps only sidedness and alpha mode; the page's texture is added later."""
     return Material(
         name="unlit",
         base_colour=(1.0, 1.0, 1.0, 1.0),
@@ -162,7 +162,7 @@ def _kind(material: Material) -> Material:
 
 
 def _texel_colour(bake: StoredBake, scene: Scene) -> tuple[TexelBuffer, NDArray[np.float32]]:
-    """Return the texels and the mean base colour of each, (n_front, 3) float32."""
+    """Return the texels of the front sides and their mean base colour, (n_front, 3) float32."""
     geometry = world_geometry(scene, bake.atlas)
     shading = resolve_materials(scene, geometry)
     texels, _ = build_texels(
@@ -172,13 +172,13 @@ def _texel_colour(bake: StoredBake, scene: Scene) -> tuple[TexelBuffer, NDArray[
 
 
 def _with_materials(scene: Scene, materials: tuple[Material, ...]) -> Scene:
-    """Return the scene with other materials, and without vertex colours, which are the base colour's."""
+    """Return the scene with other materials and without vertex colours, which belong to the base colour."""
     meshes = tuple(replace(mesh, colour=None) for mesh in scene.meshes)
     return replace(scene, materials=materials, meshes=meshes)
 
 
 def _emissive_only(material: Material) -> Material:
-    """Return a material whose base colour is the emission of another."""
+    """Return a material whose base colour is the emission of `material`."""
     return Material(
         base_colour=(*material.emission, 1.0),
         base_colour_texture=material.emission_texture,
@@ -187,7 +187,7 @@ def _emissive_only(material: Material) -> Material:
 
 
 def _alpha(material: Material) -> Material:
-    """Return a material whose base colour is the alpha of another, as three grey channels."""
+    """Return a material whose base colour is the alpha of `material`, as three equal channels."""
     share, texture = 1.0, None
     if material.alpha_mode != "OPAQUE":
         share = material.base_colour[3]

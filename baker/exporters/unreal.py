@@ -1,6 +1,7 @@
-"""Unreal Engine: pages, scene, and an editor script that builds a material function on uv set 1.
+"""Export for Unreal Engine: pages, scene, and an editor script that builds a material function.
 
-Unreal cannot import lightmaps, so the light is the emission of an unlit material:
+Unreal cannot import lightmaps, so the reflected light becomes the emission of an unlit material:
+
 emissive colour = base colour * page(TexCoord[1] * scale + offset) / pi.
 """
 
@@ -13,26 +14,26 @@ from baker.exporters.common import place_named_bake, template, write_readme, wri
 
 
 class UnrealExport:
-    """Files the export `unreal`."""
+    """The export `unreal`."""
 
     needs: tuple[str, ...] = ("irradiance",)
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write the folder."""
+        """Write the files of the export into `target`."""
         place_named_bake(bake, target)
         write_text(target / "import_lightmaps.py", template("unreal", "import_lightmaps.py"))
         write_readme(
             target,
             "Lightmaps for Unreal Engine",
             steps=(
-                "Switch the Python Editor Script plugin on, then Tools > Execute Python Script on",
-                "import_lightmaps.py. It imports pages and scene to /Game/Baker, makes the material function",
-                "MF_BakerLightmap and the unlit material M_BakerLightmap, and one instance for each object.",
-                "Exposure is the parameter `Exposure`; auto exposure of the level has the last word.",
+                "Enable the Python Editor Script plugin, then run import_lightmaps.py (Tools > Execute Python",
+                "Script). It imports pages and scene to /Game/Baker, and creates the material function",
+                "MF_BakerLightmap, the unlit material M_BakerLightmap and one instance for each object.",
+                "The parameter `Exposure` scales the light; the level's auto exposure is applied after it.",
             ),
-            scale="EXR holds irradiance E in lx; the material shows base colour x E / pi, in cd/m2.",
+            scale="The pages contain irradiance E in lx; the material shows base colour x E / pi, in cd/m2.",
             uv="TEXCOORD_1, which is UV channel 1 (TexCoord[1]).",
-            rows="v = 0 is the first row in Unreal, too: nothing is turned over.",
+            rows="v = 0 is the first row of the image, as in Unreal; v is not flipped.",
         )
 
 

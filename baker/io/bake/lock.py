@@ -60,8 +60,7 @@ class OutputLock:
         """Release the lock; delete the lock file and those parent folders that `acquire` created."""
         if self._file is None:
             return
-        # Delete the file while the lock is held: after the release, another run could already have locked the
-        # file.
+        # Delete the file before the release: afterwards, another run could already have locked it.
         with contextlib.suppress(OSError):
             self.path.unlink()
         os.close(self._file)

@@ -222,8 +222,7 @@ class OutputFolder:
     def _exchange_files(self) -> None:
         new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
         old = {Path(name) for name in own_files(self.out) or ()} | set(new)
-        # Move the old manifest out first and the new one in last, so that a folder with a manifest is
-        # complete.
+        # Move the old manifest first and the new one last, so that a folder with a manifest is complete.
         for name in sorted(old, key=lambda n: (n.as_posix() != MANIFEST_NAME, n)):
             if (self.out / name).exists():
                 (self._aside / name).parent.mkdir(parents=True, exist_ok=True)
@@ -233,8 +232,7 @@ class OutputFolder:
             self._rename(self.path / name, self.out / name)
 
     def _rename(self, source: Path, target: Path) -> None:
-        # Record the rename first, so that `abort` also undoes it if the process is interrupted right after
-        # it.
+        # Record the rename first, so that `abort` also undoes it after an interruption.
         self._journal.append((source, target))
         try:
             source.rename(target)

@@ -158,8 +158,7 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     if material.base_colour_texture is not None:
         surface["baseColorTexture"] = _texture(packer, material.base_colour_texture, images, extensions)
     if any(material.emission):
-        # `emissiveFactor` must not exceed 1: divide by the largest component, and write it as
-        # emissiveStrength.
+        # `emissiveFactor` is at most 1: divide by the largest component, and write that as strength.
         strength = max(1.0, *map(float, material.emission))
         result["emissiveFactor"] = [max(float(v), 0.0) / strength for v in material.emission]
         if strength > 1.0:

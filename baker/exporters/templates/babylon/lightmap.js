@@ -1,14 +1,14 @@
-// Loads a baked scene into Babylon.js: scene.glb with its irradiance pages as light maps.
+// Loads a baked scene into Babylon.js: scene.glb, with the irradiance pages as light maps.
 //
 //   import { loadBake } from './babylon/lightmap.js';
 //   await loadBake(BABYLON, './babylon/', scene);
 //
 // BABYLON is the namespace of the library with its glTF loader, from script tags or `import * as BABYLON`.
 
-// Loads the folder of this file. Options:
-//   exposure  factor on all light, 1 by default: shown is radiance in cd/m2
-//   lights    false (default): switch the lights of the file off, for they are in the light maps
-//   fflate    address of fflate's script, which Babylon.js needs for ZIP pages and else fetches from a CDN
+// Loads the bake in `folder`. Options:
+//   exposure  factor of all light; with 1, the default, materials show radiance in cd/m2
+//   lights    false (default): switch off the lights of the file, because the light maps contain their light
+//   fflate    URL of the fflate script, which Babylon.js needs for ZIP pages; default: Babylon.js uses a CDN
 export async function loadBake(BABYLON, folder, scene, options = {}) {
   const { exposure = 1, lights = false, fflate } = options;
   const base = folder.endsWith('/') ? folder : folder + '/';
@@ -36,7 +36,8 @@ export async function loadBake(BABYLON, folder, scene, options = {}) {
   return { ...loaded, bake, textures };
 }
 
-// The glTF node of a mesh: names may repeat, so the loader's pointers say it. A primitive asks its parent.
+// Returns the glTF node index of a mesh from the loader's JSON pointers, because names may repeat. The mesh of a single
+// primitive has no pointer, so its parents are searched.
 function nodeIndex(mesh) {
   for (let node = mesh; node; node = node.parent) {
     for (const pointer of (node._internalMetadata ?? node.metadata)?.gltf?.pointers ?? []) {
@@ -51,7 +52,7 @@ function pageTexture(BABYLON, url, object, scene) {
   const texture = new BABYLON.Texture(url, scene, true, false, BABYLON.Texture.BILINEAR_SAMPLINGMODE);
   texture.coordinatesIndex = 1;
   texture.wrapU = texture.wrapV = BABYLON.Texture.CLAMP_ADDRESSMODE;
-  // Rows of an EXR come from below, and v = 0 is the first row: v becomes 1 - v.
+  // Babylon.js stores EXR rows bottom-up, but v = 0 is the first row of the EXR: replace v by 1 - v.
   texture.uScale = object.uv_scale[0];
   texture.vScale = -object.uv_scale[1];
   texture.uOffset = object.uv_offset[0];
@@ -59,7 +60,7 @@ function pageTexture(BABYLON, url, object, scene) {
   return texture;
 }
 
-// Resolves when the page is there. The EXR loader marks its pages as gamma-encoded, so that is set right last.
+// Resolves when the page is loaded. The EXR loader marks textures as gamma-encoded, so set them to linear then.
 function loadedLinear(BABYLON, texture) {
   return new Promise((resolve, reject) => {
     const done = () => { texture.gammaSpace = false; resolve(); };
@@ -71,7 +72,8 @@ function loadedLinear(BABYLON, texture) {
   });
 }
 
-// Babylon.js adds a light map to the colour or multiplies it in: an unlit material times E / pi is albedo * E / pi.
+// Babylon.js either adds a light map to a material's colour or multiplies by it. Here it multiplies: the unlit colour
+// is the albedo and the light map is E / pi, so the product is albedo * E / pi.
 function litMaterial(material, texture, key, exposure, materials) {
   const name = material.uniqueId + ' ' + key;
   if (!materials.has(name)) {
@@ -80,7 +82,7 @@ function litMaterial(material, texture, key, exposure, materials) {
     lit.lightmapTexture = texture;
     lit.useLightmapAsShadowmap = true;
     lit.emissiveIntensity = (lit.emissiveIntensity ?? 1) * exposure;
-    // What is open or closed is in the irradiance already.
+    // The irradiance already contains occlusion.
     lit.ambientTexture = null;
     materials.set(name, lit);
   }

@@ -1,19 +1,19 @@
-//! Gives the objects of a baked scene their lightmaps.
+//! Adds lightmaps to the objects of a baked scene.
 //!
-//! `app.add_plugins(BakerLightmapsPlugin { folder: "bevy".into() })`, and spawn `scene.glb` as usual.
+//! Call `app.add_plugins(BakerLightmapsPlugin { folder: "bevy".into() })`, and spawn `scene.glb` as usual.
 
 use bevy::math::Rect;
 use bevy::pbr::Lightmap;
 use bevy::prelude::*;
 
-/// Bevy multiplies a lightmap by the diffuse colour; the pages are irradiance E, and E / pi is wanted.
+/// The pages contain irradiance E, which Bevy multiplies by the diffuse colour. The factor 1 / pi gives radiance.
 const LIGHTMAP_EXPOSURE: f32 = std::f32::consts::FRAC_1_PI;
 
 const PAGES: &[&str] = &[
     /* pages */
 ];
 
-/// Where an object lies: the page, and the rectangle that its second uv set is relative to.
+/// The page of an object, and the rectangle of the page that its second uv set covers.
 struct Baked {
     name: &'static str,
     page: usize,
@@ -39,7 +39,7 @@ impl Plugin for BakerLightmapsPlugin {
 #[derive(Resource)]
 struct BakerFolder(String);
 
-/// Adds `Lightmap` to meshes as they appear. A mesh entity is a child of its node, which has the unique name.
+/// Adds `Lightmap` to each new mesh. A mesh entity is a child of its node, which has the unique name.
 fn add_lightmaps(
     mut commands: Commands,
     added: Query<(Entity, &ChildOf, &MeshMaterial3d<StandardMaterial>), (With<Mesh3d>, Without<Lightmap>)>,
@@ -53,7 +53,7 @@ fn add_lightmaps(
         let Some(baked) = OBJECTS.iter().find(|baked| baked.name == name.as_str()) else { continue };
         let Some(material) = materials.get_mut(&material.0) else { continue };
         material.lightmap_exposure = LIGHTMAP_EXPOSURE;
-        // Metals have no diffuse colour in Bevy, but the bake takes every surface as matt.
+        // Metals have no diffuse colour in Bevy, but the bake treats every surface as diffuse.
         material.metallic = 0.0;
         commands.entity(entity).insert(Lightmap {
             image: assets.load(format!("{}/{}", folder.0, PAGES[baked.page])),

@@ -1,9 +1,9 @@
-"""Imports a baked scene into Blender (4.2 or newer) and lights it with its irradiance pages only.
+"""Imports a baked scene into Blender (4.2 or newer) and replaces its lights by the irradiance pages.
 
     blender --python import_lightmaps.py
 
-Every material is copied for each page of its objects. The copy emits the radiance of the surface: base colour
-times irradiance over pi, plus the material's own emission.
+For each page that the objects of a material use, the material is copied. The copy emits the radiance of the
+surface: base colour x irradiance / pi, plus the emission of the material.
 """
 
 import json
@@ -14,7 +14,7 @@ import bpy
 
 
 def load(folder, exposure=1.0):
-    """Import the folder of this file; `exposure` multiplies all light. Returns the objects that are lit."""
+    """Import the bake in `folder`; multiply all light by `exposure`; return the objects with lightmaps."""
     folder = Path(folder)
     bake = json.loads((folder / "lightmap.json").read_text("utf-8"))
     before = set(bpy.data.objects)
@@ -25,7 +25,7 @@ def load(folder, exposure=1.0):
     copies, lit = {}, []
     for item in sorted(set(bpy.data.objects) - before, key=lambda item: item.name):
         if item.type == "LIGHT":
-            # It is in the pages.
+            # The pages contain its light.
             item.hide_render = item.hide_viewport = True
         entry = by_node.get(item.get("baker_node")) or by_name.get(item.name)
         if item.type != "MESH" or entry is None:
@@ -44,7 +44,7 @@ def load(folder, exposure=1.0):
 
 
 def page_image(path):
-    """Load a page as the numbers that it holds."""
+    """Load a page without conversion of its colours."""
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.name = "Non-Color"
     return image
@@ -61,7 +61,7 @@ def lit_material(material, image, uv, entry, exposure):
     mapping = nodes.new("ShaderNodeMapping")
     scale, offset = entry["uv_scale"], entry["uv_offset"]
     mapping.inputs["Scale"].default_value = (scale[0], scale[1], 1.0)
-    # Both v run upwards here: 1 - ((1 - v) * scale + offset) = v * scale + (1 - scale - offset).
+    # v = 0 is the bottom in Blender: 1 - ((1 - v) * scale + offset) = v * scale + (1 - scale - offset).
     mapping.inputs["Location"].default_value = (offset[0], 1.0 - scale[1] - offset[1], 0.0)
     source = nodes.new("ShaderNodeUVMap")
     source.uv_map = uv
@@ -100,7 +100,7 @@ def lit_material(material, image, uv, entry, exposure):
 
 
 def feed(links, node, name, target, fallback):
-    """Connect `target` to the link of an input of `node`, or set it to the input's value."""
+    """Connect `target` to the source of the input `name` of `node`, or copy the input's value."""
     socket = None if node is None else node.inputs.get(name)
     if socket is not None and socket.is_linked:
         links.new(socket.links[0].from_socket, target)

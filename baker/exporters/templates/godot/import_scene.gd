@@ -1,6 +1,6 @@
 @tool
 extends EditorScenePostImport
-# Import script for scene.glb (Godot 4): attaches lightmaps.gd to its root.
+# Import script for scene.glb (Godot 4): attaches lightmaps.gd to the root of the scene.
 
 
 func _post_import(scene: Node) -> Object:

@@ -1,10 +1,10 @@
 @tool
 extends Node3D
-# Gives every object below this node its lightmap (Godot 4). Attach it to the root of the imported scene.glb.
+# Assigns lightmaps to the objects below this node (Godot 4). Attach it to the root of the imported scene.glb.
 
 @export var folder := "res://godot"
 @export var exposure := 1.0
-# The file's lights are in the pages.
+# Hide the lights of the file, because the pages contain their light.
 @export var hide_lights := true
 
 

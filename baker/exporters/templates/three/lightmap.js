@@ -1,4 +1,4 @@
-// Loads a baked scene into three.js: scene.glb with its irradiance pages as light maps.
+// Loads a baked scene into three.js: scene.glb, with the irradiance pages as light maps.
 //
 //   import { loadBake } from './three/lightmap.js';
 //   const { gltf } = await loadBake('./three/');
@@ -8,10 +8,10 @@ import { FileLoader, LinearFilter, MeshLambertMaterial, NoColorSpace } from 'thr
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
-// Loads the folder of this file. Options:
-//   exposure  factor on all light, 1 by default: shown is radiance in cd/m2
-//   matte     true (default): matte materials, which show exactly albedo * E / pi; false: keep the file's materials
-//   lights    false (default): hide the lights of the file, for they are in the light maps
+// Loads the bake in `folder`. Options:
+//   exposure  factor of all light; with 1, the default, materials show radiance in cd/m2
+//   matte     true (default): use MeshLambertMaterial, which shows albedo * E / pi; false: keep the materials
+//   lights    false (default): hide the lights of the file, because the light maps contain their light
 export async function loadBake(folder, options = {}) {
   const base = folder.endsWith('/') ? folder : folder + '/';
   const bake = JSON.parse(await new FileLoader().loadAsync(base + 'lightmap.json'));
@@ -24,7 +24,7 @@ export async function loadBake(folder, options = {}) {
   return { gltf, bake, textures };
 }
 
-// Gives every object of a loaded glTF its light map.
+// Assigns light maps to the objects of a loaded glTF.
 export function applyLightmaps(gltf, bake, textures, options = {}) {
   const { exposure = 1, matte = true, lights = false } = options;
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));
@@ -32,10 +32,10 @@ export function applyLightmaps(gltf, bake, textures, options = {}) {
   const placed = new Map();
   const materials = new Map();
   const visit = (node, inherited) => {
-    // GLTFLoader strips dots and blanks from names and numbers repeated ones, so the index goes first.
+    // GLTFLoader changes names (dots, blanks, repeated names), so identify nodes by index if possible.
     const index = gltf.parser.associations.get(node)?.nodes;
     let object = index === undefined ? byName.get(node.userData.name ?? node.name) : byNode.get(index);
-    // A mesh of several primitives becomes a group of meshes: they are their node's.
+    // A mesh with several primitives becomes a group of meshes, which get the object of their node.
     if (object === undefined && index === undefined) object = inherited;
     if (node.isLight && !lights) node.visible = false;
     if (node.isMesh && object !== undefined) {
@@ -49,7 +49,7 @@ export function applyLightmaps(gltf, bake, textures, options = {}) {
   visit(gltf.scene, undefined);
 }
 
-// Returns the page's texture as one object reads it; objects that read it alike share it.
+// Returns a page's texture with the uv transform of an object; objects with equal transforms share it.
 function placedTexture(textures, object, placed) {
   const key = [object.page, ...object.uv_scale, ...object.uv_offset].join();
   if (!placed.has(key)) {
@@ -58,7 +58,7 @@ function placedTexture(textures, object, placed) {
     texture.colorSpace = NoColorSpace;
     texture.minFilter = texture.magFilter = LinearFilter;
     texture.generateMipmaps = false;
-    // EXRLoader hands rows out from below, and v = 0 is the first row: v becomes 1 - v.
+    // EXRLoader stores rows bottom-up, but v = 0 is the first row of the EXR: replace v by 1 - v.
     const [scaleU, scaleV] = object.uv_scale;
     const [offsetU, offsetV] = object.uv_offset;
     texture.repeat.set(scaleU, -scaleV);
@@ -70,16 +70,16 @@ function placedTexture(textures, object, placed) {
 }
 
 function litMaterial(material, texture, exposure, matte, materials) {
-  // Materials that are no business of light (KHR_materials_unlit) stay as they are.
+  // Unlit materials (KHR_materials_unlit) are not changed.
   if (material.isMeshBasicMaterial) return material;
   const key = material.uuid + texture.uuid;
   if (!materials.has(key)) {
     const lit = matte ? matteMaterial(material) : material.clone();
     lit.lightMap = texture;
-    // three.js multiplies by albedo / pi itself: the map is irradiance.
+    // The map contains irradiance, which three.js multiplies by albedo / pi.
     lit.lightMapIntensity = exposure;
     lit.emissiveIntensity *= exposure;
-    // What is open or closed is in the irradiance already.
+    // The irradiance already contains occlusion.
     lit.aoMap = null;
     materials.set(key, lit);
   }

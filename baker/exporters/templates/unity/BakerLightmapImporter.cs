@@ -1,4 +1,4 @@
-// Imports the pages of a bake as lightmaps and gives them to the objects of its scene.
+// Imports the pages of a bake as lightmaps and assigns them to the renderers of its scene.
 // Menu: Baker > Apply lightmaps, with the imported scene.glb selected in the hierarchy.
 using System;
 using System.Collections.Generic;
@@ -34,7 +34,7 @@ public sealed class BakerLightmapImporter : AssetPostprocessor
         public BakedObject[] objects;
     }
 
-    // Pages are linear numbers with a high range: no sRGB, no mip levels that would mix charts, no resizing.
+    // Pages are linear HDR images: disable sRGB decoding, resizing, and mip levels, which would mix charts.
     private void OnPreprocessTexture()
     {
         string folder = Path.GetDirectoryName(assetPath);
@@ -50,8 +50,8 @@ public sealed class BakerLightmapImporter : AssetPostprocessor
         importer.filterMode = FilterMode.Bilinear;
         importer.npotScale = TextureImporterNPOTScale.None;
         importer.maxTextureSize = Mathf.Max(32, Mathf.NextPowerOfTwo(Mathf.Max(page.width, page.height)));
-        // Unity encodes a lightmap for each platform itself: BC6H or half where there is HDR, RGBM elsewhere
-        // (0 to 34.49 in linear colour space). Uncompressed keeps the numbers of the bake.
+        // By default, Unity encodes lightmaps as BC6H or half on platforms with HDR, and elsewhere as RGBM (0
+        // to 34.49 in linear colour space). Uncompressed keeps the values of the bake.
         importer.textureCompression = TextureImporterCompression.Uncompressed;
     }
 
@@ -97,7 +97,7 @@ public sealed class BakerLightmapImporter : AssetPostprocessor
         Debug.Log("Baker: " + renderers.Count + " of " + description.objects.Length + " objects have their lightmap.");
     }
 
-    // Node i is named ..._n<i>. Importers make a child for each primitive of a mesh: it is its parent's.
+    // Node i is named ..._n<i>. Importers create a child for each primitive of a mesh: search its parents, too.
     private static BakedObject Find(Transform node, Transform root, Dictionary<string, BakedObject> byName)
     {
         for (; node != null; node = node == root ? null : node.parent)

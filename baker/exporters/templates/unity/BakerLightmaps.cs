@@ -1,5 +1,5 @@
-// Keeps the lightmaps of a baked object and hands them to Unity when it is switched on.
-// Unity itself forgets lightmaps that were set by a script as soon as a scene is loaded again.
+// Stores the lightmaps of a baked scene, and passes them to Unity whenever it is enabled.
+// Unity does not keep lightmaps that a script has set when a scene is loaded again.
 using System.Collections.Generic;
 using UnityEngine;
 
@@ -7,7 +7,7 @@ using UnityEngine;
 [DisallowMultipleComponent]
 public sealed class BakerLightmaps : MonoBehaviour
 {
-    // Pages hold irradiance / pi: Unity multiplies a lightmap by the albedo and by nothing else.
+    // Pages contain irradiance / pi, because Unity multiplies a lightmap only by the albedo.
     public Texture2D[] pages = new Texture2D[0];
     public Renderer[] renderers = new Renderer[0];
     public int[] page = new int[0];

@@ -1,4 +1,4 @@
-"""Imports a baked scene into Unreal Engine (5.3 or newer): pages, meshes, and materials that show the light.
+"""Imports a baked scene into Unreal Engine (5.3 or newer): pages, meshes, and materials that show the pages.
 
 Run it in the editor: Tools > Execute Python Script. Assets outside CONTENT are not changed.
 """
@@ -26,7 +26,7 @@ def import_file(path, destination):
 
 
 def import_page(path):
-    """Import a page as linear numbers with a high range, without mip levels that would mix charts."""
+    """Import a page as a linear HDR texture without mip levels, which would mix charts."""
     texture = unreal.load_asset(import_file(path, CONTENT + "/Pages")[0])
     texture.set_editor_property("srgb", False)
     texture.set_editor_property("compression_settings", unreal.TextureCompressionSettings.TC_HDR)
@@ -38,7 +38,7 @@ def import_page(path):
 
 
 def make_function(page):
-    """Make MF_BakerLightmap: base colour in, base colour * E / pi out."""
+    """Create the material function MF_BakerLightmap, which maps base colour to base colour * E / pi."""
     function = assets.create_asset(
         "MF_BakerLightmap", CONTENT, unreal.MaterialFunction, unreal.MaterialFunctionFactoryNew()
     )
@@ -59,7 +59,7 @@ def make_function(page):
         default_value=unreal.LinearColor(1.0, 1.0, 0.0, 0.0),
     )
     size = node(unreal.MaterialExpressionComponentMask, -1000, 150, r=True, g=True, b=False, a=False)
-    # The alpha of a vector parameter is an output of its own, so the offset is composed of blue and alpha.
+    # Compose the offset from the outputs B and A, because a vector parameter outputs alpha separately.
     start = node(unreal.MaterialExpressionAppendVector, -1000, 250)
     scaled = node(unreal.MaterialExpressionMultiply, -800, 0)
     placed = node(unreal.MaterialExpressionAdd, -700, 100)
@@ -99,7 +99,7 @@ def make_function(page):
 
 
 def make_material(function):
-    """Make M_BakerLightmap: unlit, with the base colour of a texture times a factor."""
+    """Create the unlit material M_BakerLightmap, whose base colour is a texture times a factor."""
     material = assets.create_asset("M_BakerLightmap", CONTENT, unreal.Material, unreal.MaterialFactoryNew())
     material.set_editor_property("shading_model", unreal.MaterialShadingModel.MSM_UNLIT)
     call = editing.create_material_expression(
@@ -124,7 +124,7 @@ def make_material(function):
 
 
 def main():
-    """Import everything."""
+    """Import pages and scene, and assign a material instance to each slot of each baked mesh."""
     bake = json.loads((FOLDER / "lightmap.json").read_text("utf-8"))
     pages = [import_page(FOLDER / page["file"]) for page in bake["pages"]]
     material = make_material(make_function(pages[0]))
@@ -153,7 +153,7 @@ def main():
 
 
 def copy_base_colour(old, instance):
-    """Copy the base colour of the material that the glTF importer made, if it has one."""
+    """Copy base colour texture and factor, if present, from the material that the glTF importer created."""
     if old is None:
         return
     for name in ("BaseColorTexture", "Base Color Texture"):

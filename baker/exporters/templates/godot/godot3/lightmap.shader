@@ -1,4 +1,4 @@
-// Shows albedo * E / pi and its emission: E is the irradiance of a page, read through UV2.
+// Shows albedo * E / pi + emission, where E is the irradiance in the page at UV2.
 shader_type spatial;
 render_mode unshaded;
 

@@ -1,9 +1,9 @@
 extends Spatial
-# Gives every object below this node its lightmap (Godot 3, GLES3). Attach it to the root of scene.glb.
+# Assigns lightmaps to the objects below this node (Godot 3, GLES3). Attach it to the root of scene.glb.
 
 export var folder = "res://godot"
 export var exposure = 1.0
-# The file's lights are in the pages.
+# Hide the lights of the file, because the pages contain their light.
 export var hide_lights = true
 
 
