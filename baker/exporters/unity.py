@@ -57,7 +57,7 @@ class UnityExport:
                 "The component BakerLightmaps stores the pages in the scene. Delete the baked lights.",
                 "Do not use occlusion maps, because the pages already contain occlusion.",
             ),
-            scale="Pages contain E / pi, the radiance of a white surface in cd/m2; Unity multiplies by albedo.",
+            scale="Pages contain E / pi, the radiance of a white surface, cd/m2; Unity multiplies by albedo.",
             uv="TEXCOORD_1, which is Unity's `uv2` (Mesh.uv2).",
             rows="v = 0 is the first row. Importers flip v and Unity stores images bottom-up, so both agree.",
         )

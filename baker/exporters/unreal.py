@@ -26,7 +26,7 @@ class UnrealExport:
             target,
             "Lightmaps for Unreal Engine",
             steps=(
-                "Enable the Python Editor Script plugin, then run import_lightmaps.py (Tools > Execute Python",
+                "Enable the plugin Python Editor Script, and run import_lightmaps.py (Tools > Execute Python",
                 "Script). It imports pages and scene to /Game/Baker, and creates the material function",
                 "MF_BakerLightmap, the unlit material M_BakerLightmap and one instance for each object.",
                 "The parameter `Exposure` scales the light; the level's auto exposure is applied after it.",
