@@ -21,7 +21,7 @@ from baker.core.settings_model import Settings
 HEAD = """\
 # Python API
 
-Every function of the command line, and the stages of a bake one by one:
+The Python API has a function for each command except `inspect`, and functions for single stages of a bake:
 
 ```python
 import baker
@@ -34,15 +34,16 @@ baker.save(bake, "out", export=["godot"])
 baker.verify("out").channels["irradiance"].figures["median"]
 ```
 
-Settings are keywords, or an object of the class that is named in the signature, or both: keywords win. All
-are checked when the object is made. Errors are children of `BakerError`. Results have a one-line `repr`, a
-table with a small picture in notebooks, and `to_dict()`, which returns plain values for JSON. They can be
-pickled; two results are equal only if they are the same object.
+Pass settings as keywords, as an object of the class that the signature names, or as both. A keyword replaces
+the value in the object. The values are validated when the object is made. All errors are subclasses of
+`BakerError`. Results have a one-line `repr`, a table with a small picture in notebooks, and `to_dict()`,
+which returns plain values for JSON. Results can be pickled. Two results are equal only if they are the same
+object.
 
-This page is made from docstrings by `docs/make_api_page.py`; its examples run as tests, in this order.
-[SETTINGS.md](SETTINGS.md) has the settings of all functions in tables.
+`docs/make_api_page.py` generates this page from docstrings. The examples run as tests, in the order of this
+page. [SETTINGS.md](SETTINGS.md) has tables of the settings of all functions.
 """
-# In the order in which the examples build on each other.
+# In the order of the examples, which use results of earlier examples.
 FUNCTIONS = (
     "load", "check", "repair", "unwrap", "bake", "ao", "save", "export", "verify", "diff", "render", "view",
     "batch",
@@ -51,7 +52,7 @@ SECTION = re.compile(r"^(\w[\w ]*)\n-+$", re.MULTILINE)
 
 
 def sections(text: str) -> dict[str, str]:
-    """Return the sections of a numpydoc docstring by title; that before the first has the title ''."""
+    """Return {title: text} of the sections of a numpydoc docstring; the text before them has title ''."""
     parts = SECTION.split(text)
     return {"": parts[0].strip()} | {
         title: body.strip("\n") for title, body in zip(parts[1::2], parts[2::2], strict=True)
@@ -59,7 +60,7 @@ def sections(text: str) -> dict[str, str]:
 
 
 def entries(body: str) -> list[tuple[str, str]]:
-    """Return (head, text) of each entry of a section: heads are not indented."""
+    """Return (head, text) of each entry of a section; lines without indentation are heads."""
     found: list[tuple[str, list[str]]] = []
     for line in body.splitlines():
         if line and not line.startswith(" "):
@@ -70,7 +71,7 @@ def entries(body: str) -> list[tuple[str, str]]:
 
 
 def parameters(body: str) -> list[str]:
-    """Return a list item for each parameter; settings by name are items below theirs."""
+    """Return a list item for each parameter; the settings of `**keywords` are nested items."""
     lines = []
     for head, text in entries(body):
         name, _, kind = head.partition(" : ")
@@ -86,7 +87,7 @@ def parameters(body: str) -> list[str]:
 
 
 def function(name: str) -> str:
-    """Return the section of a function."""
+    """Return the Markdown section of a function."""
     found = getattr(baker, name)
     parts = sections(inspect.getdoc(found) or "")
     lines = [f"### {name}", "", "```python", signature(name, found), "```", "", parts[""], ""]
@@ -100,7 +101,7 @@ def function(name: str) -> str:
 
 
 def signature(name: str, found: Any) -> str:
-    """Return a function's signature, one parameter a line if it is long."""
+    """Return a function's signature; if it exceeds 100 characters, with one parameter on each line."""
     shown = inspect.signature(found)
     words: list[str] = []
     for parameter in shown.parameters.values():
@@ -115,7 +116,7 @@ def signature(name: str, found: Any) -> str:
 
 
 def shown_parameter(parameter: inspect.Parameter) -> str:
-    """Return a parameter as it is written in a signature."""
+    """Return the text of a parameter in a signature: name, annotation and default."""
     stars = "**" if parameter.kind is parameter.VAR_KEYWORD else ""
     text = f"{stars}{parameter.name}: {parameter.annotation}"
     if parameter.default is parameter.empty:
@@ -125,7 +126,7 @@ def shown_parameter(parameter: inspect.Parameter) -> str:
 
 
 def examples(text: str) -> list[str]:
-    """Return the examples as code, and what is written between them as text."""
+    """Return the lines of the section "Examples": code blocks, and paragraphs for the text between them."""
     lines: list[str] = []
     for block in re.split(r"\n\n+", text):
         if block.startswith(">>>"):
@@ -136,7 +137,7 @@ def examples(text: str) -> list[str]:
 
 
 def type_section(name: str) -> str:
-    """Return the section of a class: its docstring and its fields or members."""
+    """Return the Markdown section of a class: first paragraph of its docstring, and fields or members."""
     found = getattr(baker, name)
     parts = sections(inspect.getdoc(found) or "")
     lines = [f"### {name}", "", " ".join(parts[""].split("\n\n")[0].split()), ""]

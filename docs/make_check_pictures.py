@@ -1,8 +1,9 @@
-"""Draws the pictures of CHECKS.md from scenes of the tests: the faulty one left, the correct one right.
+"""Draws the pictures of CHECKS.md from scenes of the tests: left with the defect, right without it.
 
 python docs/make_check_pictures.py
 
-Lightmap uv is drawn in page coordinates, geometry from a corner above; fronts are grey, backs red.
+Lightmap uv is drawn in page coordinates. Geometry is drawn from above, in the direction of a corner of the
+scene; fronts are grey and backs red.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ FRONT, BACK, LINE, PAPER = (205, 208, 214), (222, 96, 86), (60, 64, 72), (255, 2
 
 
 def subject_of(data: bytes) -> CheckContext:
-    """Return a scene in memory, ready for checks."""
+    """Return the check context of a scene, from the bytes of its GLB."""
     return CheckContext(
         import_gltf(SceneFile(Path("case.glb"), data, lenient=True)), BakeSettings(resolution=256)
     )
 
 
 def uv_panel(context: CheckContext) -> Image.Image:
-    """Draw the layout of the first mesh; what is covered twice is red."""
+    """Draw the lightmap uv of the first mesh; overlaps are red."""
     side = SIZE * SHARP
     image = Image.new("RGB", (side, side), PAPER)
     uv = context.uv(0)
@@ -56,7 +57,7 @@ def uv_panel(context: CheckContext) -> Image.Image:
     )
     pixels = np.asarray(image).copy()
     pixels[count > 0] = FRONT
-    # Lines that two triangles share are covered twice, too: only what is wider counts.
+    # Shared edges of triangles are also covered twice, but are removed by the reduced resolution of `twice`.
     pixels[(count > 1) & (twice > 200)] = BACK
     image = Image.fromarray(pixels)
     draw = ImageDraw.Draw(image)
@@ -68,7 +69,7 @@ def uv_panel(context: CheckContext) -> Image.Image:
 
 
 def geometry_panel(context: CheckContext, low: np.ndarray, high: np.ndarray) -> Image.Image:
-    """Draw all triangles from the corner above, farthest first."""
+    """Draw all triangles as seen from `view_axes`, farthest first."""
     side = SIZE * SHARP
     image = Image.new("RGB", (side, side), PAPER)
     draw = ImageDraw.Draw(image)
@@ -90,7 +91,7 @@ def geometry_panel(context: CheckContext, low: np.ndarray, high: np.ndarray) -> 
 
 
 def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the direction to the viewer, to the right and upwards."""
+    """Return three unit vectors in world space: to the viewer, to the right and upwards in the picture."""
     view = np.array([0.75, 0.6, 0.9])
     view /= np.linalg.norm(view)
     right = np.cross([0.0, 1.0, 0.0], view)
@@ -99,7 +100,7 @@ def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def main() -> None:
-    """Draw all."""
+    """Write a picture for each code of `UV_CODES` and `GEOMETRY_CODES`."""
     folder = HERE / "pictures" / "checks"
     folder.mkdir(parents=True, exist_ok=True)
     for code in (*UV_CODES, *GEOMETRY_CODES):

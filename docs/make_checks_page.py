@@ -1,4 +1,4 @@
-"""Writes CHECKS.md from the checks themselves.
+"""Writes CHECKS.md from the registered checks.
 
 python docs/make_checks_page.py            writes the page
 python docs/make_checks_page.py --print    prints it instead
@@ -37,26 +37,26 @@ baker check level.glb --json                     # {"passed", "findings": [...],
 baker check level.glb --sarif check.sarif --junit check.xml
 ```
 
-Exit code 0: nothing reaches `--fail-on` (default `error`). 1: something does. 2: wrong use. 3: a file
-cannot be read; of several the others are still checked. What a bake would refuse although the file can be
-read (an index out of range, no usable triangle, a negative light) is a finding, not a refusal.
+Exit code 0: no finding reaches the severity of `--fail-on` (default `error`). 1: a finding reaches it. 2:
+wrong use. 3: a file cannot be read; all other files are still checked. If a file can be read but a bake
+would refuse it (an index out of range, no usable triangle, a negative light), `check` reports a finding.
 
-Every finding has `code`, `severity`, `object`, `node` (glTF node index; of a mesh that stands in several
-places the first), `count`, `message` and `fix`; where it applies also `percent`, `primitive`, up to ten
-`faces` (numbers within the primitive) or `pairs` of faces, and one `position` in the world. Severities: an
-*error* spoils the object's bake or makes it impossible, a *warning* is seen in the result or lost from it,
-an *info* is good to know.
+Every finding has `code`, `severity`, `object`, `node` (glTF node index; if several nodes show the mesh, the
+first of them), `count`, `message` and `fix`. If they apply, a finding also has `percent`, `primitive`, up to
+ten `faces` (numbers within the primitive) or `pairs` of faces, and one `position` in world space.
+Severities: an *error* makes the bake of the object useless or impossible, a *warning* is a visible fault or
+missing data in the result, and an *info* needs no action.
 
 ## Settings of a check
 
-In the file of `--config`, beside the settings of a bake:
+In the file of `--config`, which may also contain the settings of a bake:
 
 ```toml
 [check]
 fail-on = "warning"
 ignore = ["no-light", "open-edges@Fence*"]
-mip = 3                  # charts must not mix down to this mip level
-rates = "out/level"      # estimate time with the speed of this bake
+mip = 3                  # padding must separate charts down to this mip level
+rates = "out/level"      # estimate times from the measured speed of this bake
 ```
 
 In the scene itself, as glTF `extras`. On the document: `{"baker": {"check": {"fail_on": "warning", "ignore":
@@ -84,8 +84,9 @@ same codes, and runs the checks marked *in a bake* below.
 
 ## How long it takes
 
-A mesh of a million triangles with lightmap UVs at 2048 takes 10.3 s on two cores, a hundred small kit
-pieces in one process 5.7 s (`benchmarks/check_speed.py`, start of the program included).
+Measured on two cores with `benchmarks/check_speed.py`, including the start of the program: a mesh of a
+million triangles with lightmap UVs at 2048 takes 10.3 s, and a hundred small kit pieces in one process take
+5.7 s.
 
 ## All codes
 
@@ -106,7 +107,7 @@ def page() -> str:
 
 
 def quoted(text: str) -> str:
-    """Return a text of the library with its settings as flags."""
+    """Return a text of the library in which the names of settings are replaced by flags."""
     return in_flags(text, "`")
 
 
@@ -122,7 +123,7 @@ def _section(entry: Check) -> str:
 
 
 def _anchor(code: str) -> str:
-    # As code hosts make them of headings: dots go, dashes and underscores stay.
+    # Code hosts form anchors from headings by removing dots and keeping dashes and underscores.
     return code.replace(".", "")
 
 

@@ -1,7 +1,7 @@
-"""Writes the code map of ARCHITECTURE.md: the packages in the order of layers, with their docstrings.
+"""Writes the code map of ARCHITECTURE.md: packages in the order of layers, with their first docstring line.
 
-python docs/make_code_map.py            writes it into the page
-python docs/make_code_map.py --print    prints the page with it instead
+python docs/make_code_map.py            writes the map into the page
+python docs/make_code_map.py --print    prints the new page instead
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def first_line(package: str) -> str:
 
 
 def rows(package: str) -> list[str]:
-    """Return the rows of a package and of the packages in it."""
+    """Return the table rows of a package and, recursively, of its subpackages."""
     folder = folder_of(package)
     found = [f"| `{folder.relative_to(ROOT).as_posix()}/` | {first_line(package)} |"]
     for inner in sorted(path.parent.name for path in folder.glob("*/__init__.py")):
@@ -52,7 +52,7 @@ def code_map() -> str:
 
 
 def page() -> str:
-    """Return the page with the table in its place."""
+    """Return the text of ARCHITECTURE.md with the new table between its markers."""
     before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
     return before + BEGIN + "\n" + code_map() + "\n" + END + rest.partition(END)[2]
 

@@ -1,9 +1,9 @@
 """Makes the gallery of estimators and the table of their variance at equal rays, for docs/THEORY.md.
 
-    python docs/make_estimators.py             pictures and table; --table for the table alone
+    python docs/make_estimators.py             makes pictures and table; --table makes only the table
 
-Pictures of one group share their tone: L / (L + M) with M the luminance that a fifth of the last picture's
-pixels exceed, then the sRGB curve.
+All pictures of one image file have the same tone mapping: L / (L + M), followed by the sRGB curve. M is the
+luminance that a fifth of the pixels of the last picture exceed.
 
 """
 
@@ -44,7 +44,7 @@ class View:
 
 
 def surface(base: float | Point, metallic: float = 0.0, roughness: float = 1.0, **more: Any) -> Material:
-    """Return a material; grey of one number."""
+    """Return a material with base colour `base`; one number gives grey."""
     colour = (base, base, base) if isinstance(base, float) else base
     return Material(base_colour=(*colour, 1.0), metallic=metallic, roughness=roughness, **more)
 
@@ -62,7 +62,7 @@ def quad(corner: Point, u: Point, v: Point) -> tuple[NDArray[Any], NDArray[Any]]
 
 
 def turned(radius: float, low: float, high: float, n: int, *, inward: bool) -> tuple[Any, Any]:
-    """Return a smooth upright tube, seen from inside or outside."""
+    """Return corners (6 n, 3) and smooth normals of a tube about the z axis; fronts inside or outside."""
     angle = 2 * np.pi * np.arange(n + 1) / n
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     corner, normal = [], []
@@ -75,7 +75,7 @@ def turned(radius: float, low: float, high: float, n: int, *, inward: bool) -> t
 
 
 def ball(centre: Point, radius: float, n: int = 16) -> tuple[Any, Any]:
-    """Return a smooth ball."""
+    """Return corners and smooth normals of a sphere of 2 n x n faces."""
     polar = np.linspace(0, np.pi, n + 1)
     around = 2 * np.pi * np.arange(2 * n + 1) / (2 * n)
     grid = np.stack(
@@ -92,7 +92,7 @@ def ball(centre: Point, radius: float, n: int = 16) -> tuple[Any, Any]:
 
 
 def scene_of(*parts: tuple[tuple[Any, Any], Material]) -> Scene:
-    """Return a scene of loose triangles."""
+    """Return a scene of unindexed triangles, one mesh for each part."""
     meshes, instances = [], []
     for k, ((corner, normal), _) in enumerate(parts):
         n = len(corner)
@@ -129,7 +129,7 @@ def plates() -> View:
 
 
 def gap() -> View:
-    """Return a dark room beside one in which a light shines at the ceiling; a gap is between them."""
+    """Return two rooms joined by a gap: one with an emitter that shines at the ceiling, one without light."""
     wall, both = surface(0.7), surface(0.7, double_sided=True)
     parts = [
         (quad((0, 0, 0), (4, 0, 0), (0, 2, 0)), surface((0.7, 0.5, 0.3))),
@@ -164,7 +164,7 @@ def caustic() -> View:
 
 
 def yard() -> View:
-    """Return things under an open sky."""
+    """Return a wall and two balls on a floor under an open sky."""
     parts = [
         (quad((-4, -4, 0), (8, 0, 0), (0, 8, 0)), surface(0.5)),
         (quad((-1.4, 1, 0), (2.8, 0, 0), (0, 0, 1.6)), surface((0.7, 0.4, 0.3), double_sided=True)),
@@ -177,7 +177,7 @@ def yard() -> View:
 
 
 def upright(camera: Camera, eye: Any, target: Any) -> Camera:
-    """Turn a camera so that +Z is up: these scenes are made lying down."""
+    """Rotate a camera about its axis so that +Z is up, as in these scenes; `look_at` uses +Y."""
     forward = np.array(target) - eye
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, (0.0, 0.0, 1.0))
@@ -187,7 +187,7 @@ def upright(camera: Camera, eye: Any, target: Any) -> Camera:
 
 
 def render(view: View, name: str, *, width: int, height: int, passes: int, rays: int = 0) -> PointEstimate:
-    """Render passes of `SAMPLES` a pixel, or as many as cost about `rays`."""
+    """Render passes of `SAMPLES` paths a pixel: `passes` of them, or about `rays` rays if that is not 0."""
     with build_reference(view.scene, sky=view.sky) as reference:
         estimate = new_estimate(width * height, 3, SAMPLES)
         while estimate.rounds < 2 or (
@@ -198,7 +198,7 @@ def render(view: View, name: str, *, width: int, height: int, passes: int, rays:
 
 
 def save(name: str, rows: list[list[PointEstimate]]) -> None:
-    """Write pictures of one tone beside and below each other."""
+    """Write one image of a grid of pictures, given as rows, all with the same tone mapping."""
     luminance = np.array((0.2126, 0.7152, 0.0722))
     middle = float(np.quantile(rows[-1][-1].mean @ luminance, 0.8))
     shape = (HEIGHT, WIDTH, 3)
@@ -211,13 +211,13 @@ def save(name: str, rows: list[list[PointEstimate]]) -> None:
             shown.append(np.minimum(value / (bright + middle)[..., None], 1.0))
         lines.append(np.concatenate(shown, axis=1))
     levels = srgb_levels(np.concatenate(lines).astype(np.float32))
-    # Noise does not pack well: 64 colours keep a picture small.
+    # Noise compresses badly, so 64 colours keep the file small.
     image = Image.fromarray(levels).quantize(64, dither=Image.Dither.NONE)
     image.save(HERE / "pictures" / f"{name}.png", optimize=True)
 
 
 def pictures() -> None:
-    """Make the gallery."""
+    """Render and write the pictures of docs/THEORY.md."""
     size: dict[str, Any] = {"width": WIDTH, "height": HEIGHT}
     parts = [render(plates(), name, passes=4, **size) for name in ("light", "bsdf", "mis", "mis-power")]
     save("estimators_plates", [parts[:2], parts[2:]])
@@ -229,9 +229,10 @@ def pictures() -> None:
 
 
 def table() -> str:
-    """Return relative variance at equal rays, as multiples of that of `mis`.
+    """Return the Markdown table of variance at equal numbers of rays, as multiples of that of `mis`.
 
-    Where even and odd passes disagree about an estimator's variance, it lives on events too rare to measure.
+    If the variances of even and odd passes differ by more than a factor of two, the cell is "too rare": most
+    of the variance comes from events that are too rare to measure.
     """
     views = [plates(), gap(), caustic(), yard()]
     cost: dict[str, list[float]] = {name: [] for name in ESTIMATORS}
@@ -246,7 +247,7 @@ def table() -> str:
             spread = estimate.squares / count - (estimate.total / count) ** 2
             even, odd = (spread / scale).mean(axis=(1, 2))
             cost[name].append(own if 0.5 < even / odd < 2.0 else np.nan)
-    # Where even `mis` meets too little, `bdpt` is what others are measured by.
+    # If `mis` is too rare in a scene, the unit of its column is `bdpt`.
     best = [a if np.isfinite(a) else b for a, b in zip(cost["mis"], cost["bdpt"], strict=True)]
     lines = [
         "| estimator | " + " | ".join(view.title for view in views) + " |",
@@ -262,7 +263,7 @@ def table() -> str:
 
 
 def main() -> None:
-    """Write everything."""
+    """Write the table into docs/THEORY.md and, without --table, the pictures."""
     page = HERE / "THEORY.md"
     begin, end = "<!-- table by make_estimators.py -->", "<!-- end of table -->"
     before, found, rest = page.read_text(encoding="utf-8").partition(begin)

@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[1] / ".pre-commit-hooks.yaml"
 
 
 def page() -> str:
-    """Return the text of the file; its pattern matches the suffixes that importers read."""
+    """Return the text of the file, whose pattern matches the suffixes that importers read."""
     suffixes = "|".join(suffix.removeprefix(".") for suffix in scene_suffixes())
     return rf"""# Checks every scene file of a commit. Written by docs/make_hooks.py.
 - id: baker-check

@@ -1,4 +1,4 @@
-"""Writes the settings models out where editors and `help` read them, for the functions of the Python API.
+"""Writes all settings as keyword types and docstrings of the Python API, for editors and `help`.
 
 python docs/make_keywords.py            writes baker/api/keywords.py, and the lists of settings in docstrings
 python docs/make_keywords.py --check    prints the files that differ; exit code 1 if there are any
@@ -50,7 +50,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, TypedDict
 '''
-# The list of settings in a docstring: after these lines, up to the section of what is returned.
+# The list of settings in a docstring: it begins after these lines and ends at the section "Returns".
 LISTED = re.compile(
     r"(    \*\*keywords : Unpack\[(\w+)\]\n        Settings by name, in place of those in `settings`:\n)"
     r".*?(?=\n\n    Returns\n)",
@@ -59,7 +59,7 @@ LISTED = re.compile(
 
 
 def type_of(field: Any) -> str:
-    """Return the type of a setting's keyword: what the model takes, not only what it stores."""
+    """Return the annotation of a setting's keyword: all types that the model accepts."""
     found = kinds_of(field)
     if isinstance(found[0], str):
         choices = ", ".join(f'"{choice}"' for choice in found)
@@ -74,24 +74,24 @@ def type_of(field: Any) -> str:
 
 
 def takes_numbers(field: Any) -> bool:
-    """Return whether a text may be given as a number."""
+    """Return whether a setting that is stored as text also accepts a number."""
     return "_as_text" in f"{field.annotation} {field.metadata}" or takes_lists(field)
 
 
 def takes_lists(field: Any) -> bool:
-    """Return whether a text may be given as a list of numbers."""
+    """Return whether a setting that is stored as text also accepts a list of numbers."""
     return "_as_list_text" in f"{field.annotation} {field.metadata}"
 
 
 def meaning_of(name: str, field: Any) -> tuple[str, str]:
-    """Return the line of a setting, with type, unit, range and default, and its meaning."""
+    """Return ("name : type, unit, range, default", description) of a setting."""
     facts = [type_of(field), unit_of(field), "" if is_switch(field) else range_of(field)]
     facts.append(f"default {field.default!r}")
     return f"{name} : {', '.join(filter(None, facts))}", str(field.description)
 
 
 def class_head(name: str, docstring: str) -> str:
-    """Return the first lines of a class of keywords."""
+    """Return the first lines of a `TypedDict` class of keywords."""
     return f'\n\nclass {name}(TypedDict, total=False):\n    """{docstring}"""\n'
 
 
@@ -119,11 +119,11 @@ def _ao_keywords() -> str:
         for name, field in BakeSettings.model_fields.items()
         if name != "channels"
     ]
-    return class_head("AoKeywords", "Keywords of `BakeSettings`, `channels` aside.") + "\n" + "".join(lines)
+    return class_head("AoKeywords", "Keywords of `BakeSettings` except `channels`.") + "\n" + "".join(lines)
 
 
 def docstrings(text: str) -> str:
-    """Return the source of an API file with the lists of settings made again."""
+    """Return the source of an API file with new lists of settings in its docstrings."""
 
     def listed(found: re.Match[str]) -> str:
         lines = []
@@ -144,7 +144,7 @@ def formatted(text: str) -> str:
 
 
 def files() -> dict[Path, str]:
-    """Return the text that each file ought to have."""
+    """Return {path: up-to-date text} of keywords.py and of all API files with lists of settings."""
     found = {API / "keywords.py": formatted(keywords())}
     for path in sorted(API.glob("*.py")):
         text = path.read_text("utf-8")

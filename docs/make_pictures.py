@@ -1,6 +1,6 @@
 """Makes the pictures of the docs: bakes the project's scenes and renders them through their cameras.
 
-    python docs/make_pictures.py            needs baker and nothing else
+    python docs/make_pictures.py            needs only the dependencies of baker
 
 A pixel shows albedo * E / pi (what an engine draws for a diffuse surface), exposed so that the median
 pixel is mid grey, then sRGB-encoded.
@@ -25,7 +25,7 @@ from baker.shading.materials import resolve_materials
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "assets"
-# name: file, settings; the camera is the file's own
+# {name: (file, settings)}; the camera is the first camera of the file.
 VIEWS = {
     "cornell": ("cornell.glb", {"quality": "high", "resolution": 1024}),
     "interior": ("interior.glb", {"quality": "high", "resolution": 1024}),
@@ -35,7 +35,7 @@ WIDTH, HEIGHT, SAMPLES = 960, 720, 4
 
 
 def camera_rays(camera, shift):
-    """Return directions (HEIGHT * WIDTH, 3) of a pinhole camera, pixels shifted by `shift`."""
+    """Return (HEIGHT * WIDTH, 3) directions of a pinhole camera through points `shift` (0..1) of pixels."""
     tall = np.tan(camera.fov / 2)
     x = ((np.arange(WIDTH) + shift[0]) / WIDTH * 2 - 1) * tall * WIDTH / HEIGHT
     y = (1 - (np.arange(HEIGHT) + shift[1]) / HEIGHT * 2) * tall
@@ -45,7 +45,7 @@ def camera_rays(camera, shift):
 
 
 def bilinear(image, uv):
-    """Look an (H, W, C) page up at uv (n, 2) as an engine does."""
+    """Return the (n, C) bilinear lookups of an (H, W, C) page at uv (n, 2), as an engine computes them."""
     size = image.shape[0]
     x = np.clip(uv * size - 0.5, 0, size - 1.001)
     low = x.astype(int)
@@ -59,7 +59,7 @@ def bilinear(image, uv):
 
 
 def draw(result: BakeResult, channel="irradiance") -> np.ndarray:
-    """Return what the file's first camera sees of a bake, (HEIGHT, WIDTH, 3), linear."""
+    """Return a linear (HEIGHT, WIDTH, 3) picture of a bake through the file's first camera."""
     camera = result.scene.cameras[0]
     geometry = world_geometry(result.scene, result.atlas)
     shading = resolve_materials(result.scene, geometry)
@@ -100,7 +100,7 @@ def encode(linear: np.ndarray, exposure: float) -> Image.Image:
 
 
 def main(names: list[str]) -> None:
-    """Draw the named views, or all."""
+    """Draw the named views; all views if no name is given."""
     folder = HERE / "pictures"
     folder.mkdir(exist_ok=True)
     for name in names or list(VIEWS):

@@ -1,4 +1,4 @@
-"""Writes SETTINGS.md from the settings themselves, a section for each command.
+"""Writes SETTINGS.md from the settings classes, with a section for each command.
 
 python docs/make_settings_page.py            writes the page
 python docs/make_settings_page.py --print    prints it instead
@@ -22,24 +22,36 @@ from baker.verification.settings import VerifySettings
 HEAD = """\
 # Settings
 
-Every setting of every command: as a flag, as a key of the file given with `--config`, and as a keyword of the
-function of the Python API. The command line wins over the file, the file over the default.
-This page is made from the code by `docs/make_settings_page.py`.
+Every setting of every command is a flag, a key of the file given with `--config`, and a keyword of the
+function of the Python API. A flag overrides the file, and the file overrides the default.
+`docs/make_settings_page.py` generates this page from the code.
 """
 
 SECTIONS: list[tuple[type[Settings], str, str]] = [
-    (BakeSettings, "bake", "Of `baker bake`, `baker ao` and `baker check`; of `baker.bake`, `baker.ao`."),
-    (CheckSettings, "check", "Of `baker check`, beside those of the bake it is for; of `baker.check`."),
+    (
+        BakeSettings,
+        "bake",
+        "Settings of `baker bake`, `baker ao` and `baker check`, and of `baker.bake` and `baker.ao`.",
+    ),
+    (
+        CheckSettings,
+        "check",
+        "Settings of `baker check`, in addition to those of a bake, and of `baker.check`.",
+    ),
     (
         RepairSettings,
         "repair",
-        "Of `baker check` with `--fix` or `--repair`; of `baker.repair`. On the command line, settings that"
-        " a bake has, too, have the value of the bake.",
+        "Settings of `baker check` with `--fix` or `--repair`, and of `baker.repair`. On the command line,"
+        " settings that are also settings of a bake have the value given for the bake.",
     ),
-    (VerifySettings, "verify", "Of `baker verify`; of `baker.verify`."),
-    (DiffSettings, "diff", "Of `baker diff`; of `baker.diff`."),
-    (BatchSettings, "batch", "Of `baker batch`; of `baker.batch`. These have no keys in a file."),
-    (RenderSettings, "render", "Of `baker render`; of `baker.render`."),
+    (VerifySettings, "verify", "Settings of `baker verify` and `baker.verify`."),
+    (DiffSettings, "diff", "Settings of `baker diff` and `baker.diff`."),
+    (
+        BatchSettings,
+        "batch",
+        "Settings of `baker batch` and `baker.batch`. The configuration file has no keys for them.",
+    ),
+    (RenderSettings, "render", "Settings of `baker render` and `baker.render`."),
 ]
 
 TABLE = """
@@ -50,8 +62,8 @@ TABLE = """
 TAIL = """
 ## The configuration file
 
-Keys of a bake are at the top level or in a table `[bake]`, those of other commands in a table named as the
-section above; a dash in a key counts as an underscore:
+Keys of a bake are at the top level or in a table `[bake]`. Keys of another command are in a table with the
+name of its section above. Dashes in keys are treated as underscores:
 
 ```toml
 resolution = 2048
@@ -68,7 +80,7 @@ fail-on = "warning"
 texels = 5000
 ```
 
-A key or table that does not exist ends the run with exit code 2 and the name of the nearest one that does.
+An unknown key or table ends the run with exit code 2; the error suggests the nearest known name.
 """
 
 

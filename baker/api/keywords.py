@@ -96,7 +96,7 @@ class BakeKeywords(TypedDict, total=False):
 
 
 class AoKeywords(TypedDict, total=False):
-    """Keywords of `BakeSettings`, `channels` aside."""
+    """Keywords of `BakeSettings` except `channels`."""
 
     resolution: int
     density: float | None
