@@ -1,1 +1,1 @@
-"""Finished pages from the values of texels: invalid texels filled, noise removed, charts extended."""
+"""Turns texel values into finished pages: fills invalid texels, removes noise, extends charts."""

@@ -1,23 +1,40 @@
-"""Denoises a lightmap page without darkening chart borders and without inventing light.
+"""Denoises a lightmap page without darkening chart borders and without adding light.
 
-1. Empty texels are filled by reflection at the borders of charts, since the filter would mix the black of
+1. Empty texels are filled by reflection at the borders of charts. The filter would otherwise mix the black of
    empty texels into the borders.
-2. Open Image Denoise's lightmap filter runs over the part of the page that has charts.
-3. The change of each texel is limited by the error of the samples: see `baker.finish.kernels.page_guard`.
+2. Open Image Denoise's lightmap filter runs over the smallest rectangle of the page that contains all charts.
+3. The change of each texel is limited by the standard error of its samples, see
+   `baker.finish.kernels.page_guard`.
 
-Call it separately for direct and indirect light and add the results, after `recentre` and before `dilate`.
-*Measured* on a sharp shadow edge over noisy indirect light, RMS error of the sum denoised at once and of the
-separate parts: 1.5 and 0.9 % with exact direct light and 5 % noise, 4.0 and 3.0 % with 10 and 20 % noise; at
-the edge itself 2.5 and 0.6 %, 7.7 and 4.8 %. *Measured* with 20 % noise and contact shadows, outermost ring
-of charts: 16 % too dark with black gaps; RMS error 11.6 % with the nearest texel's value in the gaps, 8.7 %
-(bias +2.7 %) with reflection only, 6.1 % (bias +0.2 %) with reflection along the fitted plane. *Measured* on
-AO with 256 rays, with the binomial error and with that error lowered to the noise estimated from the page:
-RMS error relative to the mean 0.0095 and 0.0067 in the hall (not denoised 0.0080; worst texel 0.21 and 0.09),
-0.0061 and 0.0056 in the interior, 0.0022 and 0.0029 in Cornell. An error that is too large blurs contact
-shadows.
+Direct and indirect light are denoised separately and then added. *Measured* at a sharp shadow edge over noisy
+indirect light, RMS error:
 
-Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap); the filling of empty texels is a
-consequence of the filter's behaviour at gaps.
+    noise of direct and of indirect light | texels        | denoised as a sum | denoised separately
+    0 and 5 %                             | all           | 1.5 %             | 0.9 %
+    0 and 5 %                             | at the edge   | 2.5 %             | 0.6 %
+    10 and 20 %                           | all           | 4.0 %             | 3.0 %
+    10 and 20 %                           | at the edge   | 7.7 %             | 4.8 %
+
+*Measured* on the outermost ring of texels of charts, with 20 % noise and contact shadows:
+
+    content of empty texels               | RMS error | mean error
+    black                                 |           | -16 %
+    value of the nearest texel            | 11.6 %    |
+    reflection                            | 8.7 %     | +2.7 %
+    reflection times the fitted plane     | 6.1 %     | +0.2 %
+
+*Measured* on AO with 256 rays, RMS error divided by the mean. The standard error is the binomial one, or the
+binomial one lowered to the noise estimated from the page:
+
+    scene                                 | not denoised | binomial | lowered
+    hall                                  | 0.0080       | 0.0095   | 0.0067
+    hall, worst texel                     |              | 0.21     | 0.09
+    interior                              |              | 0.0061   | 0.0056
+    Cornell                               |              | 0.0022   | 0.0029
+
+If the standard error is too large, the filter blurs contact shadows.
+
+Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap).
 """
 
 from __future__ import annotations
@@ -40,21 +57,23 @@ from baker.finish.tiles import over_rows
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
-# Radius of the filter, texels (its tile overlap); reflections need no larger distance.
+# Largest distance over which charts are reflected, texels: the radius of the filter (its tile overlap).
 REACH = 96
-# Smallest number of mirrored texels around the image, and the multiple that its sides are extended to: the
-# filter shifts the colour of the outermost texels, more where it has to fill up its blocks of 16 itself. Grey
-# with 5 % noise, pages of 225 to 240: RMS error of the outermost 8 texels 0.37 to 0.38 % with it, 0.36 to
-# 0.41 % with a margin of 16.
+# Smallest number of mirrored texels at each side of the image, and the number of which the extended sides are
+# multiples. The filter shifts the colour of the outermost texels, and more so if it pads its blocks of 16
+# itself. RMS error of the outermost 8 texels on pages of 225 to 240 texels a side, grey with 5 % noise:
+# 0.37 to 0.38 % with these values, 0.36 to 0.41 % with a fixed margin of 16.
 MARGIN, BLOCK = 8, 16
-# Half window of the slopes at chart borders, texels.
+# Half side of the window to which planes are fitted at chart borders, texels.
 SLOPE_RADIUS = 4
-# Texels whose slopes are fitted at a time.
+# Number of border texels that one call of the kernel fits planes for.
 _BORDER_TEXELS = 4096
-# An upper bound of the error is lowered to this multiple of the noise estimated from the page: the error of
-# AO is 0.95 to 1.2 times that noise (Cornell, interior, hall; 16 to 256 rays).
+# Largest ratio of an upper bound of the error to the noise estimated from the page, RMS over the page: larger
+# bounds are scaled down to it. The error of AO is 0.95 to 1.2 times that noise (Cornell, interior, hall; 16
+# to 256 rays).
 FITTED = 1.2
-# Charts brighter or darker than the page's median by more than this factor are scaled to it for the filter.
+# Largest ratio of a chart's mean luminance to the page's median, or its inverse: beyond it, the chart is
+# scaled to the median before filtering.
 LEVEL = 8.0
 LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 
@@ -75,20 +94,24 @@ def denoise_page(
     Parameters
     ----------
     value : (H, W, C) float32
-        Linear light, C = 3, or C = 1 (filtered as grey). Invalid texels are filled before this.
+        Linear light, C = 3, or C = 1 (filtered as grey). The caller has filled invalid texels.
     covered : (H, W) bool
+        Texels to denoise.
     chart : (H, W) int32
+        Index of the chart of each covered texel.
     standard_error : (H, W) float32, optional
-        Standard error of each texel's mean luminance (of the value itself if C = 1), in its unit. It limits
-        the change of a texel; without it the noise is estimated from the page.
+        Standard error of each texel's mean luminance (if C = 1, of its value), in the unit of `value`. It
+        limits the change of a texel. If it is None, it is estimated from the page.
     bound : bool
-        Whether that is an upper bound: it is lowered to `FITTED` times the noise estimated from the page.
+        Whether `standard_error` is an upper bound. If so, it is lowered to at most `FITTED` times the noise
+        estimated from the page.
     signed : bool
-        Whether values may be negative; C is 1 then.
+        Whether values may be negative; requires C = 1.
     denoiser : LightmapDenoiser, optional
-        Filter whose memory is kept for further pages; its threads also run the kernels. By default one of a
-        single thread is made and released here.
+        Filter that keeps its memory for further pages. The kernels run on as many threads as the filter. By
+        default, a filter with one thread is created for this call.
     progress : Progress
+        Gets the share that the filter has done; may cancel.
 
     Returns
     -------
@@ -110,7 +133,7 @@ def denoise_page(
     if not covered.any():
         return result
     window = _window(covered)
-    # Contiguous: the kernels would be compiled a second time for slices.
+    # Copy to contiguous arrays, because Numba compiles a kernel again for strided ones.
     inside = np.ascontiguousarray(covered[window])
     charts = np.ascontiguousarray(chart[window])
     noisy = np.ascontiguousarray(np.broadcast_to(value[window], (*inside.shape, 3)))
@@ -154,9 +177,12 @@ def _filter_window(
     denoiser: LightmapDenoiser,
     progress: Progress,
 ) -> NDArray[np.float32]:
-    """Return the filtered picture (h, w, 3) of a window of noisy values (h, w, 3), gaps filled."""
-    # Charts are scaled to one level: the filter treats a room of a millionth of the page's light as black,
-    # and its error was larger than unfiltered.
+    """Return (h, w, 3) float32: a window of `noisy` (h, w, 3) after filling its empty texels and filtering.
+
+    charts : (h, w) int32; inside : (h, w) bool, covered texels
+    """
+    # Scale very dark and very bright charts to the median: the filter treats a room with a millionth of the
+    # page's light as black.
     level = _levels(np.abs(noisy) if signed else noisy, charts, inside)
     picture = surround_charts(noisy / level, inside, charts, threads=denoiser.threads)
     rows, columns = (_margins(side) for side in inside.shape)
@@ -166,7 +192,7 @@ def _filter_window(
 
 
 def _margins(side: int) -> tuple[int, int]:
-    """Return the mirrored texels before and after a side of the picture."""
+    """Return the numbers of mirrored texels to add before and after `side` texels; see `MARGIN`."""
     total = 2 * MARGIN + -(side + 2 * MARGIN) % BLOCK
     return total // 2, total - total // 2
 
@@ -174,7 +200,10 @@ def _margins(side: int) -> tuple[int, int]:
 def _levels(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Return (H, W, 1) the divisor of each chart; 1 for charts about as bright as the page's median."""
+    """Return (H, W, 1) float32: the divisor of each texel's chart, 1 if the ratio is within `LEVEL`.
+
+    value : (H, W, 3) float32; chart : (H, W) int32; covered : (H, W) bool
+    """
     n = int(chart.max(initial=-1)) + 1
     total, count = np.zeros(n), np.zeros(n, np.int64)
     chart_sums(value, LUMINANCE, chart, covered, total, count)
@@ -182,7 +211,7 @@ def _levels(
     level = np.ones((*chart.shape, 1), np.float32)
     lit = np.flatnonzero(mean > 0.0)
     if len(lit):
-        # Of the texels, not of the charts.
+        # Compute the median over lit texels of the mean luminance of their chart.
         order = lit[np.argsort(mean[lit], kind="stable")]
         middle = mean[order[np.searchsorted(np.cumsum(count[order]), 0.5 * count[order].sum())]]
         ratio = np.where(mean > 0.0, mean / middle, 1.0)
@@ -201,7 +230,10 @@ def _error_within(
     bound: bool,
     threads: int,
 ) -> NDArray[np.float32]:
-    """Return the standard error (h, w) of the texels of a window; see `denoise_page`."""
+    """Return (h, w) float32: the standard error of the texels of a window; see `denoise_page`.
+
+    standard_error : (H, W) float32 of the whole page, or None; the other arrays are those of the window
+    """
     if standard_error is None:
         return estimate_error(noisy @ LUMINANCE, charts, inside, threads=threads)
     error = np.ascontiguousarray(standard_error[window], np.float32)
@@ -217,21 +249,21 @@ def surround_charts(
 ) -> NDArray[np.float32]:
     """Fill every empty texel of a page with the reflection of the nearest chart.
 
-    Values resampled from the neighbouring chart across a seam would be better than the reflection; they would
-    be inserted here.
-
     Parameters
     ----------
     value : (H, W, C) float32
+        The page.
     covered : (H, W) bool
-        At least one texel set.
+        Texels of charts, at least one.
     chart : (H, W) int32
+        Index of the chart of each covered texel.
     threads : int
+        Number of threads.
 
     Returns
     -------
     picture : (H, W, C) float32
-        Covered texels as they are, no texel empty.
+        Covered texels have the values of `value`; all other texels have reflected values.
     """
     nearest = np.zeros(covered.shape, np.int32)
     nearest_texel(covered, nearest)
@@ -259,7 +291,8 @@ def surround_charts(
 
 
 def _window(covered: NDArray[np.bool_]) -> tuple[slice, slice]:
-    # Smallest rectangle with all charts: the last page of an atlas is often nearly empty.
+    # Return rows and columns of the smallest rectangle that contains all charts. The last page of an atlas is
+    # often nearly empty.
     rows = np.flatnonzero(covered.any(axis=1))
     columns = np.flatnonzero(covered.any(axis=0))
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

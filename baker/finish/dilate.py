@@ -1,9 +1,15 @@
 """Fills empty texels around charts, so that bilinear lookups and mip levels do not read empty texels.
 
-Values are extrapolated with a plane fitted at the chart's border (weighted least squares in 5 x 5 texels),
-within limits, so that a lookup between the last covered texel and the first empty one continues the gradient.
-Measured on charts with slanted borders and a darkening of 6 texels towards them: RMS error of lookups within
-half a texel of the border 0.8 % after `recentre`, 3.4 % with the mean of neighbours, 5.9 % with neither.
+Values are extrapolated with a plane fitted at the chart's border (weighted least squares in 5 x 5 texels) and
+limited to a range around the values in that window. A lookup between the last covered texel and the first
+empty one therefore continues the gradient.
+
+*Measured* on charts with slanted borders, which darken over the last 6 texels. RMS error of lookups within
+half a texel of the border:
+
+    plane, after `recentre`                     | 0.8 %
+    mean of the neighbours                      | 3.4 %
+    neither extrapolation nor `recentre`        | 5.9 %
 """
 
 from __future__ import annotations
@@ -35,20 +41,20 @@ def dilate(
     covered : (H, W) bool
         Texels of charts.
     chart : (H, W) int32
-        Chart of each covered texel.
+        Index of the chart of each covered texel.
     pixels : int
-        Rings of 8-neighbours to grow; 0 = none.
+        Number of rings of 8-neighbours to fill around charts; 0 = none.
     nearest : (H, W) int32, optional
-        From `nearest_texel`, if known.
+        Result of `nearest_texel` for `covered`; computed here by default.
     threads : int
-        Threads of the kernel.
+        Number of threads.
 
     Returns
     -------
     value : (H, W, C) float32
-        A new page; covered texels are unchanged, empty texels further away are 0.
+        A new page. Covered texels are unchanged; empty texels outside the rings are 0.
     dilated : (H, W) bool
-        The texels that got a value.
+        The texels of the rings, which received a value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Finished pages from texel values: invalid texels filled, noise removed, values centred, charts grown."""
+"""Finishes pages: fills invalid texels, removes noise, corrects values to texel centres, dilates charts."""
 
 from __future__ import annotations
 
@@ -21,23 +21,24 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-# A layer is not denoised if the RMS noise of all texels of similar brightness is below this share of their
-# light: a second pass of the filter did not lower the error (Cornell, 64 samples: 0.33 % median error with
-# it, 0.35 % without).
+# RMS noise of the texels in a brightness band divided by their light: bands below it are not denoised.
+# For comparison, a second pass of the filter changed the median error by little (Cornell, 64 samples: 0.33 %
+# with it, 0.35 % without).
 NOT_WORTH_FILTERING = 0.02
-# Charts belong to one brightness band if their mean light is within this factor. Bands of fewer texels do
-# not count.
+# Ratio of the upper to the lower limit of the mean light in a brightness band, and the number of texels below
+# which a band is not denoised.
 BAND = 8.0
 FEWEST = 64
-# A chart whose mean light exceeds this multiple of its geometric mean is split into blocks for this decision.
+# Ratio of the arithmetic to the geometric mean of a chart's light: charts above it are split into blocks,
+# each of which is assigned to its own brightness band.
 UNEVEN = 2.5
-# Light below this share of the light of the page's brightest chart counts as black.
+# Smallest mean light, as a share of that of the brightest chart or block: darker means are raised to it.
 BLACK = 1e-10
-# Relative noise below this counts as zero.
+# RMS relative noise below which a chart is not filtered.
 QUIET = 0.002
-# The charts to filter are packed together if the packed page has less than this share of the charts' area.
+# Texels of the packed page divided by the covered texels of the page: above it, charts are not packed.
 SMALLER = 0.9
-# Side of a block, texels.
+# Side of a block of an uneven chart, texels.
 BLOCK = 16
 
 
@@ -47,7 +48,8 @@ class PagePlan:
 
     Attributes
     ----------
-    chart : (H, W) int32, -1 = empty
+    chart : (H, W) int32
+        Index of the chart of each texel, -1 = empty.
     valid : (H, W) bool
         Covered texels with a valid point.
     centroid : (H, W, 2) float32
@@ -60,24 +62,24 @@ class PagePlan:
 
     @property
     def covered(self) -> NDArray[np.bool_]:
-        """Return the texels of charts, (H, W) bool."""
+        """Return (H, W) bool: the texels that belong to a chart."""
         covered: NDArray[np.bool_] = self.chart >= 0
         return covered
 
     @cached_property
     def nearest(self) -> NDArray[np.int32]:
-        """Return the flat index of the covered texel nearest to each texel, (H, W) int32."""
+        """Return (H, W) int32: row * W + column of the covered texel nearest to each texel."""
         nearest = np.zeros(self.chart.shape, np.int32)
         nearest_texel(self.covered, nearest)
         return nearest
 
 
 class PageLayer(NamedTuple):
-    """A part of a page that is denoised separately.
+    """One summand of a page, such as direct light. Each summand is denoised separately.
 
     value : (H, W, C) float32
-    error : (H, W) float32, standard error of the mean of the components of each group; or (H, W, G) float32,
-        one for each of G groups
+    error : (H, W) float32, standard error of the mean of all components; or (H, W, G) float32, standard error
+        of the mean of the components of each of the G groups of `ComponentRules.groups`
     bound : bool, whether `error` is an upper bound
     kept : (H, W) bool or None, texels that are not denoised
     """
@@ -97,8 +99,8 @@ class ComponentRules:
     lower, upper : float
         Smallest and largest possible value; `lower` < 0 for signed values.
     groups : tuple of slice
-        Components that are denoised together: three that are one colour, or a single one. Signed components
-        are in groups of one.
+        Components that are denoised together: the three of a colour, or a single component. Signed components
+        are denoised one by one.
     """
 
     lower: float
@@ -111,7 +113,11 @@ class ComponentRules:
         return self.lower < 0.0
 
     def clip(self, value: NDArray[np.float32], like: NDArray[np.float32] | None = None) -> None:
-        """Clip `value` (H, W, C) in place to the bounds, and to the extremes of each component of `like`."""
+        """Clip `value` (H, W, C) in place to the bounds.
+
+        If `like` (H, W, C) is given, each component is also clipped to the largest value of that component in
+        `like` and, if that component has negative values, to the smallest.
+        """
         lower, upper = np.float32(self.lower), np.float32(self.upper)
         if like is None:
             np.clip(value, lower, upper, out=value)
@@ -129,11 +135,13 @@ class Finisher:
     Attributes
     ----------
     threads : int
+        Number of threads.
     dilation : int
-        Texels by which charts grow into the padding.
+        Texels by which charts are dilated into the padding.
     denoiser : LightmapDenoiser or None
         None: layers are not denoised.
     progress : Progress
+        Gets the denoiser's progress; may cancel.
     """
 
     threads: int
@@ -151,9 +159,9 @@ def open_finisher(
     Parameters
     ----------
     threads : int
-        Threads of the kernels and of the denoiser.
+        Number of threads of the kernels and of the denoiser.
     dilation : int
-        Texels by which charts grow into the padding.
+        Texels by which charts are dilated into the padding.
     denoise : bool
         Whether layers are denoised.
     progress : Progress
@@ -171,7 +179,7 @@ def open_finisher(
 def finish_page(
     plan: PagePlan, layers: list[PageLayer], rules: ComponentRules, finisher: Finisher
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Fill, denoise and sum the layers of one page, then grow its charts.
+    """Fill, denoise and sum the layers of one page, then dilate its charts.
 
     Parameters
     ----------
@@ -180,16 +188,16 @@ def finish_page(
     layers : list of PageLayer
         At least one; the page is their sum.
     rules : ComponentRules
-        Of the sum.
+        Bounds and groups of the components of the sum.
     finisher : Finisher
         Threads, denoiser, dilation.
 
     Returns
     -------
     value : (H, W, C) float32
-        Finite, within the bounds.
+        The page: finite values within the bounds.
     grown : (H, W) bool
-        Texels filled by the growth.
+        Texels filled by dilation.
 
     Raises
     ------
@@ -222,16 +230,17 @@ def finish_page(
 def _denoised(
     plan: PagePlan, layer: PageLayer, light: _Light, rules: ComponentRules, finisher: Finisher
 ) -> NDArray[np.float32]:
-    """Return a filled layer (H, W, C) float32 with the noisy charts denoised.
+    """Return (H, W, C) float32: a layer without invalid texels, after denoising its noisy charts.
 
-    The sums that the filter changed are not restored in signed components, since relative changes of a sum
-    near 0 are meaningless.
+    `keep_light` is not applied to signed components, because relative changes of a sum near 0 are
+    meaningless.
     """
     denoiser = finisher.denoiser
     worth = _worth_filtering(plan, _mean_error(layer, rules), light) if denoiser else None
     if denoiser is None or worth is None:
         return layer.value
-    # Noise of invalid texels is not that of the texels around them.
+    # Set the error of invalid texels to 0: they were filled from neighbours, and their own error is
+    # unrelated.
     valid = plan.valid if layer.error.ndim == 2 else plan.valid[..., None]
     noisy = layer._replace(error=np.where(valid, layer.error, np.float32(0.0)))
     chosen = plan.covered & worth[plan.chart]
@@ -249,9 +258,11 @@ def _filter_groups(
     rules: ComponentRules,
     finisher: Finisher,
 ) -> NDArray[np.float32]:
-    """Return the page with the chosen texels, whole charts, denoised group by group.
+    """Return (H, W, C) float32: the layer after denoising the chosen charts, one component group at a time.
 
-    If they are few, they are packed on a smaller page first.
+    If the chosen charts fit on a sufficiently smaller page (`SMALLER`), they are packed on it first.
+
+    chart : (H, W) int32; chosen : (H, W) bool, all texels of the chosen charts
     """
 
     def filtered(
@@ -284,7 +295,7 @@ def _filter_groups(
 
 
 def _mean_error(layer: PageLayer, rules: ComponentRules) -> NDArray[np.float32]:
-    """Return the standard error (H, W) float32 of the mean of all components of a layer."""
+    """Return (H, W) float32: the standard error of the mean of all components of a layer."""
     if layer.error.ndim == 2:
         return layer.error
     share = np.array(
@@ -295,17 +306,20 @@ def _mean_error(layer: PageLayer, rules: ComponentRules) -> NDArray[np.float32]:
 
 
 class _Light(NamedTuple):
-    """Brightness of the valid texels, (n,) float64, and the group of texels that each is in, (n,) int64."""
+    """Brightness and group of the n valid texels of a page.
+
+    texel : (n,) float64, brightness; group : (n,) int64, index of a chart, or of a block of an uneven chart
+    """
 
     texel: NDArray[np.float64]
     group: NDArray[np.int64]
 
 
 def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _Light:
-    """Return the brightness of the layers' sum; a group is a chart, or a block of an uneven chart.
+    """Return brightness and group of the valid texels of the sum of all layers.
 
-    Brightness is the mean of the components, of their sizes if they are signed. Dark texels are raised to a
-    tenth of their group's mean.
+    Brightness is the mean of the components, or of their absolute values if they are signed. It is raised to
+    at least a tenth of the mean brightness of the texel's group.
     """
     total = np.zeros(int(plan.valid.sum()))
     for layer in layers:
@@ -324,11 +338,11 @@ def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _L
 
 
 def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
-    """Return the charts to filter, (n_charts,) bool, or None if the noise of each is small against its light.
+    """Return (n_charts,) bool: the charts to filter, or None if no brightness band is noisy.
 
-    Noise is compared within bands of charts of similar brightness: relative to the mean of the page, the
-    noise of a dim room beside sunlit ground would be negligible. Charts without noise are left out, since the
-    filter derives its exposure from all texels that it is given.
+    Noise is averaged over bands of groups with similar brightness. Relative to the mean of the page, the
+    noise of a dim room beside sunlit ground would be negligible. Charts without noise are excluded, because
+    the filter derives its exposure from all texels of its input.
 
     error : (H, W) float32, standard error of each texel's brightness
     """
@@ -349,5 +363,5 @@ def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) 
 
 
 def _mean_of(group: NDArray[np.int64], value: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of the values (n,) of each group; 0 for empty groups."""
+    """Return (n_groups,) float64: the mean of the values (n,) in each group, 0 for empty groups."""
     return np.bincount(group, value) / np.maximum(np.bincount(group), 1)

@@ -1,7 +1,7 @@
-"""Fills invalid texels from the valid ones of their own chart.
+"""Fills invalid texels from the valid texels of the same chart.
 
-The rays of a texel inside other geometry hit only back faces, so its value is meaningless; but bilinear
-lookups on the visible surface beside it read it.
+All rays of a texel inside other geometry hit back faces, so its value is meaningless. Bilinear lookups on the
+visible surface beside it nevertheless read that value.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from baker.finish.page import check_page
 
-# Of the 8 neighbours, row by row.
+# Weights of the 8 neighbours in the order of `_neighbours`, row by row.
 _RING_WEIGHTS = (0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5)
 
 
@@ -20,14 +20,15 @@ def fill_invalid(
 ) -> tuple[NDArray[np.float32], int]:
     """Replace covered but invalid texels by means of their chart's valid texels.
 
-    Values are propagated ring by ring, nearest first, so the two sides of an invalid strip are not mixed, as
-    a smooth interpolation between two rooms would do.
+    Values are propagated in rings from the valid texels outwards. Across an invalid strip between two rooms,
+    each half therefore gets the value of its own room, with no gradient between them.
 
     Parameters
     ----------
     value : (H, W, C) float32
+        The page.
     chart : (H, W) int32
-        Chart of each covered texel, -1 = empty.
+        Index of the chart of each covered texel, -1 = empty.
     valid : (H, W) bool
         Covered texels with a valid point.
 
@@ -36,7 +37,8 @@ def fill_invalid(
     value : (H, W, C) float32
         A new page; valid and empty texels are unchanged.
     n_hopeless : int
-        Texels of charts without any valid texel; they keep their values, 0 if these are not finite.
+        Number of texels in charts without any valid texel. They keep their values; values that are not finite
+        become 0.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def fill_invalid(
     known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
-    # Charts without any valid texel keep their values: the solid around them may be misclassified.
+    # Keep the values of charts without any valid texel: the solid around them may be misclassified.
     n_charts = int(chart.max()) + 1
     some = np.bincount(chart[known], minlength=n_charts) > 0
     hopeless = covered & ~known & ~some[chart]
@@ -57,13 +59,13 @@ def fill_invalid(
     n_hopeless = int(hopeless.sum())
     if n_hopeless:
         chart, covered = np.where(hopeless, -1, chart), covered & ~hopeless
-    # Values of invalid texels beside valid ones are dropped, even NaN.
+    # Discard the values of all other invalid texels, which may be NaN.
     filled[covered & ~known] = 0.0
     _grow_rings(filled, chart, known)
     left = covered & ~known
     if not left.any():
         return filled, n_hopeless
-    # Pieces of a chart cut off from its valid texels take the mean of these.
+    # Fill texels that no ring reached with the mean of their chart's valid texels.
     trusted = valid & covered
     count = np.bincount(chart[trusted], minlength=n_charts)
     owner = chart[left]
@@ -75,14 +77,14 @@ def fill_invalid(
 
 
 def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDArray[np.bool_]) -> None:
-    """Fill the unknown texels of each chart ring by ring from its known ones, in place.
+    """Fill the texels of each chart that are not `known`, ring by ring from the known ones, in place.
 
-    A texel of the next ring takes the mean of its known 8-neighbours of the same chart (edge neighbours
-    weigh 1, diagonal ones 1/2). A ring is finished before its values are used, so the result does not depend
-    on the order of texels.
+    A texel of the next ring gets the weighted mean of its known 8-neighbours of the same chart; the weight is
+    1 for edge neighbours and 1/2 for diagonal ones. The values of a ring are used only after the whole ring
+    is computed, so the result does not depend on the order of texels.
 
-    value (H, W, C) float32 and known (H, W) bool change at the texels that get filled; chart : (H, W) int32,
-    -1 = empty
+    value : (H, W, C) float32 and known : (H, W) bool, both changed at the texels that are filled
+    chart : (H, W) int32, -1 = empty
     """
     flat_chart, flat_known = chart.reshape(-1), known.reshape(-1)
     flat_value = value.reshape(-1, value.shape[2])
@@ -107,7 +109,10 @@ def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDA
 def _neighbours(
     texel: NDArray[np.int64], shape: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the 8 neighbours (8, n) int64 of flat texel numbers, and which of them lie on the page."""
+    """Return the flat indices (8, n) int64 of the 8 neighbours of n texels, and (8, n) bool: on the page.
+
+    texel : (n,) int64, row * W + column; shape : (H, W) of the page
+    """
     row, column = np.divmod(texel, shape[1])
     down = row + np.array([-1, -1, -1, 0, 0, 1, 1, 1])[:, None]
     right = column + np.array([-1, 0, 1, -1, 1, -1, 0, 1])[:, None]

@@ -1,7 +1,7 @@
-"""Estimates a page's noise from the page itself, for callers without standard errors.
+"""Estimates a page's noise from its values, for callers without standard errors.
 
-The high-pass filter is 0 on planes, and the median over a block ignores the few texels on a shadow's edge;
-the rest is the noise between texels.
+The page is filtered with a high-pass filter that is 0 on planes. The median of the result over a block
+ignores the few texels on a shadow's edge and measures the noise of the others.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from baker.finish.kernels.page_guard import high_pass
 from baker.finish.tiles import over_rows
 
+# Side of a block, texels.
 BLOCK = 16
-# In a block of fewer texels, the median of the chart is used, or that of the page.
+# Number of filtered texels below which the median of a block is replaced by that of the chart, and the median
+# of a chart by that of the page.
 FEWEST = 12
 # Median of |x| of a standard normal variable.
 NORMAL_MEDIAN = 0.6744898
@@ -64,7 +66,8 @@ def _grouped_median(
     known: NDArray[np.bool_],
     otherwise: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    # Upper median of the known sizes of each element's group, `otherwise` if fewer than FEWEST are known.
+    # Return (n,) float64: for each texel, the upper median of `size` over the texels of its group with
+    # `known` set, or its entry of `otherwise` if fewer than FEWEST of them are set. All arguments are (n,).
     _, index = np.unique(group, return_inverse=True)
     count = np.bincount(index[known], minlength=int(index.max()) + 1)
     order = np.lexsort((size[known], index[known]))

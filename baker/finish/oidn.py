@@ -1,8 +1,9 @@
 """Runs Open Image Denoise's filters; the only file that imports `pyoidn`.
 
-*Measured* with OIDN 2.5.1 on the CPU: the same bytes for 1 and 2 threads, from run to run, and for any
-`memory_mb` (its tiles overlap by the network's whole field of view). The lightmap filter has one network:
-`hdr` and `quality` change nothing. Device and network are made in 0.04 s, the library loads in 0.2 s.
+*Measured* with OIDN 2.5.1 on the CPU: the result has the same bytes for 1 and 2 threads, from run to run, and
+for any `memory_mb` (tiles overlap by the network's receptive field). The lightmap filter ignores the options
+`hdr` and `quality`, because it has a single network. Loading the library takes 0.2 s, creating the device and
+the network 0.04 s.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report, silent
 from baker.core.stage import Stage
 
-# Scratch memory the filter may use, MB. Larger tiles were not faster; 4096 pages must fit beside the bake.
+# Largest scratch memory of the filter, MB. More memory allows larger tiles, which were not faster.
 MEMORY_MB = 1000
 
 
@@ -54,7 +55,7 @@ def filter_picture(
     threads: int = 0,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
-    """Denoise one HDR picture of a camera, guided by albedo and normals of its first hits.
+    """Denoise a rendered HDR picture, guided by albedo and normals at the first hits of its pixels.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def filter_picture(
     normal : (H, W, 3) float32
         Normal at the first hits.
     threads : int
-        0 = all of the machine.
+        Number of threads; 0 = all cores.
     progress : Progress
         Called with the fraction done; a truthy return value cancels.
 
@@ -99,24 +100,24 @@ def filter_picture(
 
 
 class LightmapDenoiser:
-    """Denoises pages one after the other; scratch memory is kept until it is closed.
+    """Denoises pages one after the other and keeps the filter's scratch memory until `close`.
 
-    *Measured*: a new device for each page of 512 takes a seventh longer, since the system clears its scratch
-    memory (160 MB) again.
+    *Measured* on pages of 512 x 512 texels: with a new device for each page, denoising takes a seventh
+    longer, because the operating system clears the scratch memory (160 MB) each time.
 
     Parameters
     ----------
     threads : int
-        0 = all of the machine.
+        Number of threads; 0 = all cores.
     memory_mb : int
-        Upper limit of the filter's own memory.
+        Largest scratch memory of the filter, MB.
     """
 
     def __init__(self, threads: int = 0, memory_mb: int = MEMORY_MB) -> None:
         self._threads = threads
         self._memory_mb = memory_mb
         self._device: Any = None
-        # The filters of light and of signed values, made when first needed.
+        # Filters by the argument `signed` of `filter`, created when first needed.
         self._filters: dict[bool, Any] = {}
 
     @property
@@ -138,17 +139,18 @@ class LightmapDenoiser:
         Parameters
         ----------
         image : (H, W, 3) float32
-            Linear light, finite and not negative; or finite values of both signs. Every pixel counts, there
-            are no gaps.
+            Linear light, finite and not negative. If `signed`, finite values of both signs. All pixels must
+            have a meaningful value.
         progress : Progress
             Called with the fraction done; a truthy return value stops the filter.
         signed : bool
-            Use the filter's mode for coefficients of directional lightmaps in [-1, 1]; they are scaled to
-            that range here.
+            Use the filter's mode for coefficients of directional lightmaps in [-1, 1]. The values are scaled
+            to that range by the filter's input scale.
 
         Returns
         -------
         image : (H, W, 3) float32
+            The denoised picture.
 
         Raises
         ------
@@ -183,7 +185,7 @@ class LightmapDenoiser:
 def _new_device(library: Any, threads: int) -> Any:
     device = library.Device(library.OIDN_DEVICE_TYPE_CPU)
     device.set_int("numThreads", threads)
-    # Do not pin threads: it would move other threads of the caller, and is not faster here.
+    # Do not pin threads to cores: pinning would also affect other threads of the caller, and was not faster.
     device.set_bool("setAffinity", False)
     device.commit()
     _check(library, device)
@@ -193,7 +195,7 @@ def _new_device(library: Any, threads: int) -> Any:
 def _execute(
     library: Any, device: Any, filter_: Any, inputs: dict[Any, NDArray[np.float32]], progress: Progress
 ) -> NDArray[np.float32]:
-    """Run a filter over its named input pictures (H, W, 3)."""
+    """Run a filter and return (H, W, 3) float32; `inputs` maps OIDN's image names to pictures (H, W, 3)."""
     sources = {name: np.ascontiguousarray(image, np.float32) for name, image in inputs.items()}
     result = np.zeros_like(sources[library.OIDN_IMAGE_COLOR])
     for name, source in sources.items():
@@ -208,12 +210,12 @@ def _execute(
 
 
 class _Monitor:
-    """Reports OIDN's progress. `pyoidn` has no wrapper for it, so its library is called directly."""
+    """Reports OIDN's progress. `pyoidn` does not wrap that function, so the C library is called directly."""
 
     def __init__(self, library: Any, filter_: Any, progress: Progress) -> None:
         self._progress = progress
         self._caught: BaseException | None = None
-        # Kept alive as long as the filter may call it.
+        # Keep a reference to the callback, so that it is not freed while the filter runs.
         self._function = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_double)(self._step)
         native = ctypes.CDLL(str(_native_path(library)))
         native.oidnSetFilterProgressMonitorFunction.argtypes = [ctypes.c_void_p] * 3
@@ -224,7 +226,7 @@ class _Monitor:
         )
 
     def _step(self, user: int | None, fraction: float) -> bool:
-        # No exception can pass through the C library: keep it and stop. A Ctrl-C arrives here as well.
+        # Exceptions (KeyboardInterrupt included) cannot pass through the C library: store it and stop.
         try:
             if self._caught is None:
                 report(self._progress, Stage.DENOISE, float(fraction))

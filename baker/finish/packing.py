@@ -1,4 +1,4 @@
-"""Moves some charts of a page close together, so that a filter works on little more than these."""
+"""Packs some charts of a page on a smaller page, so that a filter processes few other texels."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from numpy.typing import NDArray
 
 from baker.finish.kernels.page_charts import chart_boxes
 
-# Empty texels between charts: their surroundings are filled by reflection.
+# Empty texels between packed charts. The denoiser fills them by reflection.
 _GAP = 8
 
 
 @dataclass(frozen=True)
 class PackedCharts:
-    """Where the chosen texels of a page lie on a smaller one.
+    """Positions of n chosen texels on a page of shape (H, W) and on a smaller page of shape (h, w).
 
     Attributes
     ----------
     source : (n,) int64
-        Row * W + column of each on the page.
+        Row * W + column of each texel on the page.
     target : (n,) int64
-        The same on the smaller page.
+        Row * w + column of each texel on the smaller page.
     shape : (int, int)
-        Of the smaller page.
+        (h, w).
     """
 
     source: NDArray[np.int64]
@@ -33,26 +33,27 @@ class PackedCharts:
     shape: tuple[int, int]
 
     def take(self, page: NDArray[Any], fill: float = 0) -> NDArray[Any]:
-        """Return the smaller page (h, w, ...) of a page (H, W, ...), with `fill` between charts."""
+        """Copy the chosen texels of a page (H, W, ...) to a new page (h, w, ...), with `fill` elsewhere."""
         rest = page.shape[2:]
         packed = np.full((self.shape[0] * self.shape[1], *rest), fill, page.dtype)
         packed[self.target] = page.reshape(-1, *rest)[self.source]
         return packed.reshape(*self.shape, *rest)
 
     def put(self, packed: NDArray[Any], page: NDArray[Any]) -> None:
-        """Write the smaller page (h, w, ...) back to the chosen texels of `page` (H, W, ...)."""
+        """Copy the texels of the smaller page (h, w, ...) to the chosen texels of `page` (H, W, ...)."""
         rest = page.shape[2:]
         page.reshape(-1, *rest)[self.source] = packed.reshape(-1, *rest)[self.target]
 
 
 def pack_charts(chart: NDArray[np.int32], chosen: NDArray[np.bool_]) -> PackedCharts:
-    """Pack the boxes of charts in rows, the tallest first.
+    """Pack the bounding boxes of charts in rows, in order of decreasing height.
 
     Parameters
     ----------
     chart : (H, W) int32
+        Index of the chart of each texel.
     chosen : (H, W) bool
-        Texels to pack; those of one chart keep their places to each other.
+        Texels to pack. All chosen texels of a chart are moved by the same offset.
     """
     n = int(chart.max()) + 1
     low, high = np.full((n, 2), max(chart.shape), np.int64), np.full((n, 2), -1, np.int64)

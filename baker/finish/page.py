@@ -1,4 +1,4 @@
-"""Checks of the shapes of page arrays, and the largest values of charts, for all finishing stages."""
+"""Checks the shapes of page arrays, and computes the largest values of charts, for all finishing stages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: ND
     Raises
     ------
     ValueError
-        If shapes or types differ from these; this is an error of the caller, not of a scene.
+        If a shape or type differs. This means a bug in the calling code, not a defect of the scene.
     """
     if value.ndim != 3 or value.dtype != np.float32:
         raise ValueError(f"value must be (H, W, C) float32, it is {value.shape} {value.dtype}")
@@ -36,7 +36,10 @@ def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: ND
 def highest_of_charts(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Return the largest value of each chart's covered texels, (n_charts, C) float32; -inf if it has none."""
+    """Return (n_charts, C) float32: the largest value of each chart's covered texels, -inf if there are none.
+
+    value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
+    """
     highest = np.full((int(chart.max(initial=-1)) + 1, value.shape[2]), -np.inf, np.float32)
     chart_maxima(value, chart, covered, highest)
     return highest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-# Rows of a band: enough that the call's overhead is negligible, few enough for an even distribution.
+# Rows of the page in a band: enough to make the overhead of a call negligible, few enough to balance threads.
 ROWS = 64
 
 
@@ -15,11 +15,14 @@ def over_rows(kernel: Callable[[int, int], object], height: int, threads: int, b
     Parameters
     ----------
     kernel : callable
-        Must write its own rows only, so that the number of threads cannot change the result.
+        Must write only the rows first_row to end_row - 1, so that the number of threads does not change the
+        result.
     height : int
+        Number of rows of the page.
     threads : int
-        At least 1.
+        Number of threads; 1 runs the bands in the calling thread.
     band_rows : int
+        Number of rows in a band.
     """
     bands = [(first, min(first + band_rows, height)) for first in range(0, height, band_rows)]
     if threads <= 1 or len(bands) == 1:

@@ -8,9 +8,10 @@ from baker.trace.jit import kernel, larger, smaller
 
 @kernel
 def chart_maxima(value, chart, covered, highest):
-    """Raise `highest` (n_charts, C) float32 to the largest value of each chart's covered texels.
+    """Set each row of `highest` to the maximum of itself and the values of the chart's covered texels.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
+    highest : (n_charts, C) float32, changed in place
     """
     height, width, channels = value.shape
     for r in range(height):
@@ -22,10 +23,11 @@ def chart_maxima(value, chart, covered, highest):
 
 @kernel
 def chart_sums(value, weight, chart, covered, total, count):
-    """Add the weighted sum over channels of covered texels to `total`, and 1 to `count`, of their chart.
+    """Sum the luminance of each chart's covered texels and count these texels.
 
-    value : (H, W, C) float32; weight : (C,) float32; chart : (H, W) int32; covered : (H, W) bool
-    total : (n_charts,) float64; count : (n_charts,) int64
+    value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
+    weight : (C,) float32, weights of the channels in the luminance
+    total : (n_charts,) float64, sums, increased in place; count : (n_charts,) int64, increased in place
     """
     height, width, channels = value.shape
     for r in range(height):
@@ -43,7 +45,8 @@ def chart_boxes(chart, chosen, low, high):
     """Write the first and last row and column of each chart's chosen texels.
 
     chart : (H, W) int32; chosen : (H, W) bool
-    low, high : (n_charts, 2) int64, on entry larger than the page, and -1
+    low, high : (n_charts, 2) int64 outputs, first and last (row, column). On entry `low` is at least the side
+        of the page and `high` is -1.
     """
     height, width = chart.shape
     for r in range(height):

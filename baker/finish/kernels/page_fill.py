@@ -1,7 +1,7 @@
 """Kernels that fill empty texels of a lightmap page: nearest texel, reflection at chart borders.
 
-`nearest_texel` computes exact Euclidean distances in linear time. `reflect_outwards` reads only texels of the
-chart that the nearest texel belongs to.
+`nearest_texel` uses exact Euclidean distances and takes linear time. `reflect_outwards` fills an empty texel
+from the chart of its nearest covered texel only.
 
 Based on: Meijster, Roerdink, Hesselink, A General Algorithm for Computing Distance Transforms in Linear
 Time, 2000.
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Largest distance, texels, over which reflected values follow the plane fit at the border, and largest factor
-# by which it changes them.
+# Distance from the border beyond which the fitted plane is constant, texels.
 SLOPE_REACH = 6.0
+# Largest factor (and largest divisor) by which the plane changes a reflected value.
 MOST = 4.0
 
 
@@ -27,8 +27,8 @@ def nearest_texel(mask: NDArray[np.bool_], out: NDArray[np.int32]) -> None:
     ----------
     mask : (H, W) bool
     out : (H, W) int32
-        Receives row * W + column of the nearest set texel, -1 everywhere if none is set. Which of several
-        equally near texels is chosen depends on the mask only.
+        Receives row * W + column of the nearest set texel, or -1 everywhere if none is set. The choice among
+        equally near texels depends on the mask only.
     """
     row_of = np.full(mask.shape, -1, np.int32)
     apex, start = np.zeros((2, mask.shape[1]), np.int64)
@@ -55,7 +55,8 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
             below = row_of[r + 1, c]
             if below >= 0 and (row_of[r, c] < 0 or below - r < r - row_of[r, c]):
                 row_of[r, c] = below
-    # Compute the lower envelope of the columns' parabolas in each row, exactly, in integers.
+    # In each row, compute the lower envelope of the columns' parabolas (squared distance as a function of the
+    # column) in exact integer arithmetic. apex[k] is the column of parabola k, start[k] its first column.
     for r in range(height):
         n = 0
         for c in range(width):
@@ -66,7 +67,7 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
             while n > 0:
                 i = apex[n - 1]
                 gi = np.int64(row_of[r, i] - r)
-                # Last column at which i is at least as near as c.
+                # Compute the last column at which the texel of column i is at least as near as that of c.
                 cut = (c * c - i * i + g * g - gi * gi) // (2 * (c - i))
                 if cut >= start[n - 1]:
                     first = cut + 1
@@ -94,8 +95,8 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
 
     Let q be the covered texel nearest to an empty texel p, and m the texel of q's chart opposite to p at the
     same distance from q. Then value(p) = value(m) * plane(p) / plane(m), where the plane is fitted at q. So
-    the noise has the same statistics on both sides of the border, and gradients continue. Where the chart is
-    thinner than the distance, m is found by repeated reflection at its two borders.
+    the noise has the same statistics on both sides of the border, and gradients continue. If the chart is
+    thinner than the distance from p to q, m is found by repeated reflection at the chart's two borders.
 
     Parameters
     ----------
@@ -104,11 +105,13 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
     plane_row : (H, W) int32
-        Row of `plane` for each covered texel that is some empty texel's nearest.
+        For each texel in `nearest`, the index of its plane in `plane`.
     plane : (n, 3, C) float32
-        Plane at these texels: value, slope per column, slope per row.
+        Planes fitted at n border texels: value, slope per column, slope per row.
     max_distance : int
         Largest distance between q and m, in texels.
+    first_row, end_row : int
+        Rows of the page to fill.
     """
     height, width, channels = value.shape
     for r in range(first_row, end_row):
@@ -118,6 +121,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
                 continue
             qr, qc = q // width, q % width
             dr, dc = qr - r, qc - c
+            # Measure the depth of the chart behind q, in texels along the direction from p to q.
             distance = larger(abs(dr), abs(dc))
             depth = 0
             own = chart[qr, qc]
@@ -129,6 +133,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
                 if not covered[rr, cc] or chart[rr, cc] != own:
                     break
                 depth = k
+            # Find m by reflection, repeated if the chart is thinner than the distance.
             step = distance
             if depth == 0:
                 step = 0
@@ -138,7 +143,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
                     step = 2 * depth - step
             rr = qr + _round_ratio(dr * step, distance)
             cc = qc + _round_ratio(dc * step, distance)
-            # Beyond SLOPE_REACH texels the plane is constant.
+            # Multiply the value at m by the ratio of the plane at p and at m.
             outside = smaller(1.0, SLOPE_REACH / distance)
             inside = smaller(1.0, SLOPE_REACH / step) if step > 0 else 1.0
             at = plane_row[qr, qc]

@@ -1,10 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that limit the change of a denoised page by the error of its noisy samples.
+"""Kernels that limit the change of a denoised page by the standard error of its noisy samples.
 
-A denoiser should remove noise, not light, so the mean difference between noisy and denoised page over a small
-window of a chart is reduced to a few of its standard errors. No texel changes by more than a few standard
-errors, or to a value outside the range of the samples around it. The result is mixed with the samples by
-inverse variance, so a converged page does not change.
+1. The mean difference between the noisy and the denoised page over a window of 5 x 5 texels is limited to
+   `MEAN_SIGMAS` of its standard errors, because a denoiser should remove noise but no light.
+2. Each texel's change is limited to `TEXEL_SIGMAS` of its standard errors and to the range of the noisy
+   values in the window.
+3. The result is averaged with the noisy value by inverse variance, so a converged page does not change.
 """
 
 from __future__ import annotations
@@ -16,14 +17,17 @@ import numpy as np
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.trace.jit import kernel, larger, scratch, smaller
 
+# Half side of the window, texels.
 RADIUS = 2
-# Largest mean difference of a window that is attributed to noise, in its standard errors.
+# Largest mean difference of a window that is attributed to noise, in standard errors of that mean.
 MEAN_SIGMAS = 2.5
 # Largest change of a texel, in its standard errors.
 TEXEL_SIGMAS = 5.0
-# The filter's own relative error: 0.1 to 0.5 % on noise-free pages with contact shadows.
+# Assumed relative error of the filter itself. Measured: 0.1 to 0.5 % on noise-free pages with contact
+# shadows.
 OWN_ERROR = 0.005
-# The same within two texels of a chart's border, where partly covered texels step from row to row.
+# Assumed relative error of the filter within two texels of a chart's border, where the covered part of texels
+# changes in steps from row to row.
 OWN_ERROR_BORDER = 0.02
 _RED, _GREEN, _BLUE = LUMINANCE_WEIGHTS
 _three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
@@ -31,9 +35,9 @@ _three, _range = scratch((3,), np.float64), scratch((2, 3), np.float64)
 
 @kernel
 def high_pass(luminance, chart, covered, out, first_row, end_row):
-    """Filter a page by the kernel [1 -2 1; -2 4 -2; 1 -2 1] / 6, which is 0 on planes.
+    """Convolve a page with [1 -2 1; -2 4 -2; 1 -2 1] / 6, whose result is 0 on planes.
 
-    For white noise the result has the noise's own standard deviation.
+    White noise keeps its standard deviation.
 
     Parameters
     ----------
@@ -41,7 +45,10 @@ def high_pass(luminance, chart, covered, out, first_row, end_row):
     chart : (H, W) int32
     covered : (H, W) bool
     out : (H, W) float32
-        Receives the filtered page where all nine texels are covered ones of one chart; untouched elsewhere.
+        Receives the result at texels whose 3 x 3 neighbourhood is covered and in one chart. All other texels
+        are unchanged.
+    first_row, end_row : int
+        Rows of the page to compute.
 
     Notes
     -----
@@ -64,7 +71,7 @@ def high_pass(luminance, chart, covered, out, first_row, end_row):
 
 @kernel
 def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):
-    """Correct a denoised page where it leaves the noisy one by more than noise explains.
+    """Limit the difference between a denoised and a noisy page to what the standard error explains.
 
     Parameters
     ----------
@@ -81,6 +88,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
         for c in range(width):
             if not covered[r, c]:
                 continue
+            # Sum weights, squared errors and differences, and find the range of values, over the window.
             sw = sww = se = 0.0
             n = 0
             for j in range(3):
@@ -101,7 +109,8 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                         residual[j] += w * (sample - float(denoised[rr, cc, j]))
                         extent[0, j] = smaller(extent[0, j], sample)
                         extent[1, j] = larger(extent[1, j], sample)
-            # Pooled over the window: the estimated error of a texel without rare bright samples is too small.
+            # Take at least the mean error of the window: a texel without rare bright samples underestimates
+            # its own error.
             texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
             mean_error = texel_error * math.sqrt(sww) / sw
@@ -111,18 +120,21 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                 + _BLUE * float(denoised[r, c, 2])
             )
             for j in range(3):
-                # Assume the same relative noise for each channel as for the luminance.
+                # Scale the error of the luminance to the channel: assume the same relative noise.
                 scale = 1.0
                 if luminance > 0.0:
                     scale = smaller(larger(float(denoised[r, c, j]) / luminance, 0.0), 8.0)
+                # Limit the mean difference of the window.
                 believed = MEAN_SIGMAS * mean_error * scale
                 mean = residual[j] / sw
                 excess = larger(abs(mean) - believed, 0.0)
                 value = float(denoised[r, c, j]) + (excess if mean > 0.0 else -excess)
+                # Limit the change of the texel.
                 far = TEXEL_SIGMAS * texel_error * scale
                 own = float(noisy[r, c, j])
                 value = smaller(larger(value, own - far), own + far)
                 value = smaller(larger(value, extent[0, j]), extent[1, j])
+                # Average with the noisy value by inverse variance.
                 noise = (texel_error * scale) ** 2
                 bias = (own_error * value) ** 2
                 if noise + bias > 0.0:

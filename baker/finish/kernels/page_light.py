@@ -1,26 +1,31 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that restore the light that the denoiser removed from a page, from sums over blocks of texels."""
+"""Kernels that restore the light that the denoiser removed from a page, by sums over blocks of texels.
+
+A group is the set of chosen texels of one chart in one block. The window of a group consists of the groups of
+the same chart in the surrounding 5 x 5 blocks.
+"""
 
 from __future__ import annotations
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Side of a block, texels; radius of a window, blocks. Weights of blocks fall off linearly from its centre.
+# Side of a block, texels; half side of a window, blocks. The weight of a block falls linearly with its
+# distance from the window's centre.
 BLOCK, REACH = 8, 2
-# Weighted number of texels in a window at which half of the missing light is restored.
+# Weighted number of texels in a window for which half of the missing light is restored.
 HALF = 30.0
-# Limits of the relative change of a texel.
+# Smallest and largest relative change of a texel.
 LEAST, MOST = -0.5, 1.0
 
 
 @kernel
 def group_blocks(chart, chosen, label, first, owner):
-    """Number the groups, which are the chosen texels of one chart in one block; return the number of groups.
+    """Number the groups in the order of their blocks; return the number of groups.
 
     chart : (H, W) int32; chosen : (H, W) bool
     label : (H, W) int32, receives the group of each texel, -1 for none
     first : (blocks + 1,) int64, receives the first group of each block
-    owner : (n,) int32 for n chosen texels, receives the chart of each group
+    owner : (n,) int32 for n chosen texels, receives the chart of each group in its first entries
     """
     height, width = chart.shape
     across, n = (width + BLOCK - 1) // BLOCK, 0
@@ -44,7 +49,7 @@ def group_blocks(chart, chosen, label, first, owner):
 
 @inner
 def _group_of(begin, end, owner, chart):
-    """Return the group of `chart` among the groups `begin` to `end`, or -1.
+    """Return the group of `chart` among the groups `begin` to `end - 1`, or -1.
 
     owner : (n,) int32, chart of each group
     """
@@ -56,12 +61,13 @@ def _group_of(begin, end, owner, chart):
 
 @kernel
 def sum_groups(noisy, filtered, label, light, sums):
-    """Sum the light that the filter removed and that it kept, relative to the mean light of each group.
+    """Sum removed and kept light over the texels of each group, divided by the group's mean light.
 
-    noisy, filtered : (H, W, C) float32; label : (H, W) int32
-    light : (G, 2) float64 zeros, receives the filtered light of each group's texels and their number
-    sums : (G, 2 C + 1) float64 zeros, receives the sums of (noisy - filtered) / light and filtered / light of
-        each channel, and the number of texels
+    noisy, filtered : (H, W, C) float32; label : (H, W) int32, group of each texel or -1
+    light : (G, 2) float64 zeros, receives for each group the sum of `filtered` over texels and channels, and
+        the number of texels; their quotient is the mean light
+    sums : (G, 2 C + 1) float64 zeros, receives for each group the C sums of (noisy - filtered) / mean light,
+        the C sums of filtered / mean light, and the number of texels
     """
     height, width, channels = noisy.shape
     for r in range(height):
@@ -85,14 +91,14 @@ def sum_groups(noisy, filtered, label, light, sums):
 
 @kernel
 def missing_shares(first, owner, across, sums, share):
-    """Write the relative change that restores the missing light of the window around each group.
+    """Write the relative change of each group that restores the light removed in the window around it.
 
-    It is removed light / kept light, times n / (n + HALF) for a window of n texels, since sums over few
-    texels are noisy.
+    The change is (removed / kept) * n / (n + HALF) for sums of removed and kept light over a window of n
+    texels. The second factor reduces the change for few texels, because their sums are noisy.
 
-    share : (G, C) float64 output, limited to LEAST and MOST
+    share : (G, C) float64 output, relative change, limited to LEAST and MOST
     first : (blocks + 1,) int64, first group of each block; owner : (n,) int32, chart of each group
-    across : int, blocks in a row
+    across : int, number of blocks in a row of blocks
     sums : (G, 2 C + 1) float64, from `sum_groups`
     """
     channels = share.shape[1]
@@ -119,11 +125,14 @@ def missing_shares(first, owner, across, sums, share):
 
 @kernel
 def add_shares(label, first, owner, across, share, page):
-    """Multiply a page (H, W, C) float32 by 1 + share, bilinearly interpolated between the centres of blocks.
+    """Multiply each texel of a page by 1 + share, with shares interpolated bilinearly between block centres.
 
-    label : (H, W) int32, first : (blocks + 1,) int64, owner : (n,) int32 from `group_blocks`
-    across : int, blocks in a row
-    share : (G, C) float64
+    If a neighbouring block has no texel of the same chart, the share of the texel's own group is used for it.
+
+    label : (H, W) int32, first : (blocks + 1,) int64, owner : (n,) int32, from `group_blocks`
+    across : int, number of blocks in a row of blocks
+    share : (G, C) float64, from `missing_shares`
+    page : (H, W, C) float32, changed in place
     """
     height, width, channels = page.shape
     down = (len(first) - 1) // across
@@ -148,6 +157,9 @@ def add_shares(label, first, owner, across, share, page):
 
 @inner
 def _group_or(block, first, owner, chart, otherwise):
-    """Return the group of `chart` in `block`, or `otherwise`; `first` and `owner` from `group_blocks`."""
+    """Return the group of `chart` in `block`, or `otherwise` if there is none.
+
+    first : (blocks + 1,) int64, owner : (n,) int32, from `group_blocks`
+    """
     group = _group_of(first[block], first[block + 1], owner, chart)
     return group if group >= 0 else otherwise

@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Planes fitted to windows of a lightmap page, and values moved or continued along them.
+"""Kernels that fit planes to windows of a lightmap page, and extrapolate values along these planes.
 
-The plane at a texel is the weighted least-squares plane through the covered texels of its own chart in a
-window around it, each placed at the centroid of its covered part.
+The plane at a texel is a weighted least-squares fit to the covered texels of the same chart in a window
+around it. The position of each value is the centroid of the covered part of its texel.
 """
 
 from __future__ import annotations
@@ -11,42 +11,46 @@ import numpy as np
 
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Half window, texels.
+# Half side of a window, texels.
 RADIUS = 2
-# Added to the diagonal of the normal equations: if the texels lie on one line, the slope across it is 0.
+# Ridge term on the diagonal of the normal equations, texels^2 times the sum of weights. If all texels lie on
+# one line, the slope across that line becomes 0.
 RIDGE = 1e-3
-# Largest distance of a result from the range of the window's values: as a share of that range, and in units
-# of the steps between the last three texels, that is, of the last step and CURVED times the one before.
+# Largest excess of a result over the range of the window's values, as a share of that range.
 HEADROOM = 0.5
+# Largest excess in units of the differences between the last three texels (see `_trend`): STEEP times the
+# smaller of the last difference and CURVED times the difference before it.
 STEEP, CURVED = 2.0, 3.0
-# A value may exceed the range of its chart only if a plane explains more than this share of the variance in
-# the window.
+# Share of the variance in the window that a plane must explain before a value may exceed its chart's largest.
 STRAIGHT = 0.95
-# Extrapolation stops growing this many texels outside the chart.
+# Distance from the chart beyond which extrapolated values are constant, texels.
 MAX_STEP = 2.0
-# Share of a value by which differences between it and a plane's are reduced: few texels are noisier than a
-# plane.
+# Part of the change made by `match_lookups` that is discarded, as a share of the texel's value. A bilinear
+# lookup uses few texels and is noisier than a plane.
 NOISY = 0.03
-# A noisy slope is multiplied by 1 - DOUBT / F, F its variance ratio: noise alone gives F = 1 on average.
+# A slope on a noisy page is multiplied by 1 - DOUBT / F, where F is the slope's variance ratio (F-test).
+# Noise alone gives F = 1 on average.
 DOUBT = 3.0
-# Added to squared distances, texels: the weight of a texel is 1 / (FLAT + distance^2). The weights of noisy
-# pages are more uniform.
+# Constants in the weight of a texel, texels^2: weight = 1 / (FLAT + distance^2). On noisy pages NOISY_FLAT
+# replaces FLAT, which makes the weights more uniform.
 FLAT, NOISY_FLAT = 1.0, 4.0
 
-# Sums over a window: of the weights w, w x, w y, w x x, w x y, w y y, and the number of texels; then for each
-# channel those of w v, w x v, w y v, w v v, and the smallest and the largest value v.
+# Columns of the sums over a window, with weight w and position (x, y): sums of w, w x, w y, w x x, w x y and
+# w y y, and the number of texels. For each channel with value v: sums of w v, w x v, w y v and w v v, and the
+# smallest and largest v.
 W, WX, WY, WXX, WXY, WYY, COUNT = range(7)
 WV, WXV, WYV, WVV, LOW, HIGH = range(6)
 N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
-# Columns of a plane, per channel: value at the texel, slope per column and per row, smallest and largest
-# value in the window, weighted sum of squares about the mean, and the part of it that the plane explains.
+# Columns of a plane, for each channel: value at the texel, slope per column and per row, smallest and largest
+# value in the window, weighted sum of squares about the mean, and the part of that sum that the plane
+# explains.
 CENTRE, ACROSS, DOWN, LOWEST, HIGHEST, SPREAD, EXPLAINED = range(7)
 N_PLANE = 7
-# Largest further increase and decrease of values, see `_trend`.
+# Columns of a trend: by how much values may increase and decrease beyond the window, see `_trend`.
 RISE, FALL = range(2)
 
 MAX_CHANNELS = 16
-# Planes that are kept while neighbouring texels continue the same ones.
+# Number of planes cached in `extrapolate_outwards`, where neighbouring texels often use the same plane.
 _SLOTS = 64
 
 _sums = scratch((N_COLUMNS + N_CHANNEL_COLUMNS * MAX_CHANNELS,), np.float64)
@@ -54,18 +58,20 @@ _planes = scratch((1, MAX_CHANNELS, N_PLANE), np.float64)
 _kept_planes = scratch((_SLOTS, MAX_CHANNELS, N_PLANE), np.float64)
 _kept_sources = scratch((_SLOTS,), np.int64)
 _trends = scratch((MAX_CHANNELS, 2), np.float64)
-# Offsets of a page whose values all lie at their texels' centres.
+# Value of `offset` for a page whose values all lie at texel centres.
 NO_OFFSET = np.zeros((0, 0, 2), np.float32)
 
 
 @inner
 def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
-    """Sum over the texels of one chart around texel (r, c), weighted by 1 / (flat + distance^2).
+    """Sum over the texels around texel (r, c) in its chart, weighted by 1 / (flat + distance^2).
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     offset : (H, W, 2) float32, column and row offset of each value's position from its texel centre, texels;
-        (0, 0, 2) where all are zero
-    sums : output, see the column names; x and y are counted from the place of texel (r, c)
+        of shape (0, 0, 2) if all offsets are zero
+    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64 output, see the column names; x and y are relative to
+    the
+        position of texel (r, c)
     """
     height, width, channels = value.shape
     placed = offset.shape[0] > 0
@@ -105,11 +111,12 @@ def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
 
 @inner
 def fit_plane(value, chart, covered, offset, r, c, radius, flat, sums, planes, slot):
-    """Fit a plane per channel to the texels of one chart around texel (r, c).
+    """Fit a plane for each channel to the texels around texel (r, c) in its chart.
 
-    value, chart, covered, offset, radius, flat : see `_sum_window`
-    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64, scratch
-    planes : (slots, C, N_PLANE) float64, row `slot` is written
+    value, chart, covered, offset : see `_sum_window`
+    radius : int, half side of the window, texels; flat : float, see `FLAT`
+    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64, receives the sums over the window
+    planes : (slots, C, N_PLANE) float64 output; only planes[slot] is written
     """
     _sum_window(value, chart, covered, offset, r, c, radius, flat, sums)
     weight = sums[W]
@@ -135,19 +142,20 @@ def fit_plane(value, chart, covered, offset, r, c, radius, flat, sums, planes, s
 
 @inner
 def _step(along, length):
-    """Return the nearest of -1, 0, 1 to along / length."""
+    """Return -1, 0 or 1, whichever is nearest to along / length."""
     return 1 if along > 0.5 * length else (-1 if along < -0.5 * length else 0)
 
 
 @inner
 def _trend(value, chart, covered, r, c, x, y, trend):
-    """Write the largest increase and decrease of values from texel (r, c) along (x, y) texels, both >= 0.
+    """Write the largest plausible increase and decrease of values from texel (r, c) to (r + y, c + x).
 
-    They are 0 unless the last two steps between texels along that direction have the same sign. At the edge
-    of a shadow, between different faces and in noise, the signs differ.
+    Both limits are derived from the differences between the last three texels towards (r, c) in that
+    direction (see `STEEP`). If these two differences have different signs, both limits are 0. The signs
+    differ at shadow edges, between different faces and in noise.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
-    trend : (C, 2) float64 output
+    trend : (C, 2) float64 output, columns RISE and FALL, both >= 0
     """
     height, width, channels = value.shape
     length = larger(abs(x), abs(y))
@@ -171,12 +179,13 @@ def _trend(value, chart, covered, r, c, x, y, trend):
 
 @inner
 def _limited(planes, slot, j, estimate, trend, highest):
-    """Return an estimate limited to the window's range, which is extended where there is a trend.
+    """Return an estimate for channel j, limited to the range of the window extended by the trend.
 
-    Values never become negative, and exceed the largest value of the chart, `highest`, only where a plane
-    fits the window well.
+    If all values in the window are >= 0, the result is >= 0. It exceeds `highest` only if the plane explains
+    more than `STRAIGHT` of the variance in the window.
 
-    planes : (slots, C, N_PLANE) float64, row `slot`; trend : (C, 2) float64; highest : float
+    planes : (slots, C, N_PLANE) float64, of which planes[slot] is read; trend : (C, 2) float64
+    highest : float, largest value of the chart
     """
     low, high = planes[slot, j, LOWEST], planes[slot, j, HIGHEST]
     room = HEADROOM * (high - low)
@@ -192,7 +201,7 @@ def _limited(planes, slot, j, estimate, trend, highest):
 
 @inner
 def _off_centre(covered, offset, smallest, r, c):
-    """Return whether texel (r, c) is covered and its centroid further than `smallest` from its centre.
+    """Return whether texel (r, c) is covered and its centroid offset is at least `smallest` along one axis.
 
     covered : (H, W) bool; offset : (H, W, 2) float32, texels; smallest : float, texels
     """
@@ -201,7 +210,7 @@ def _off_centre(covered, offset, smallest, r, c):
 
 @kernel
 def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_row, end_row):
-    """Move each texel's value from the centroid of its covered part to the texel centre.
+    """Extrapolate each texel's value from the centroid of its covered part to the texel centre.
 
     Parameters
     ----------
@@ -211,7 +220,7 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
     offset : (H, W, 2) float32
         Centroid minus texel centre (column, row), texels.
     smallest : float
-        Offsets below this are left alone, texels.
+        Texels whose offset is below this along both axes are not changed, texels.
     highest : (n_charts, C) float32
         Largest value of each chart.
     out : (H, W, C) float32, changed in rows first_row to end_row - 1
@@ -234,14 +243,14 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
 def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row):
     """Set each partly covered texel so that a bilinear lookup at its centroid returns its mean.
 
-    Only texels of which all texels of that lookup are covered and of one chart are changed. The change
-    relative to `move_to_centre` is reduced by the share NOISY of the mean, since a plane through many texels
-    is less noisy.
+    A texel is changed only if all texels of that lookup are covered and in its chart. The difference to the
+    result of `move_to_centre` is reduced by NOISY times the mean, because that result is less noisy: it comes
+    from a plane through many texels.
 
     Parameters
     ----------
     value, chart, covered, offset, smallest, highest : see `move_to_centre`
-    moved : (H, W, C) float32, from `move_to_centre`
+    moved : (H, W, C) float32, result of `move_to_centre`
     out : (H, W, C) float32, changed in rows first_row to end_row - 1
     """
     height, width, channels = value.shape
@@ -252,7 +261,7 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
                 continue
             ox, oy = float(offset[r, c, 0]), float(offset[r, c, 1])
             x, y = abs(ox), abs(oy)
-            # Row and column of the other texels of the lookup.
+            # Find the row and column of the other three texels of the lookup, and require the same chart.
             rr = smaller(larger(r + (1 if oy > 0.0 else -1), 0), height - 1)
             cc = smaller(larger(c + (1 if ox > 0.0 else -1), 0), width - 1)
             own = chart[r, c]
@@ -264,6 +273,7 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
             fit_plane(value, chart, covered, offset, r, c, RADIUS, FLAT, sums, planes, 0)
             _trend(value, chart, covered, r, c, -ox, -oy, trend)
             for j in range(channels):
+                # Solve the bilinear lookup for the value at the centre of this texel.
                 measured, centred = float(value[r, c, j]), float(moved[r, c, j])
                 others = x * (1.0 - y) * float(moved[r, cc, j]) + (1.0 - x) * y * float(moved[rr, c, j])
                 others += x * y * float(moved[rr, cc, j])
@@ -275,11 +285,11 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
 
 @kernel
 def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels, grown, first_row, end_row):
-    """Extrapolate each chart with planes fitted at its border into the empty texels near it, in place.
+    """Fill the empty texels near each chart with planes fitted at its border, in place.
 
     Parameters
     ----------
-    value : (H, W, C) float32, changed at grown texels in rows first_row to end_row - 1
+    value : (H, W, C) float32, changed at filled texels in rows first_row to end_row - 1
     chart : (H, W) int32
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
@@ -292,7 +302,7 @@ def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels
     """
     width, channels = value.shape[1], value.shape[2]
     sums, trend = _sums(), _trends()
-    # Many texels continue the same one: slot s keeps the plane of texel source[s] - 1.
+    # Cache planes, since many texels use the same one: slot s holds the plane of the texel source[s] - 1.
     planes, source = _kept_planes(), _kept_sources()
     for r in range(first_row, end_row):
         for c in range(width):
@@ -320,7 +330,7 @@ def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels
 
 @kernel
 def noisy_planes(value, chart, covered, offset, texel, radius, out):
-    """Fit a plane per channel around chosen texels of a noisy page, with slopes reduced by their uncertainty.
+    """Fit a plane for each channel around n texels of a noisy page, with slopes reduced by their uncertainty.
 
     Parameters
     ----------
@@ -329,7 +339,8 @@ def noisy_planes(value, chart, covered, offset, texel, radius, out):
     texel : (n,) int64
         Row * W + column of covered texels.
     radius : int
-        Half window, texels; wider than for clean pages, since a slope has to rise above the noise.
+        Half side of the window, texels. It is larger than for denoised pages, because slopes are fitted to
+        noisy values.
     out : (n, 3, C) float32 output
         Value, slope per column and slope per row.
     """
@@ -339,7 +350,7 @@ def noisy_planes(value, chart, covered, offset, texel, radius, out):
         r, c = texel[k] // width, texel[k] % width
         fit_plane(value, chart, covered, offset, r, c, radius, NOISY_FLAT, sums, planes, 0)
         for j in range(value.shape[2]):
-            # Explained against unexplained spread, per degree of freedom: the F ratio of the slope.
+            # Reduce the slope by its F ratio: explained over unexplained variance, per degree of freedom.
             explained, spread = planes[0, j, EXPLAINED], planes[0, j, SPREAD]
             trust = 0.0
             if sums[COUNT] > 3.0 and explained > 0.0:
