@@ -6,7 +6,7 @@
 >>> result.lightmaps["irradiance"].value.shape  # doctest: +SKIP
 (1, 1024, 1024, 3)
 
-docs/API.md describes every function. Names are imported when they are first used.
+docs/API.md describes every function. Each name of the API is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# The module of each name.
+# Names of the API by the module that defines them.
 _HOMES = {
     "api.bakes": ("ao", "bake", "export", "save"),
     "api.results": ("batch", "diff", "render", "verify", "view"),

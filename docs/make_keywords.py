@@ -52,7 +52,7 @@ from typing import Literal, TypedDict
 '''
 # The list of settings in a docstring: it begins after these lines and ends at the section "Returns".
 LISTED = re.compile(
-    r"(    \*\*keywords : Unpack\[(\w+)\]\n        Settings by name, in place of those in `settings`:\n)"
+    r"(    \*\*keywords : Unpack\[(\w+)\]\n        Settings by name, which replace those in `settings`:\n)"
     r".*?(?=\n\n    Returns\n)",
     re.DOTALL,
 )

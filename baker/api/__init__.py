@@ -1,1 +1,1 @@
-"""The functions of the Python API, which `import baker` offers."""
+"""The functions of the Python API, available as attributes of `baker`."""

@@ -1,4 +1,4 @@
-"""Checks of arguments of the Python API that are no settings; errors of the system as those of baker."""
+"""Checks arguments of the Python API other than settings, and converts system errors to errors of baker."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ T = TypeVar("T")
 
 
 def of_the_api(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function of the API: a full disk or memory raises a `BakerError`, too.
+    """Decorate a function of the API: convert OSError and MemoryError to a `BakerError`.
 
-    `progress` is checked before the work.
+    Before the call, a keyword `progress` that is not callable raises `SettingsError`.
     """
 
     @wraps(function)
@@ -38,12 +38,12 @@ def of_the_api(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def path_of(value: Any, name: str, what: str = "a path") -> Path:
-    """Return an argument as a path.
+    """Return the argument `name` as a Path; `what` describes the expected value in the message.
 
     Raises
     ------
     SettingsError
-        If it is neither a str nor a Path.
+        If the value is neither a str nor a Path.
     """
     if not isinstance(value, str | os.PathLike):
         raise wrong_type(name, what, value)
@@ -51,12 +51,12 @@ def path_of(value: Any, name: str, what: str = "a path") -> Path:
 
 
 def instance_of(value: Any, kind: type[T], name: str, hint: str = "") -> T:
-    """Return an argument that must be of one class.
+    """Return the argument `name` after checking that it is an instance of `kind`.
 
     Raises
     ------
     SettingsError
-        If it is of another one; the message ends with `hint`.
+        If it is not; the message ends with `hint`.
     """
     if not isinstance(value, kind):
         raise wrong_type(name, f"a baker.{kind.__name__}", value, hint)
@@ -64,5 +64,5 @@ def instance_of(value: Any, kind: type[T], name: str, hint: str = "") -> T:
 
 
 def wrong_type(name: str, what: str, value: Any, hint: str = "") -> SettingsError:
-    """Return the error for an argument of a wrong type, not raised."""
+    """Return the error for an argument of a wrong type; the caller raises it."""
     return SettingsError(f"`{name}` should be {what} (was {type(value).__name__}){hint}", object=name)

@@ -1,4 +1,4 @@
-"""Bakes: make them, write them, export them to engines."""
+"""Functions that bake a scene, write a bake to a folder and export it for an engine."""
 
 from __future__ import annotations
 
@@ -34,74 +34,75 @@ def bake(
     Parameters
     ----------
     scene : Scene, str or Path
-        A scene file, or what `load` returns.
+        A scene file, or a result of `load`.
     settings : BakeSettings, optional
         Settings of the bake.
     out : str or Path, optional
-        Folder to write; None keeps everything in memory.
+        Folder to write; None keeps the result in memory.
     atlas : Atlas, optional
-        Lightmap uv of the scene, as `unwrap` returns it; its resolution and padding count. A Scene is needed.
+        Lightmap uv of the scene, a result of `unwrap` for the same Scene. Its resolution and padding replace
+        those of the settings.
     force : bool
-        Replace an `out` that baker did not write.
+        Replace `out` even if baker did not write it.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[BakeKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         channels : str | Sequence[str], default ('irradiance', 'ao')
             Channels to bake.
         resolution : int, texels, 16 to 16384, default 1024
-            Page width and height, exact.
+            Width and height of each page.
         density : float | None, texels/m, above 0, default None
-            Texels per metre; pages overflow into more.
+            Texels per metre; adds pages as needed.
         max_pages : int, 1 to 256, default 16
-            Most pages that `density` may fill.
+            Largest number of pages if `density` is set.
         padding : int, texels, 0 to 64, default 4
             Empty texels between charts.
         uv : Literal["auto", "keep", "unwrap"], default 'auto'
-            Keep a valid TEXCOORD_1, or unwrap.
+            Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
         unwrapper : Literal["xatlas"], default 'xatlas'
-            Library that cuts and packs charts.
+            Library that cuts surfaces into charts and packs them.
         quality : Literal["preview", "medium", "high", "ultra"], default 'medium'
-            Preset of samples: preview 16, medium 64, high 256, ultra 1024.
+            Preset of `samples`: preview 16, medium 64, high 256, ultra 1024.
         samples : int | None, 1 to 65536, default None
-            Hemisphere rays per texel; default by quality.
+            Hemisphere rays per texel; default: by `quality`.
         light_samples : int | None, 1 to 65536, default None
-            Shadow rays per texel; default: samples.
+            Shadow rays per texel; default: `samples`.
         ao_samples : int | None, 1 to 65536, default None
-            AO rays per texel; default: samples.
+            AO rays per texel; default: `samples`.
         ao_distance : str | float, m, default '10%'
             Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
         sky : str | float | Sequence[float] | None, cd/m2, default None
             Sky radiance R,G,B in cd/m2.
         sky_strength : float, from 0, default 1.0
-            Factor on the sky.
+            Factor of the sky radiance.
         bounces : int | None, 0 to 1000, default None
-            Reflections of light; default: until converged.
+            Number of reflections of light; default: until converged.
         denoise : bool, default True
             Denoise with Open Image Denoise.
         encode : str | Sequence[str], default ()
-            Further files of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+            Additional file formats of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
         export : str | Sequence[str], default ()
-            Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+            Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
         include : str | Sequence[str], default ()
-            Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
+            Bake only objects with these node names or node paths; `*` and `?` are wildcards.
         exclude : str | Sequence[str], default ()
-            Leave out objects and lights with these names or paths of nodes, and their descendants.
+            Leave out objects and lights with these node names or node paths, and their descendants.
         up : Literal["y", "z"], default 'y'
-            Up axis of files whose format defines none.
+            Up axis of files in formats that do not specify it.
         scale : float, m, above 0, default 1.0
-            Metres per unit of files whose format defines none.
+            Metres per unit of files in formats that do not specify it.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
         dtype : Literal["half", "float"], default 'half'
             Number format of the EXR files.
         exr_compression : Literal["zip", "piz"], default 'zip'
             Compression of the EXR files.
         rgbm_range : str | float, lx, default 'auto'
-            Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.
+            Largest irradiance that RGBM can store, lx; `auto` uses the brightest texel.
 
     Returns
     -------
@@ -111,7 +112,7 @@ def bake(
     Raises
     ------
     InputError
-        If the scene cannot be read or holds nothing to bake.
+        If the scene cannot be read or contains nothing to bake.
     SettingsError
         For an unknown setting, a value out of range, or an atlas of another scene.
     ResourceError
@@ -127,7 +128,7 @@ def bake(
     >>> (result.status == baker.TexelStatus.COVERED).any()
     np.True_
 
-    Stages can be called one by one, and settings be kept in an object:
+    The scene and its atlas can be made by separate calls, and settings can be passed as an object:
 
     >>> scene = baker.load("cornell.glb")
     >>> atlas = baker.unwrap(scene, baker.UnwrapSettings(resolution=64))
@@ -165,27 +166,27 @@ def ao(
     Parameters
     ----------
     scene : Scene, str or Path
-        A scene file, or what `load` returns.
+        A scene file, or a result of `load`.
     settings : BakeSettings, optional
-        How it is baked; its channels do not count.
+        Settings of the bake; `channels` is ignored.
     out : str or Path, optional
-        Folder to write; None keeps everything in memory.
+        Folder to write; None keeps the result in memory.
     force : bool
-        Replace an `out` that baker did not write.
+        Replace `out` even if baker did not write it.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[AoKeywords]
-        Settings by name, in place of those in `settings`; as of `bake`, without `channels`.
+        Settings by name, which replace those in `settings`: all keywords of `bake` except `channels`.
 
     Returns
     -------
     BakeResult
-        `result.lightmaps["ao"].value` is (pages, H, W, 1) float32; 1 is open, 0 is closed.
+        `result.lightmaps["ao"].value` is (pages, H, W, 1) float32; 1 is unoccluded, 0 is fully occluded.
 
     Raises
     ------
     InputError
-        If the scene cannot be read or holds nothing to bake.
+        If the scene cannot be read or contains nothing to bake.
     SettingsError
         For an unknown setting or a value out of range.
     ResourceError
@@ -219,32 +220,32 @@ def save(
     force: bool = False,
     progress: Progress = silent,
 ) -> BakeResult:
-    """Write a bake that is in memory to an output folder.
+    """Write a result of `bake` to an output folder.
 
     Parameters
     ----------
     bake : BakeResult
-        As `bake` returns it.
+        The bake to write.
     out : str or Path
-        Folder to write, as a whole or not at all.
+        Folder to write. After an error it has its old content.
     export : str or sequence of str
-        Engines for which a folder is added: "godot", "unity", "three" ...
+        Engines for which a subfolder is written: "godot", "unity", "three" ...
     force : bool
-        Replace an `out` that baker did not write.
+        Replace `out` even if baker did not write it.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
 
     Returns
     -------
     BakeResult
-        The same, with `out` and `manifest`.
+        A copy of `bake` with `out` and `manifest`.
 
     Raises
     ------
     SettingsError
-        For an unknown export, or an `out` that must not be replaced.
+        For an unknown export, or if `out` must not be replaced.
     ResourceError
-        If it cannot be written.
+        If the folder cannot be written.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -268,16 +269,16 @@ def save(
 
 @of_the_api
 def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
-    """Make a folder for one engine from a finished output folder.
+    """Convert a finished bake to a folder of files for one engine.
 
     Parameters
     ----------
     bake : str, Path or BakeResult
-        An output folder, or a bake that was written to one.
+        An output folder, or a bake that was written to a folder.
     engine : str
-        Name of an export, such as "godot", "unity" or "three"; see ENGINES.md.
+        Name of the engine, such as "godot", "unity" or "three"; see ENGINES.md.
     out : str or Path
-        Folder to make; it must not exist or be empty.
+        Folder to write. If it exists, it must be empty.
 
     Returns
     -------
@@ -287,9 +288,9 @@ def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
     Raises
     ------
     InputError
-        If the folder holds no bake.
+        If the folder contains no bake.
     SettingsError
-        For an unknown engine, a channel that is not baked, or an `out` that is not empty.
+        For an unknown engine, if a channel that it needs is not baked, or if `out` is not empty.
 
     Examples
     --------

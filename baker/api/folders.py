@@ -1,4 +1,4 @@
-"""The output folder of a bake that is given as a path or a result."""
+"""Finds the output folder of a bake that is passed as a path or as a result."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 def folder_of(bake: str | Path | BakeResult, name: str = "bake") -> Path:
-    """Return the output folder of a bake; `name` is that of the argument.
+    """Return the output folder of a bake; `name` is the name of the argument, for messages.
 
     Raises
     ------
     InputError
-        If a bake is only in memory.
+        If the bake was not written to a folder.
     SettingsError
-        If it is neither a path nor a bake.
+        If `bake` is neither a path nor a BakeResult.
     """
     from baker.core.lightmap import BakeResult
 

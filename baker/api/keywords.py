@@ -16,34 +16,34 @@ class BakeKeywords(TypedDict, total=False):
     # Channels to bake.
     channels: str | Sequence[str]
 
-    # Page width and height, exact.
+    # Width and height of each page.
     resolution: int
 
-    # Texels per metre; pages overflow into more.
+    # Texels per metre; adds pages as needed.
     density: float | None
 
-    # Most pages that `density` may fill.
+    # Largest number of pages if `density` is set.
     max_pages: int
 
     # Empty texels between charts.
     padding: int
 
-    # Keep a valid TEXCOORD_1, or unwrap.
+    # Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
     uv: Literal["auto", "keep", "unwrap"]
 
-    # Library that cuts and packs charts.
+    # Library that cuts surfaces into charts and packs them.
     unwrapper: Literal["xatlas"]
 
-    # Preset of samples: preview 16, medium 64, high 256, ultra 1024.
+    # Preset of `samples`: preview 16, medium 64, high 256, ultra 1024.
     quality: Literal["preview", "medium", "high", "ultra"]
 
-    # Hemisphere rays per texel; default by quality.
+    # Hemisphere rays per texel; default: by `quality`.
     samples: int | None
 
-    # Shadow rays per texel; default: samples.
+    # Shadow rays per texel; default: `samples`.
     light_samples: int | None
 
-    # AO rays per texel; default: samples.
+    # AO rays per texel; default: `samples`.
     ao_samples: int | None
 
     # Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
@@ -52,37 +52,37 @@ class BakeKeywords(TypedDict, total=False):
     # Sky radiance R,G,B in cd/m2.
     sky: str | float | Sequence[float] | None
 
-    # Factor on the sky.
+    # Factor of the sky radiance.
     sky_strength: float
 
-    # Reflections of light; default: until converged.
+    # Number of reflections of light; default: until converged.
     bounces: int | None
 
     # Denoise with Open Image Denoise.
     denoise: bool
 
-    # Further files of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+    # Additional file formats of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
     encode: str | Sequence[str]
 
-    # Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+    # Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
     export: str | Sequence[str]
 
-    # Bake only objects with these names or paths of nodes (`*` and `?` stand for others).
+    # Bake only objects with these node names or node paths; `*` and `?` are wildcards.
     include: str | Sequence[str]
 
-    # Leave out objects and lights with these names or paths of nodes, and their descendants.
+    # Leave out objects and lights with these node names or node paths, and their descendants.
     exclude: str | Sequence[str]
 
-    # Up axis of files whose format defines none.
+    # Up axis of files in formats that do not specify it.
     up: Literal["y", "z"]
 
-    # Metres per unit of files whose format defines none.
+    # Metres per unit of files in formats that do not specify it.
     scale: float
 
     # Seed of all random numbers.
     seed: int
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
     # Number format of the EXR files.
@@ -91,7 +91,7 @@ class BakeKeywords(TypedDict, total=False):
     # Compression of the EXR files.
     exr_compression: Literal["zip", "piz"]
 
-    # Irradiance that RGBM stores as all ones: lx, or `auto` for the brightest texel.
+    # Largest irradiance that RGBM can store, lx; `auto` uses the brightest texel.
     rgbm_range: str | float
 
 
@@ -147,7 +147,7 @@ class BatchKeywords(TypedDict, total=False):
     # Seed of all bakes; default: that of each job.
     seed: int | None
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
 
@@ -185,7 +185,7 @@ class DiffKeywords(TypedDict, total=False):
     # Seed of all random numbers.
     seed: int
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
 
@@ -232,13 +232,13 @@ class RenderKeywords(TypedDict, total=False):
     # Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
     sky: str | float | Sequence[float] | None
 
-    # Factor on the sky.
+    # Factor of the sky radiance.
     sky_strength: float
 
     # Seed of all random numbers.
     seed: int
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
 
@@ -252,38 +252,38 @@ class RepairKeywords(TypedDict, total=False):
     # Page width for which lightmap uv are tested and made.
     resolution: int
 
-    # Up axis of files whose format defines none.
+    # Up axis of files in formats that do not specify it.
     up: Literal["y", "z"]
 
-    # Metres per unit of files whose format defines none.
+    # Metres per unit of files in formats that do not specify it.
     scale: float
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
 
 class UnwrapKeywords(TypedDict, total=False):
     """Keywords of `UnwrapSettings`."""
 
-    # Page width and height, exact.
+    # Width and height of each page.
     resolution: int
 
-    # Texels per metre; pages overflow into more.
+    # Texels per metre; adds pages as needed.
     density: float | None
 
-    # Most pages that `density` may fill.
+    # Largest number of pages if `density` is set.
     max_pages: int
 
     # Empty texels between charts.
     padding: int
 
-    # Keep a valid TEXCOORD_1, or unwrap.
+    # Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
     uv: Literal["auto", "keep", "unwrap"]
 
-    # Library that cuts and packs charts.
+    # Library that cuts surfaces into charts and packs them.
     unwrapper: Literal["xatlas"]
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None
 
 
@@ -308,5 +308,5 @@ class VerifyKeywords(TypedDict, total=False):
     # Seed of all random numbers.
     seed: int
 
-    # Threads; default: all cores.
+    # Number of threads; default: all cores.
     threads: int | None

@@ -1,4 +1,4 @@
-"""Finished bakes: verify, compare, render and view them; batches of bakes."""
+"""Functions that verify, compare, render and view finished bakes, and that run batches of bakes."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def verify(
     Parameters
     ----------
     bake : str, Path or BakeResult
-        An output folder, or a bake that was written to one.
+        An output folder, or a bake that was written to a folder.
     settings : VerifySettings, optional
-        How much is path-traced, and limits.
+        Number of points, effort of path tracing, and limits.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[VerifyKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         texels : int, from 1, default 2000
             Texels compared at their centres; points at edges and outliers are added.
@@ -57,19 +57,20 @@ def verify(
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------
     VerifyReport
-        Figures of each channel, tables by object, worst texels, and whether all limits hold.
+        Metrics of each channel, tables by object, the texels with the largest errors, and whether all limits
+        hold.
 
     Raises
     ------
     InputError
-        If the folder holds no bake.
+        If the folder contains no bake.
     SettingsError
-        For an unknown setting, a value out of range, or a limit that cannot be read.
+        For an unknown setting, a value out of range, or a limit that cannot be parsed.
     ResourceError
         If memory or a library is missing.
     Cancelled
@@ -100,18 +101,18 @@ def diff(
     progress: Progress = silent,
     **keywords: Unpack[DiffKeywords],
 ) -> DiffReport:
-    """Compare two finished bakes at the same points of the surface, whatever their lightmap uv.
+    """Compare two finished bakes at the same points of the surface; their lightmap uv may differ.
 
     Parameters
     ----------
     a, b : str, Path or BakeResult
-        Output folders, or bakes that were written to one; b is the reference.
+        Output folders, or bakes that were written to folders. `b` is the reference.
     settings : DiffSettings, optional
-        How much is compared, and limits.
+        Number of texels, and limits.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[DiffKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         texels : int, from 1, default 20000
             Number of texels of A to compare.
@@ -122,19 +123,19 @@ def diff(
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------
     DiffReport
-        Error measures of each channel that both have, and the points with the largest differences.
+        Error metrics of each channel that both bakes have, and the points with the largest differences.
 
     Raises
     ------
     InputError
-        If one is no bake, or they have nothing in common.
+        If a folder contains no bake, or the bakes have no surface or channel in common.
     SettingsError
-        For an unknown setting, a value out of range, or a limit that cannot be read.
+        For an unknown setting, a value out of range, or a limit that cannot be parsed.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -163,20 +164,20 @@ def render(
     progress: Progress = silent,
     **keywords: Unpack[RenderKeywords],
 ) -> Picture:
-    """Render a scene through a pinhole camera: path-traced, its ambient occlusion, or lit by a bake.
+    """Render a scene through a pinhole camera by path tracing, as ambient occlusion, or lit by a bake.
 
     Parameters
     ----------
     scene : Scene, str or Path
-        A scene file, or what `load` returns.
+        A scene file, or a result of `load`.
     settings : RenderSettings, optional
         Camera, size, samples ...
     out : str or Path, optional
-        An EXR or PNG file to write, too.
+        EXR or PNG file to write.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[RenderKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         camera : str | float | Sequence[float] | None, default None
             Position, target, vertical field of view in degrees; or one of the file's own; default: its
@@ -206,11 +207,11 @@ def render(
         sky : str | float | Sequence[float] | None, cd/m2, default None
             Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
         sky_strength : float, from 0, default 1.0
-            Factor on the sky.
+            Factor of the sky radiance.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------
@@ -220,9 +221,9 @@ def render(
     Raises
     ------
     InputError
-        If the scene cannot be read, or has no camera and none is set.
+        If the scene cannot be read, or if neither the scene nor `camera` specifies a camera.
     SettingsError
-        For an unknown setting, a value out of range, or an `out` that is no picture.
+        For an unknown setting, a value out of range, or if `out` is not an EXR or PNG file.
     ResourceError
         If memory, disk or a library is missing.
     Cancelled
@@ -259,27 +260,27 @@ def view(
     Parameters
     ----------
     bake : str, Path or BakeResult
-        An output folder, or a bake that was written to one.
+        An output folder, or a bake that was written to a folder.
     port : int
-        Port on 127.0.0.1; 0 is a free one.
+        Port on 127.0.0.1; 0 chooses a free port.
     three : str or Path, optional
-        Your own three.js: its file, or npm's folder.
+        Copy of three.js to use: its file, or the folder in which npm installed it.
     browser : bool
-        Open the page.
+        Whether to open the page in the default browser.
 
     Returns
     -------
     ViewServer
-        Its address is `url`; `shutdown()` and `server_close()` end it.
+        The running server. `url` is its address; `shutdown()` and `server_close()` stop it.
 
     Raises
     ------
     InputError
-        If the folder holds no bake, or `three` is no three.js.
+        If the folder contains no bake, or `three` is not three.js.
     SettingsError
-        If `port` is no number of a port.
+        If `port` is not an integer from 0 to 65535.
     ResourceError
-        If the port is taken, or three.js is not installed.
+        If the port is in use, or three.js is not installed.
 
     Examples
     --------
@@ -321,13 +322,13 @@ def batch(
     Parameters
     ----------
     jobs_file : str or Path
-        TOML file of scenes and settings, see BATCH.md.
+        TOML file that lists scenes and settings, see BATCH.md.
     settings : BatchSettings, optional
-        Processes, memory, and the jobs to bake.
+        Number of processes, memory limit, and which jobs are baked.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[BatchKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         jobs : int, 1 to 1024, default 1
             Bakes at a time, each in a process of its own.
@@ -342,7 +343,7 @@ def batch(
         seed : int | None, 0 to 2147483647, default None
             Seed of all bakes; default: that of each job.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Scenes and their lightmap uv: load, check, repair, unwrap."""
+"""Functions that load, check and repair scenes, and that make lightmap uv."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     Parameters
     ----------
     path : str or Path
-        A file of a format that `baker.io.importers` has, such as .glb or .obj.
+        A scene file, such as .glb or .obj; `baker.io.importers` contains one module for each format.
     up : str
         Up axis of formats other than glTF: "y" or "z".
     scale : float
@@ -36,12 +36,12 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     Returns
     -------
     Scene
-        In metres, +Y up, linear Rec.709.
+        The scene in metres, +Y up, linear Rec.709.
 
     Raises
     ------
     InputError
-        If the file is unreadable, malformed, or holds nothing to bake.
+        If the file is unreadable, malformed, or contains nothing to bake.
 
     Examples
     --------
@@ -69,16 +69,16 @@ def check(
     Parameters
     ----------
     scene : Scene, str or Path
-        A file is read leniently: errors that would stop a bake are reported as findings. A Scene has passed
-        the importer.
+        A scene file, or a result of `load`. For a file, errors that would stop `load` are reported as
+        findings.
     settings : CheckSettings, optional
-        How findings are counted.
+        Which findings are ignored, which fail the check, and how cost is estimated.
     bake : BakeSettings, optional
-        Settings of the bake that the scene is for: resolution, padding, uv, sky ...
+        Settings of the planned bake: resolution, padding, uv, sky ...
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[CheckKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         fail_on : Literal["warning", "error"] | None, default None
             Lowest severity that fails the check; default: the scene's extras, else error.
@@ -94,7 +94,7 @@ def check(
     Returns
     -------
     CheckReport
-        Findings, worst first, and whether the scene passed.
+        Findings in order of decreasing severity, and whether the scene passed.
 
     Raises
     ------
@@ -139,17 +139,17 @@ def repair(
     Parameters
     ----------
     scene : str or Path
-        A file of any format that can be read. It is not changed.
+        A scene file of any supported format. It is not changed.
     out : str or Path, optional
         The .glb file to write; None keeps the result in memory.
     settings : RepairSettings, optional
         Lightmap resolution, units, and whether shapes are repaired.
     force : bool
-        Replace an `out` that exists.
+        Replace `out` if it exists.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[RepairKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         repair : bool, default False
             Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers
@@ -157,23 +157,23 @@ def repair(
         resolution : int, texels, 16 to 16384, default 1024
             Page width for which lightmap uv are tested and made.
         up : Literal["y", "z"], default 'y'
-            Up axis of files whose format defines none.
+            Up axis of files in formats that do not specify it.
         scale : float, m, above 0, default 1.0
-            Metres per unit of files whose format defines none.
+            Metres per unit of files in formats that do not specify it.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------
     FixResult
-        The GLB in `data`, the changes made, and the defects that were not fixed.
+        The content of the GLB file (`data`), the changes made, and the defects that were not fixed.
 
     Raises
     ------
     InputError
         If the file cannot be read.
     SettingsError
-        For an unknown setting, a value out of range, or an `out` that cannot be written.
+        For an unknown setting, a value out of range, or if `out` cannot be written.
     ResourceError
         If `repair` is set and pymeshlab is not installed.
     Cancelled
@@ -208,38 +208,38 @@ def unwrap(
     progress: Progress = silent,
     **keywords: Unpack[UnwrapKeywords],
 ) -> Atlas:
-    """Lay out every instance of a scene in lightmap pages.
+    """Make lightmap uv for every instance of a scene and pack them in pages.
 
     Parameters
     ----------
     scene : Scene
-        As `load` returns it.
+        A result of `load`.
     settings : UnwrapSettings, optional
-        Size of the pages, and how charts are cut and packed.
+        Size of the pages, density, padding, and whether TEXCOORD_1 is kept.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[UnwrapKeywords]
-        Settings by name, in place of those in `settings`:
+        Settings by name, which replace those in `settings`:
 
         resolution : int, texels, 16 to 16384, default 1024
-            Page width and height, exact.
+            Width and height of each page.
         density : float | None, texels/m, above 0, default None
-            Texels per metre; pages overflow into more.
+            Texels per metre; adds pages as needed.
         max_pages : int, 1 to 256, default 16
-            Most pages that `density` may fill.
+            Largest number of pages if `density` is set.
         padding : int, texels, 0 to 64, default 4
             Empty texels between charts.
         uv : Literal["auto", "keep", "unwrap"], default 'auto'
-            Keep a valid TEXCOORD_1, or unwrap.
+            Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
         unwrapper : Literal["xatlas"], default 'xatlas'
-            Library that cuts and packs charts.
+            Library that cuts surfaces into charts and packs them.
         threads : int | None, 1 to 1024, default None
-            Threads; default: all cores.
+            Number of threads; default: all cores.
 
     Returns
     -------
     Atlas
-        Page and lightmap uv of each instance; an argument of `bake`.
+        Page and lightmap uv of each instance, for the argument `atlas` of `bake`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Settings of a call: an object, keywords, or both."""
+"""Combines the settings object and the keywords of a call."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def settings_of(model: type[S], settings: S | None, keywords: Mapping[str, Any]) -> S:
-    """Return settings of an object, changed by keywords; the defaults without an object.
+    """Return `settings`, or the defaults if it is None, with the values in `keywords` replaced.
 
     Raises
     ------

@@ -1,6 +1,7 @@
-"""The atlas: page and lightmap uv of each instance.
+"""The atlas: the page and the lightmap uv of each instance.
 
-A chart is a connected piece of uv; a page is one image; padding is the empty border of a chart.
+A chart is a connected piece of surface in uv, a page is one image, and padding is the empty border of a
+chart.
 """
 
 from __future__ import annotations
@@ -17,25 +18,28 @@ from baker.core.scene import SceneWarning
 
 @dataclass(frozen=True, eq=False)
 class InstanceLayout:
-    """One instance's lightmap uv. An instance lies in exactly one page.
+    """The lightmap uv of one instance. An instance lies in exactly one page.
+
+    Unwrapping splits vertices at chart borders. The V' vertices after the split are called lightmap vertices.
 
     Attributes
     ----------
     instance : int
         Index into `Scene.instances`.
     page : int
+        Index of its page.
     vertex : (V',) int32
-        The mesh vertex that each lightmap vertex comes from (unwrapping splits vertices at chart borders).
+        For each lightmap vertex, the index of the mesh vertex that it is a copy of.
     uv : (V', 2) float32
-        Lightmap uv in the page, 0 to 1; v = 0 is the first image row. These are the final page
-        coordinates: scale and offset are already applied.
+        Lightmap uv in the page, 0 to 1, with scale and offset applied; v = 0 is the first image row.
     triangle : (T, 3) int32
-        Indices into the lightmap vertices; row t is the mesh's triangle t with its corner order.
+        Indices into the lightmap vertices. Row t is triangle t of the mesh, with the same order of corners.
     chart : (T,) int32
         Chart of each triangle, numbered from 0 over the whole atlas.
     kept : bool
-        True if the uv is the input's own TEXCOORD_1, unchanged.
+        Whether the uv is TEXCOORD_1 of the scene file, up to scale and offset.
     texels_per_metre : float
+        Texels per metre of surface.
     """
 
     instance: int
@@ -50,7 +54,7 @@ class InstanceLayout:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Atlas(Result):
-    """All instances' layouts.
+    """The layouts of all instances.
 
     Attributes
     ----------
@@ -59,6 +63,8 @@ class Atlas(Result):
     n_pages : int
     layouts : tuple of InstanceLayout, in the order of `Scene.instances`
     n_charts : int
+    padding : int
+        Empty texels between charts.
     warnings : tuple of SceneWarning
     """
 
@@ -70,7 +76,7 @@ class Atlas(Result):
     warnings: tuple[SceneWarning, ...] = ()
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that `repr` and notebooks show."""
         return {
             "pages": f"{self.n_pages} of {self.resolution} x {self.resolution}",
             "objects": len(self.layouts),
@@ -80,7 +86,7 @@ class Atlas(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return sizes, and the page and density of each object, as plain values."""
+        """Return sizes, warnings, and the page and density of each object, as values that JSON can hold."""
         return {
             "resolution": self.resolution,
             "n_pages": self.n_pages,

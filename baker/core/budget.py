@@ -1,6 +1,6 @@
 """Limits on the work of a bake, and estimates of its texels, rays and memory before it runs.
 
-The stages, the checks and the memory limit of `baker batch` use these numbers.
+The stages of a bake, the rules of `baker check` and the memory limit of `baker batch` use these estimates.
 """
 
 from __future__ import annotations
@@ -14,46 +14,50 @@ from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# Largest number of patches outside narrow gaps, and inside them; larger pages get larger blocks.
+# Largest number of patches outside narrow gaps, and largest number inside them. If there are more, patches
+# are built from larger blocks of texels.
 MAX_PATCHES = 32768
-# Rays from each patch for its form factors: the hemisphere samples of a texel, within these limits.
+# Limits of the number of rays from each patch for its form factors. Within them, it is the number of
+# hemisphere rays per texel.
 MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
-# Share of a page that the packer fills: 0.67 to 0.83 in the project's own scenes at 512 and 1024 if the scale
-# is free, 0.55 to 0.69 if a density is set, since each instance lies in one page.
+# Share of the texels of a page that charts cover, for a free scale and for a given density. Measured in this
+# project's scenes at 512 and 1024 texels a side: 0.67 to 0.83 and 0.55 to 0.69. It is lower for a given
+# density, because each instance must fit on one page.
 FILLED, FILLED_AT_DENSITY = 0.8, 0.65
-# Rays per texel that do not depend on settings: for points inside geometry, towards each light without area,
-# near emitters.
+# Rays per texel that do not depend on settings: to find points inside geometry, to each light without area,
+# and to nearby emitters.
 INSIDE_RAYS, DELTA_LIGHT_RAYS, NEAR_RAYS = 4, 16, 4
 
 MIB = 1 << 20
-# Resident memory in bytes, fitted to measured peaks (`benchmarks/memory_peaks.py`): Python, libraries and
-# compiled kernels; each triangle.
+# All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
+# Python, libraries and compiled kernels together, and each triangle.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
-# Decoded images, per byte of pixels: as in the file, and as float32.
+# Bytes for each byte of decoded image pixels: 1 as stored in the file and 4 as float32.
 BYTES_PER_IMAGE_BYTE = 5
-# Texels whose 16 points (position and normal, float32) are kept from one ray stage to the next. Bakes with
-# more texels keep none.
+# Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
+# of these points (position and normal, float32). Bakes with more texels cache no points.
 MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
-# Other arrays of each texel, in the ray stages and when pages are finished: without light, and with it.
+# Bytes of all other arrays per texel, in the ray stages and while pages are finished: first for bakes of
+# ambient occlusion only, then for bakes with light.
 AO_RAY_BYTES_PER_TEXEL, AO_FINISH_BYTES_PER_TEXEL = 150, 230
 LIGHT_RAY_BYTES_PER_TEXEL, LIGHT_FINISH_BYTES_PER_TEXEL = 200, 380
-# A form factor, its reciprocal and the merged one, for each ray of each patch.
+# Bytes for each ray of each patch: its form factor, the reciprocal form factor and the merged one.
 BYTES_PER_PATCH_RAY = 28
-# Open Image Denoise, per pixel of one page; it processes larger pages in tiles.
+# Bytes of Open Image Denoise per pixel of one page, and its largest total: larger pages are split into tiles.
 DENOISE_BYTES_PER_PIXEL, MAX_DENOISE_BYTES = 520, 650 * MIB
-# Patches beyond those of even blocks, where charts end, directions change and gaps are narrow: for each
-# triangle, and at most.
+# Number of smaller patches where charts end, normals change or gaps are narrow: per triangle, and the largest
+# total.
 EXTRA_PATCHES_PER_TRIANGLE, MAX_EXTRA_PATCHES = 0.4, 13000
 
 
 def patch_rays(settings: BakeSettings) -> int:
-    """Count the rays from each patch for its form factors.
+    """Return the number of rays from each patch for its form factors.
 
     Parameters
     ----------
     settings : BakeSettings
-        The hemisphere samples are read.
+        `hemisphere_samples` is read.
 
     Returns
     -------
@@ -64,21 +68,21 @@ def patch_rays(settings: BakeSettings) -> int:
 
 
 def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
-    """Estimate the texels on surfaces and the pages of a bake.
+    """Estimate how many texels on surfaces and how many pages a bake has.
 
     Parameters
     ----------
     settings : BakeSettings
-        Resolution, density and `max_pages` are read.
+        `resolution`, `density` and `max_pages` are read.
     area : float
         Area of all surfaces, m2.
 
     Returns
     -------
     texels : int
-        Texels on surfaces, of all pages.
+        Number of texels on surfaces, of all pages.
     pages : int
-        1 unless a density is set, at most `max_pages`.
+        Number of pages: 1 if no density is set, else at most `max_pages`.
     """
     page = settings.resolution**2
     if settings.density is None:
@@ -89,17 +93,17 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
 
 
 def surface_area(scene: Scene) -> float:
-    """Sum the area of all instances of a scene.
+    """Return the area of all instances of a scene.
 
     Parameters
     ----------
     scene : Scene
-        Meshes and instances are read.
+        Its meshes and instances are read.
 
     Returns
     -------
     float
-        Square metres, world.
+        Square metres, in world space.
     """
     area = 0.0
     for instance in scene.instances:
@@ -111,17 +115,17 @@ def surface_area(scene: Scene) -> float:
 
 
 def image_bytes(scene: Scene) -> int:
-    """Sum the sizes of all images that a bake reads.
+    """Return the total size of all images that a bake reads.
 
     Parameters
     ----------
     scene : Scene
-        Textures of base colour and emission are read.
+        Its textures of base colour and emission are read.
 
     Returns
     -------
     int
-        Bytes of pixels as decoded.
+        Bytes of the decoded pixels.
     """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
     return sum({id(t.image): t.image.nbytes for t in textures if t is not None}.values())
@@ -134,13 +138,13 @@ class Workload:
     Attributes
     ----------
     texels : int
-        Texels on surfaces.
+        Number of texels on surfaces.
     pages, triangles : int
-        Pages of the atlas; triangles of all instances.
+        Number of pages of the atlas, and number of triangles of all instances.
     image_bytes : int
-        Decoded pixels of the images that are read, bytes.
+        Size of the decoded pixels of the images that the bake reads, bytes.
     light, ambient_occlusion : bool
-        Whether a channel needs light, and whether one needs ambient occlusion.
+        Whether a channel of the bake needs light, and whether a channel needs ambient occlusion.
     """
 
     texels: int
@@ -151,7 +155,7 @@ class Workload:
     ambient_occlusion: bool
 
     def patches(self, settings: BakeSettings) -> int:
-        """Estimate the patches of the solve: blocks of 2^k x 2^k texels, and smaller ones at borders."""
+        """Estimate the number of patches: blocks of 2^k x 2^k texels, and smaller ones at chart borders."""
         if not self.light or settings.bounces == 0:
             return 0
         even = float(self.texels)
@@ -161,15 +165,15 @@ class Workload:
         return min(round(even + extra), self.texels)
 
     def rays(self, settings: BakeSettings, *, delta_lights: int, emitters: bool) -> dict[Stage, int]:
-        """Estimate the rays of each stage; the early out may save some of them.
+        """Estimate the number of rays of each stage. Early-out tests may save some of them.
 
         Parameters
         ----------
         settings : BakeSettings
         delta_lights : int
-            Lights without area that are not black.
+            Number of lights without area that are not black.
         emitters : bool
-            Whether a triangle emits.
+            Whether the scene has emitters.
 
         Returns
         -------
@@ -191,8 +195,8 @@ class Workload:
     def peak_bytes(self, settings: BakeSettings) -> int:
         """Estimate the largest resident memory of a bake.
 
-        Triangles and images are held throughout. The peak is either in the ray stages, with all form factors,
-        or when pages are finished, with the denoiser's memory.
+        Triangles and images stay in memory throughout. The peak is reached either in the ray stages, which
+        store all form factors, or while pages are finished, when the denoiser allocates its memory.
 
         Parameters
         ----------
@@ -201,7 +205,7 @@ class Workload:
         Returns
         -------
         int
-            Bytes; within 30 % of what is measured in `tests/unit/core/test_budget.py`.
+            Bytes, within 30 % of the peaks in `tests/unit/core/test_budget.py`.
         """
         lasting = BASE_BYTES + BYTES_PER_TRIANGLE * self.triangles + BYTES_PER_IMAGE_BYTE * self.image_bytes
         rays = BYTES_PER_PATCH_RAY * patch_rays(settings) * self.patches(settings)

@@ -13,7 +13,7 @@ def start_module(module: str) -> subprocess.Popen[bytes]:
     Parameters
     ----------
     module : str
-        Dotted name. The child has the same module search path, so it imports the same package.
+        Dotted name of the module. The child process gets the module search path of this process.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Colour encodings; inside baker all colours are linear Rec.709.
+"""Conversion from sRGB to linear Rec.709, the colour space of all colours in baker.
 
 Based on: IEC 61966-2-1 (the sRGB curve).
 """

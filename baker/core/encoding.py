@@ -1,8 +1,8 @@
-"""The interface of image encodings: one file of `baker.encodings` writes and reads one format.
+"""The interface of image encodings: each file of `baker.encodings` writes and reads one image format.
 
-Callers find an encoding by its name in `ENCODINGS` and never import it. A new format is one new file, its
-settings included: each field of its options is a setting of a bake, with a flag, a key of the configuration
-file and a row of the settings page.
+Callers look up an encoding by its name in `ENCODINGS` and do not import it. A new format is therefore added
+as one new file. Each field of its options class becomes a setting of a bake: a flag of the command line, a
+key of the configuration file and a row of the settings page.
 """
 
 from __future__ import annotations
@@ -20,19 +20,20 @@ from baker.core.errors import ResourceError
 from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
-# Relative error of a stored value above which steps are visible: the eye distinguishes 1 to 2 %.
+# Relative error of a stored value above which steps between stored values are visible. The eye distinguishes
+# 1 to 2 %.
 VISIBLE_STEP = 0.01
-# Texels darker than this share of the page's mean are black on a screen exposed for the page.
+# Share of the page's mean below which a texel is displayed as black: steps there are not counted.
 BLACK = 0.01
-# The encoding of the files that every bake has.
+# Encoding of the files that every bake writes.
 ALWAYS_WRITTEN = "exr"
-# Rows measured at once, so that a page of 16384 texels a side needs no second page of memory.
+# Rows of a page that `measure_loss` processes at once, to limit its memory.
 _ROWS = 256
 
 
 @dataclass(frozen=True)
 class DecodedImage:
-    """An image read back.
+    """An image read from a file.
 
     Attributes
     ----------
@@ -52,10 +53,10 @@ class DecodedImage:
 
 
 class EncodingOptions(Settings):
-    """Settings of one encoding; a subclass has a field with default, range and description for each.
+    """Base class for the options of an encoding; each option is a field made with `setting`.
 
-    The names are settings of a bake and must differ from all other settings. The types are those that a flag
-    can have: str, int, float, bool, Literal.
+    Options are settings of a bake, so their names must differ from those of all other settings. The type of a
+    field is one that a flag can have: str, int, float, bool or Literal.
     """
 
 
@@ -68,14 +69,15 @@ class Encoding(ABC, Generic[Options]):
     Attributes
     ----------
     suffix : str
-        Ends the names of its files and those of no other encoding.
+        End of the file names of this format. It must differ from the suffixes of all other encodings.
     components : tuple of int
-        Numbers of components that an image of it may have.
+        Numbers of components that an image in this format may have.
     signed : bool
-        Whether it holds negative numbers.
+        Whether the format can store negative values.
     options_type : type of `EncodingOptions`
+        Class of its options.
     when_clipped, when_banded : str
-        Advice if a page exceeds the limits, or has visible steps; ends the sentence of the warning.
+        Advice at the end of the warning about a page that exceeds the limits, or that has visible steps.
     """
 
     suffix: str
@@ -90,24 +92,24 @@ class Encoding(ABC, Generic[Options]):
         return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 
     def fitted(self, options: Options, brightest: float) -> Options:
-        """Return the options for one map, with those set that depend on its largest value."""
+        """Return `options` after setting those that depend on `brightest`, the largest value of the map."""
         return options
 
     def options_of_image(self, image: DecodedImage) -> Options:
-        """Return options that write an image in the number format of its file."""
+        """Return options with which `encode` writes `image` in the number format that it was read from."""
         return self.options_type()
 
     @abstractmethod
     def limits(self, options: Options) -> tuple[float, float]:
-        """Return the lowest and highest value it can hold; values beyond are stored as these."""
+        """Return the smallest and largest value that can be stored. Values outside are clipped to them."""
 
     @abstractmethod
     def stored(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
-        """Return (..., C) float32: the values decoded from the file for pixels (..., C)."""
+        """Return (..., C) float32: the values that result from encoding and decoding pixels (..., C)."""
 
     @abstractmethod
     def tolerance(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float64]:
-        """Return (..., C) float64: how far `stored` may be from pixels within the limits."""
+        """Return (..., C) float64: the largest |stored - pixels| for pixels (..., C) within the limits."""
 
     @abstractmethod
     def encode(
@@ -126,13 +128,13 @@ class Encoding(ABC, Generic[Options]):
         path : Path
             The file; its folder exists.
         pixels : (H, W, C) float32
-            Values beyond the limits are stored as these.
+            Values outside the limits are clipped to them.
         options : EncodingOptions
-            As `fitted` returns them.
+            Result of `fitted`.
         header : mapping of str to str
-            Quantity, unit and so on, kept in the file as text for `decode`.
+            Quantity, unit and other texts, stored in the file for `decode`.
         names : tuple of str, optional
-            Of the components, where a format has names.
+            Names of the components, for formats that store names.
 
         Raises
         ------
@@ -144,27 +146,28 @@ class Encoding(ABC, Generic[Options]):
 
     @abstractmethod
     def decode(self, path: Path) -> DecodedImage:
-        """Read a file of this format; the pixels are those of `stored`.
+        """Read a file of this format. The pixels equal the result of `stored` for the encoded pixels.
 
         Raises
         ------
         InputError
-            If the file cannot be read, or "is not a readable" image of this format, or ends early.
+            If the file cannot be read, is not an image of this format, or is truncated. In the second case
+            the message contains "is not a readable".
         """
 
 
 @dataclass(frozen=True)
 class Loss:
-    """Texels of a page that a format cannot hold well.
+    """Numbers of texels of a page that a format cannot store accurately.
 
     Attributes
     ----------
     clipped : int
-        Texels with a channel beyond the limits.
+        Number of texels with a component outside the limits.
     banded : int
-        Texels on surfaces whose code misses the value by a visible step, see `measure_loss`.
+        Number of texels on surfaces whose stored value differs visibly, see `measure_loss`.
     surface : int
-        Texels on surfaces.
+        Number of texels on surfaces.
     """
 
     clipped: int
@@ -175,7 +178,7 @@ class Loss:
 def measure_loss(
     encoding: Encoding[Options], pixels: NDArray[np.float32], surface: NDArray[np.bool_], options: Options
 ) -> Loss:
-    """Count the texels that a format clips, and those where its steps can be seen.
+    """Count the texels that a format clips, and those where the steps between stored values are visible.
 
     Parameters
     ----------
@@ -186,7 +189,7 @@ def measure_loss(
     surface : (H, W) bool
         Texels that are shown.
     options : EncodingOptions
-        Of this encoding.
+        Options of `encoding`.
 
     Returns
     -------
@@ -195,8 +198,9 @@ def measure_loss(
 
     Notes
     -----
-    A texel is banded if a channel is stored more than `VISIBLE_STEP` of its brightest channel away from its
-    value, though not clipped. Texels that are much darker than the page are not counted.
+    A texel is banded if it is not clipped and the stored value of a component differs from the true value by
+    more than `VISIBLE_STEP` times the texel's brightest component. Texels below `BLACK` times the page's mean
+    are not counted.
     """
     low, high = encoding.limits(options)
     n_surface = int(surface.sum())
@@ -214,7 +218,7 @@ def measure_loss(
 
 
 def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name: str) -> None:
-    """Refuse pixels of another shape than (H, W, C) with C in `components`, and NaN.
+    """Raise an error if pixels are not (H, W, C) with C in `components`, or if a pixel is NaN.
 
     Parameters
     ----------
@@ -223,11 +227,12 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     components : tuple of int
         Numbers of components that the format holds.
     name : str
-        Of the file, for the message.
+        Name of the file, for the message.
 
     Raises
     ------
     ValueError
+        If the shape is wrong or a pixel is NaN.
     """
     if pixels.ndim != 3 or pixels.shape[2] not in components or 0 in pixels.shape:
         shapes = " nor ".join(f"(H, W, {count})" for count in components)
@@ -235,7 +240,7 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
         if len(components) > 3:
             word, shapes = "not ", f"(H, W, {min(components)} to {max(components)})"
         raise ValueError(f"pixels of shape {pixels.shape} are {word}{shapes}")
-    # The minimum and maximum are NaN if any pixel is: no mask is needed for most pages.
+    # Test the minimum and maximum first: both are NaN if any pixel is. This avoids a mask for most pages.
     if np.isnan(pixels.min()) or np.isnan(pixels.max()):
         count = int(np.isnan(pixels).any(axis=2).sum())
         raise ValueError(f"{count} texels are not a number; {name} is not written")
@@ -249,7 +254,7 @@ def write_image(path: Path, data: bytes) -> None:
     path : Path
         The file; replaced if it exists.
     data : bytes
-        All of it.
+        The whole content.
 
     Raises
     ------
@@ -271,12 +276,13 @@ def encoding_of(name: str) -> Encoding[Any] | None:
     Parameters
     ----------
     name : str
-        Name of the file; upper and lower case are the same.
+        Name of the file; case is ignored.
 
     Returns
     -------
     Encoding or None
-        The one with the longest suffix that ends the name.
+        The encoding whose suffix the name ends with; the longest suffix if there are several. None if there
+        is none.
     """
     plugins = [ENCODINGS.require(key, "encoding") for key in ENCODINGS.names()]
     fitting = [plugin for plugin in plugins if name.lower().endswith(plugin.suffix)]
@@ -284,7 +290,7 @@ def encoding_of(name: str) -> Encoding[Any] | None:
 
 
 def encodings_in_words() -> str:
-    """Return the names of the encodings beside the EXR, by the number of components that they hold."""
+    """Return a text that lists all encodings except the EXR, grouped by their numbers of components."""
     names: dict[tuple[int, ...], list[str]] = {}
     for name in ENCODINGS.names():
         if name != ALWAYS_WRITTEN:
@@ -297,7 +303,7 @@ def encodings_in_words() -> str:
 
 
 def encoding_options() -> dict[str, type[EncodingOptions]]:
-    """Return the options model of each encoding that has options, by the name of the encoding.
+    """Return {name of an encoding: class of its options}, for all encodings that have options.
 
     Raises
     ------

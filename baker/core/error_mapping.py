@@ -11,7 +11,7 @@ from baker.core.errors import BakerError, Cancelled, ResourceError
 _OUT_OF_MEMORY = (
     "out of memory; try a smaller `resolution`, a lower `density`, fewer `samples` or fewer `threads`"
 )
-# Messages for error numbers of the operating system: a resource ran out, or access is denied.
+# Messages by `errno`, for exhausted resources and denied access.
 _RESOURCE_ERRNO = {
     errno.ENOSPC: "the disk is full; free some space, or write elsewhere with `out`",
     errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with `out`",
@@ -29,12 +29,12 @@ def explain(error: BaseException) -> BakerError | None:
     Parameters
     ----------
     error : BaseException
-        Anything that a stage of a bake raised.
+        Any exception that a stage of a bake raised.
 
     Returns
     -------
     BakerError or None
-        None if the exception means a bug in `baker`.
+        None if the exception has another cause, which means a bug in `baker`.
     """
     if isinstance(error, BakerError):
         return error
@@ -55,12 +55,11 @@ def memory_errors(*, file: str | None = None) -> Iterator[None]:
     Parameters
     ----------
     file : str, optional
-        File that the body reads.
+        File that the body reads, for the error.
 
     Yields
     ------
     None
-        Nothing; the body runs.
 
     Raises
     ------
@@ -84,7 +83,7 @@ def bug(error: BaseException) -> ResourceError:
     Returns
     -------
     ResourceError
-        It has exit code 4, not 1: scripts read 1 as "the check failed".
+        An error with exit code 4, because exit code 1 means that a check failed.
     """
     what = f"{type(error).__name__}: {error}".splitlines()[0]
     return ResourceError(f"internal error ({what}); run with -vv to see where, and please report it")

@@ -1,13 +1,13 @@
 """Errors that `baker` raises: a base class and one class for each exit code.
 
-A message is one sentence: what was found, in which file and object, and what to do about it.
+A message is one sentence that says what was found, in which file and object, and what to do.
 """
 
 from __future__ import annotations
 
 
 class BakerError(Exception):
-    """Base class of the errors of baker's interface.
+    """Base class of all errors that baker raises on purpose.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ class InputError(BakerError):
 
 
 class IndexRangeError(InputError):
-    """A face refers to a vertex that does not exist: the file can be read, but not baked."""
+    """A face refers to a vertex that does not exist. The file can be checked and repaired, but not baked."""
 
 
 class ResourceError(BakerError):
-    """Memory or disk space ran out, or a needed library is missing (exit code 4)."""
+    """Memory or disk space ran out, or a required library is missing (exit code 4)."""
 
     kind = "resource"
     exit_code = 4

@@ -15,13 +15,13 @@ from baker.core.stage import Stage
 
 
 class TileExecutor(Protocol):
-    """Provides a tile runner for each stage. Results are the same bytes with every executor."""
+    """Provides a tile runner for each stage. All executors give the same bytes."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Receive the data that all stages of a bake share; called once before the first stage."""
 
     def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
-        """Return the runner of a stage; `arrays` holds the results of earlier stages that it needs."""
+        """Return the runner of a stage; `arrays` are the results of earlier stages that this stage reads."""
 
     def close(self) -> None:
         """Release the data of the bake."""
@@ -31,7 +31,7 @@ class LocalTileExecutor:
     """Runs tiles on the threads of this process."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Do nothing: the stages hold the data already."""
+        """Do nothing, because the stages have the data in this process."""
 
     def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return `run_tiles`."""

@@ -1,6 +1,7 @@
-"""Interface of exports: a file of `baker.exporters` converts a finished bake for one engine.
+"""The interface of exports: each file of `baker.exporters` converts a finished bake for one engine.
 
-Callers find an export by its name in `EXPORTS` and never import it, so a new engine is one new file.
+Callers look up an export by its name in `EXPORTS` and do not import it. A new engine is therefore supported
+by one new file.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from baker.core.registry import Registry
 class Export(Protocol):
     """Writes a folder of files for one engine.
 
-    `needs` lists the channels that must have been baked.
+    `needs` lists the channels that the bake must contain.
     """
 
     needs: tuple[str, ...]
 
     def write(self, bake: Path, target: Path) -> None:
-        """Write files for a whole bake in the folder `bake` into the existing empty folder `target`.
+        """Convert the bake in the folder `bake` and write the files to the existing, empty folder `target`.
 
         The same bake gives the same bytes.
         """
@@ -31,7 +32,7 @@ EXPORTS: Registry[Export] = Registry("baker.exporters")
 
 
 def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
-    """Make sure that exports exist and that the channels they need are baked.
+    """Raise an error if an export does not exist, or if a channel that it needs is not baked.
 
     Parameters
     ----------
@@ -43,6 +44,7 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     Raises
     ------
     SettingsError
+        For the first such export.
     """
     for name in names:
         for channel in EXPORTS.require(name, "export", setting="export").needs:

@@ -1,6 +1,7 @@
-"""The whole scene as one world-space triangle list with its lightmap uv.
+"""The whole scene as one list of world-space triangles with lightmap uv.
 
-Every instance is expanded: each triangle here can be hit by rays and has its own texels.
+The triangles of a mesh are repeated for each of its instances. Rays can hit each triangle in the list, and
+each has its own texels.
 """
 
 from __future__ import annotations
@@ -17,19 +18,19 @@ from baker.core.scene import Scene
 
 @dataclass(frozen=True)
 class Geometry:
-    """World-space triangles in the order of instances, then of the mesh's triangles.
+    """World-space triangles, sorted by instance and then by their index in the mesh.
 
     Attributes
     ----------
     position : (V, 3) float32, metres, world, relative to `origin`
     normal : (V, 3) float32, unit shading normals, world
-    uv : (V, 2) float32, lightmap uv of the page, 0 to 1
-    vertex_source : (V,) int32, index of the mesh vertex that each was copied from
-    triangle : (T, 3) int32, counter-clockwise seen from the front
-    face_normal : (T, 3) float32, unit
+    uv : (V, 2) float32, lightmap uv in the page, 0 to 1
+    vertex_source : (V,) int32, index of the mesh vertex that each vertex is a copy of
+    triangle : (T, 3) int32, indices into the vertices, counter-clockwise seen from the front
+    face_normal : (T, 3) float32, unit, world
     area : (T,) float32, m2
-    page, instance, chart, material : (T,) int32
-    double_sided : (T,) bool
+    page, instance, chart, material : (T,) int32, indices
+    double_sided : (T,) bool, whether the material is double-sided
     origin : (3,) float64, metres, world: `Scene.origin`
     """
 
@@ -56,7 +57,7 @@ class Geometry:
 
 
 def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | None = None) -> Geometry:
-    """Transform every instance to world space, with the lightmap uv of its layout.
+    """Transform the triangles of all instances to world space and attach the lightmap uv of their layouts.
 
     Parameters
     ----------
@@ -79,8 +80,8 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
     for index, (instance, layout) in enumerate(zip(scene.instances, atlas.layouts, strict=True)):
         mesh = scene.meshes[instance.mesh]
         matrix = instance.world_from_object
-        # Transform each mesh vertex once: vertices that are split at charts stay bitwise equal, without gaps.
-        # Subtract the origin in float64: far from 0 the spacing of float32 numbers is large.
+        # Transform each mesh vertex once, so that its copies at chart borders have bitwise equal positions.
+        # Subtract the origin in float64, because float32 numbers are widely spaced far from 0.
         shift = matrix[:3, 3] - origin
         position = (mesh.position.astype(np.float64) @ matrix[:3, :3].T + shift).astype(np.float32)
         normal = mesh.normal.astype(np.float64) @ np.linalg.inv(matrix[:3, :3])

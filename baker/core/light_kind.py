@@ -1,15 +1,15 @@
-"""A kind of light without area: one record that a file of `baker.lights.kinds` registers by name.
+"""The interface of light kinds: each file of `baker.lights.kinds` registers one kind of light without area.
 
-The record holds everything that differs between kinds: the unit, how glTF stores a light, the irradiance at
-points for the bake, the emission for the path tracer, the power. The rest of the program calls the record and
-compares no names. A light whose kind has no record is refused.
+A `LightKind` contains everything that differs between kinds: the unit, the glTF representation, the
+irradiance at points for the bake, the emission for the path tracer, and the power. Other code calls these
+functions and never compares names of kinds. A light of an unregistered kind is refused.
 
-The bake and the path tracer share a light's parameters (`PunctualLight`) and no code: `fill` computes
-irradiance in a kernel of the file; `emission` describes the light as an `EmissionProfile`, which the path
-tracer evaluates and samples with its own kernels. A profile is data: a light added later needs no compilation
-of the path tracer, and its fall-off may be any function of direction, as a table. Functions of each kind
-called from the path kernels were the alternative; the loops over eight paths would no longer vectorize, and
-each new kind would compile all path kernels again, about a minute.
+The bake and the path tracer share a light's parameters (`PunctualLight`) but no code. `fill` computes
+irradiance in a kernel of the light's file. `emission` returns an `EmissionProfile`, which the path tracer
+evaluates and samples with its own kernels. A profile is data, so a new kind needs no compilation of the path
+tracer, and its angular fall-off may be any function, given as a table. If the path kernels called a function
+of each kind instead, their loops over eight paths would not vectorize. Each new kind would also compile all
+path kernels again, which takes about a minute.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from baker.core.names import unknown_name
 from baker.core.registry import Registry
 from baker.core.scene import PunctualLight, Scene
 
-# Longest name of a kind that an error quotes.
+# Characters of an unknown kind's name that an error quotes.
 _QUOTED = 20
 
 Vector = tuple[float, float, float]
@@ -48,30 +48,30 @@ class FillRays(Protocol):
         Parameters
         ----------
         light : PunctualLight
-            With its position relative to the same origin as `origin`.
+            Its position is relative to `Scene.origin`, as are the points.
         origin, normal : (n, 16, 3) float32
-            Points, metres, and unit normals, world.
+            The 16 points of n texels, metres, and their unit normals, world.
         ray : (n, 16, 4) float32, output
-            Direction to the light, of any length, and the distance at which the shadow ray ends, in units of
-            that length: just before a light with a position, such as at 0.99999 of the way, and 1e30 for
-            parallel light. Finite also for a point at the light.
+            Columns 0 to 2: direction to the light, of any length. Column 3: where the shadow ray ends, in
+            units of that length. It ends just before a light with a position, such as at 0.99999 of the
+            distance, and at 1e30 for parallel light. All values are finite, even for a point at the light.
         weight : (n, 16) float32, output
-            Unoccluded irradiance, lx, for an intensity of 1; 0 below the horizon. A surface that faces the
-            light gets 1 lx: from parallel light, or at 1 m on the axis.
+            Unoccluded irradiance, lx, for an intensity of 1; 0 if the light is below the horizon. It is 1 lx
+            on a surface that faces parallel light, or that faces another light on its axis at 1 m.
         """
 
 
 class LightJson(Protocol):
-    """A light of KHR_lights_punctual, the argument of `read`: see `io.gltf.json.JsonObject`."""
+    """The JSON object of a light in KHR_lights_punctual, as `read` gets it; see `io.gltf.json.JsonObject`."""
 
     def __contains__(self, key: str) -> bool:
-        """Return whether the member is there."""
+        """Return whether the object has the member `key`."""
 
     def number(self, key: str, default: float | None = None, *, low: float = ..., high: float = ...) -> float:
-        """Return a finite number between `low` and `high`, or raise InputError."""
+        """Return the member `key`, a finite number between `low` and `high`; raise InputError otherwise."""
 
     def child_or_empty(self, key: str) -> LightJson:
-        """Return the object under `key`, or an empty one."""
+        """Return the object that is the member `key`, or an empty object if there is none."""
 
     def fail(self, message: str, key: str = "") -> NoReturn:
         """Raise InputError about the member `key`."""
@@ -80,37 +80,39 @@ class LightJson(Protocol):
 class EmissionProfile(NamedTuple):
     """The emission of a light without area, as data that the path tracer evaluates and samples.
 
-    With a position, the radiant intensity in unit direction w, and the irradiance of a surface that faces the
-    light at distance r, are
+    If the light has a position, its intensity in unit direction w, and the irradiance of a surface that faces
+    it at distance r, are
 
         I(w) = intensity f(w)        E = I(w) / r^2 clamp(1 - (r / range)^4, 0, 1)
 
-    with c = w . axis and f(w) one of
+    with c = w . axis. The function f is 0 for c < min_cosine, and otherwise
 
-        1                                                       cone_scale and table None
-        clamp((c - min_cosine) cone_scale, 0, 1)^2              cone_scale
-        table, bilinear in c and the azimuth around the axis    table
+        f(w) = 1                                                if `cone_scale` and `table` are None
+        f(w) = clamp((c - min_cosine) cone_scale, 0, 1)^2       if `cone_scale` is set
+        f(w) = bilinear lookup of (c, azimuth around the axis)  if `table` is set
 
-    and f = 0 for c < min_cosine. Without a position the light is parallel: E = intensity.
+    A light without a position is parallel, and E = intensity.
 
     Attributes
     ----------
     position : tuple of 3 float, or None
-        Metres; None for parallel light.
+        Position of the light, metres; None for parallel light.
     axis : tuple of 3 float
         Unit direction in which the light shines, world.
     min_cosine : float
-        Nothing is emitted at larger angles to the axis; paths that start at the light are uniform inside.
+        Smallest cosine of the angle to the axis at which the light emits. Paths that start at the light have
+        uniformly distributed directions within this cone.
     cone_scale : float or None
         1 / (cosine of the inner angle - cosine of the outer angle) of glTF's spot.
     table : (n, m) float32, or None
-        Values of f, n >= 2 of them from c = min_cosine to c = 1 in even steps of c, m >= 1 azimuths in even
-        steps of 2 pi / m, the first one at `tangent`. One column: the same all around. Enough of them that
-        linear interpolation is within 3e-5 of f, as the contract asks: n = 1024 for the eighth power of c.
+        Values of f at n >= 2 equidistant values of c from `min_cosine` to 1, and at m >= 1 azimuths
+        k 2 pi / m. With m = 1, f does not depend on the azimuth. n and m must be so large that interpolation
+        is within 3e-5 of f; for example, f = c^8 needs n = 1024.
     tangent : tuple of 3 float
-        Unit, at right angles to the axis; azimuths increase from it towards axis x tangent.
+        Unit direction of azimuth 0, perpendicular to the axis. Azimuths increase from it towards
+        axis x tangent.
     inverse_range : float
-        1 / range^2, 1/m2; 0 without a range.
+        1 / range^2, 1/m2; 0 for a light without a range.
     """
 
     position: Vector | None
@@ -129,35 +131,37 @@ class LightKind:
     Attributes
     ----------
     name : str
-        As in `PunctualLight.kind` and in the manifest.
+        Name of the kind in `PunctualLight.kind` and in the manifest.
     unit : str
-        Of its intensity: "cd" or "lx".
+        Unit of the intensity: "cd" or "lx".
     has_position : bool
-        Moving the light changes its irradiance.
+        Whether the irradiance depends on the light's position.
     has_direction : bool
-        Turning the light changes its irradiance: one whose node leaves it no direction is left out.
+        Whether the irradiance depends on the light's direction. If so, a light is left out if its node's
+        transform makes the direction undefined.
     gltf_type : str or None
-        `type` in KHR_lights_punctual; None if glTF files cannot hold it.
+        `type` in KHR_lights_punctual; None if glTF files cannot contain such lights.
     plausible_max : float
         Intensity above which the unit is probably wrong.
     read : callable
-        Takes the light's JSON and the linear part, (3, 3) float64, of its node's world transform; returns
-        fields of `PunctualLight` by name, except those that all kinds have: name, node, intensity, position
-        and direction. Raises InputError.
+        read(json, linear) for the light's JSON and the linear part, (3, 3) float64, of its node's world
+        transform. Returns fields of `PunctualLight` by name, except those that all kinds have: name, node,
+        intensity, position and direction. Raises InputError.
     write : callable
-        Returns the members of the light's JSON that `read` reads.
+        write(light) returns the members of the light's JSON that `read` reads.
     describe : callable
-        Returns position, direction and parameters of a light by name, for the manifest.
+        describe(light) returns position, direction and parameters by name, for the manifest.
     fill : FillRays
-        Irradiance at points, for the bake.
+        Computes the irradiance at points, for the bake.
     emission : callable or None
-        Returns the `EmissionProfile` of a light; None if there is none: the path tracer refuses such lights.
+        emission(light) returns its `EmissionProfile`. If it is None, the path tracer refuses such lights.
     power : callable
-        Returns an upper bound of the flux, lm, of a light of intensity 1, from the light and the area, m2, of
-        a disc as wide as the scene, which parallel light passes through. Paths choose lights in proportion.
+        power(light, disc) returns an upper bound of the flux, lm, of the light at intensity 1. For parallel
+        light, this is the flux through a disc as wide as the scene, of area `disc`, m2. Paths choose lights
+        with probabilities proportional to power.
     delta : bool
-        Its light reaches a point from a single direction, so that no random ray hits it. The path tracer
-        refuses other lights.
+        Whether the light reaches each point from a single direction, so that no random ray hits it. The path
+        tracer refuses other lights.
     """
 
     name: str
@@ -189,12 +193,12 @@ def kind_of(light: PunctualLight) -> LightKind:
     Returns
     -------
     LightKind
-        Registered by the file of that name.
+        The record registered under that name.
 
     Raises
     ------
     InputError
-        If no file of `baker.lights.kinds` describes such lights.
+        If no file of `baker.lights.kinds` registers that kind.
     """
     kind = LIGHT_KINDS.get(light.kind)
     if kind is None:
@@ -209,24 +213,24 @@ def kind_of(light: PunctualLight) -> LightKind:
 
 
 def kinds_by_gltf_type() -> dict[str, LightKind]:
-    """Return the kinds that glTF files can hold, by their `type` there.
+    """Return the kinds of light that glTF files can contain.
 
     Returns
     -------
     dict of str to LightKind
-        Kinds with `gltf_type` None are not in it.
+        Kinds by `gltf_type`, without those whose `gltf_type` is None.
     """
     kinds = [LIGHT_KINDS.get(name) for name in LIGHT_KINDS.names()]
     return {kind.gltf_type: kind for kind in kinds if kind is not None and kind.gltf_type is not None}
 
 
 def light_positions(scene: Scene) -> NDArray[np.float64]:
-    """Return the positions of all lights that have one.
+    """Return the positions of all lights whose kind has a position.
 
     Parameters
     ----------
     scene : Scene
-        All its lights are of known kinds.
+        All its lights must be of registered kinds.
 
     Returns
     -------
@@ -238,7 +242,7 @@ def light_positions(scene: Scene) -> NDArray[np.float64]:
 
 
 def check_light_kinds(scene: Scene) -> None:
-    """Refuse lights whose kind has no record.
+    """Raise an error if the scene has a light of an unregistered kind.
 
     Parameters
     ----------
@@ -248,7 +252,7 @@ def check_light_kinds(scene: Scene) -> None:
     Raises
     ------
     InputError
-        Naming the scene's file and the light.
+        With the scene's file and the light's name.
     """
     try:
         for light in scene.lights:

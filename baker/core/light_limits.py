@@ -1,4 +1,4 @@
-"""The largest intensity and emission that a bake computes with."""
+"""The largest intensity and emission that a bake accepts."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from baker.core.errors import InputError
 from baker.core.light_kind import check_light_kinds, kind_of
 from baker.core.scene import Scene
 
-# In cd, lx or cd/m2: the square of the light that it gives is a float32 number. The sun's disc has 2e9 cd/m2.
+# Largest intensity (cd or lx) and emission (cd/m2): the square of the resulting irradiance is below the
+# largest float32 number. For comparison, the disc of the sun has 2e9 cd/m2.
 BRIGHTEST = 1e15
 
 
 def check_brightness(scene: Scene) -> None:
-    """Refuse lights of an unknown kind, and lights and materials too bright to compute with.
+    """Raise an error for lights of an unregistered kind, and for lights and materials above `BRIGHTEST`.
 
     Parameters
     ----------
@@ -21,7 +22,7 @@ def check_brightness(scene: Scene) -> None:
     Raises
     ------
     InputError
-        If a light's kind has no record, or an intensity or an emission is above `BRIGHTEST`.
+        If a light's kind is not registered, or an intensity or an emission is above `BRIGHTEST`.
     """
     check_light_kinds(scene)
     named = [(f"material '{m.name}'", "emission", m.emission, "cd/m2") for m in scene.materials]

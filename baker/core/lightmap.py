@@ -1,4 +1,4 @@
-"""Finished maps, the state of their texels, and the result of a bake."""
+"""Finished maps, the status of their texels, and the result of a bake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from baker.core.settings import BakeSettings
 
 
 class TexelStatus(IntEnum):
-    """State of a texel of a page; the values stored in `status_0.png`."""
+    """Status of a texel of a page. These values are stored in `status_0.png`."""
 
     EMPTY = 0
     COVERED = 1
@@ -33,14 +33,14 @@ class ChannelDescription:
     Attributes
     ----------
     unit : str
-        "lx", "1", ...
+        Unit of the values: "lx", "1", ...
     quantity : str
         Name of the quantity.
     definition : str
-        The same as a formula.
+        Definition of the quantity as a formula.
     components : tuple of str
-        Names of the components, in the order of the last axis of a map; the EXR channels. ("R", "G", "B") and
-        ("Y",) are an image without layers; "L1.R" is channel R of the layer L1.
+        Names of the components in the order of the last axis of a map; they are the names of EXR channels.
+        ("R", "G", "B") and ("Y",) have no layer; "L1.R" is channel R of the layer L1.
     signed : bool
         Whether values may be negative.
     colour : bool
@@ -56,12 +56,15 @@ class ChannelDescription:
 
     @property
     def colour_space(self) -> str:
-        """Return the colour space in words, "none" if the components are no colours."""
+        """Return the name of the colour space, "none" if the components are not colours."""
         return "linear Rec.709, D65" if self.colour else "none"
 
     @property
     def groups(self) -> tuple[slice, ...]:
-        """Return the groups of components: three that are a colour, or one; signed ones are single."""
+        """Return slices of the components: the R, G, B of one layer, or a single component.
+
+        Signed components are always single.
+        """
         groups, start = [], 0
         while start < len(self.components):
             three = self.components[start : start + 3]
@@ -82,8 +85,9 @@ class Lightmap(Result):
     channel : str
         "irradiance", "ao", ...
     value : (P, H, W, C) float32
-        Pages, rows (row 0 is v = 0), columns, components.
+        Values by page, row (row 0 is v = 0), column and component.
     description : ChannelDescription
+        Unit, quantity and components.
     """
 
     channel: str
@@ -96,7 +100,7 @@ class Lightmap(Result):
         return self.description.unit
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that `repr` and notebooks show."""
         pages, height, width, _ = self.value.shape
         return {
             "channel": self.channel,
@@ -106,11 +110,11 @@ class Lightmap(Result):
         }
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return the first page; None for components that are neither one value nor one colour."""
+        """Return the first page, or None if the map has neither one nor three components."""
         return self.value[0] if self.value.shape[-1] in (1, 3) else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return channel, size and meaning as plain values, without the texels."""
+        """Return channel, shape and description as values that JSON can hold, without the texels."""
         meaning = {**asdict(self.description), "components": list(self.description.components)}
         return {"channel": self.channel, "shape": list(self.value.shape), **meaning}
 
@@ -122,18 +126,20 @@ class BakeResult(Result):
     Attributes
     ----------
     lightmaps : dict of str to Lightmap
-    status : (P, H, W) uint8, `TexelStatus`
+        Maps by channel.
+    status : (P, H, W) uint8
+        `TexelStatus` of each texel of the pages.
     texel_count : (I,) int64
-        Texels of each instance, in the order of `scene.instances`.
+        Number of texels of each instance, in the order of `scene.instances`.
     statistics : dict of channel to {min, max, mean, clipped, invalid}
     timings : dict of stage to seconds
-    rays : dict of stage to count
-    solve : dict, {patches, nonzeros, iterations, residual, energy: {emitted, absorbed, escaped}}
-    denoise : dict, names and versions from `denoiser_name` (empty if none ran)
+    rays : dict of stage to number of rays
+    solve : dict, {patches, nonzeros, iterations, residual, energy: {emitted, absorbed, escaped}, ...}
+    denoise : dict, names and versions from `denoiser_name` (empty without denoising)
     out : Path or None
-        The folder written, if any.
+        The output folder, None if no folder was written.
     manifest : dict
-        Content of `bake.json` in that folder.
+        Content of `bake.json` in the output folder.
     """
 
     scene: Scene
@@ -152,7 +158,7 @@ class BakeResult(Result):
     manifest: dict[str, Any] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that `repr` and notebooks show."""
         pages, height, width = self.status.shape
         rows: dict[str, Any] = {
             "pages": f"{pages} of {width} x {height}",
@@ -169,7 +175,7 @@ class BakeResult(Result):
         return next((lightmap.value[0] for lightmap in self.lightmaps.values()), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return statistics, times and warnings as plain values, with the manifest of a written bake."""
+        """Return statistics, timings, warnings and the manifest as values that JSON can hold."""
         found = {
             "out": None if self.out is None else str(self.out),
             "statistics": self.statistics,

@@ -1,4 +1,4 @@
-"""The error for an unknown name: of a setting, a channel, an export, a limit, a rule of a check."""
+"""The error for an unknown name of a setting, channel, export, metric or rule."""
 
 from __future__ import annotations
 
@@ -28,23 +28,22 @@ def unknown_name(
     what : str
         Kind of the named objects, in the singular: "channel".
     name : str
-        The name as it was given. The search for the nearest name ignores case and takes dashes for
-        underscores.
+        The unknown name. The search for the nearest name ignores case and treats dashes as underscores.
     known : iterable of str
-        The known names, in the order of the message.
+        The known names, in the order in which the message lists them.
     file : str or None
-        Passed to the error.
+        Attribute `file` of the error.
     object : str or None
-        Passed to the error.
+        Attribute `object` of the error.
     listed : str or None
-        Text in place of the list of known names, where the list is too long for a sentence.
+        Text that replaces the list of known names if that list is too long for a sentence.
     error : type
         Class of the error: `SettingsError`, or `InputError` for a name in a scene file.
 
     Returns
     -------
     BakerError
-        The error, not raised.
+        The error; the caller raises it.
     """
     known = list(known)
     folded = {_fold(other): other for other in known}

@@ -1,12 +1,13 @@
-"""Choice of the origin of a bake's coordinates: float32 is finest near 0, so the origin is near the objects.
+"""Chooses the origin of a bake's coordinates near the objects, because float32 is most accurate near 0.
 
-World positions are float64 in the scene; all that is traced or rasterised is float32 and relative to this
-origin. It is 0 for scenes that lie around 0 already.
+Transforms to world space are float64. Positions that are traced or rasterised are float32 and relative to
+this origin. The origin is 0 for scenes that lie around 0.
 
-The spacing of float32 numbers is about 2^-23 of their size. An object of size s at distance d from the origin
-loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` of them are not counted. The origin minimises
-the weighted sum of lost bits over all objects. A backdrop, a terrain or a sky around everything loses no bits
-wherever the origin is, and a single distant object has less weight than the other objects together.
+The spacing of float32 numbers is about 2^-23 of their absolute value. An object of size s at distance d from
+the origin loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` lost bits are ignored. The origin
+minimises the weighted sum of lost bits over all objects. A terrain or a backdrop around all other objects
+loses no bits for any origin within it. A single distant object has less weight than the other objects
+together.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-# Lost bits of an object that do not count.
+# Number of lost bits of an object that are ignored.
 _UNCOUNTED_BITS = 3.0
-# Bits of the mean object that a move of the origin away from 0 must save.
+# Number of bits that an origin other than 0 must save, weighted mean over all objects.
 _MIN_GAIN = 2.0
-# Candidate origins, half of them at the objects with most triangles.
+# Number of candidate origins, which are centres of objects. Half of them are the objects with most triangles.
 _CANDIDATES = 64
-# Vertices read of each mesh.
+# Largest number of vertices read from each mesh.
 _VERTICES = 1 << 15
 
 
@@ -40,11 +41,12 @@ def scene_origin(
     triangles : sequence of int
         Number of triangles of each mesh.
     placed : sequence of (int, (4, 4) float64)
-        Mesh and world_from_object of each object.
+        Index of the mesh, and world_from_object, of each object.
 
     Returns
     -------
     origin : (3,) float64, metres, world
+        The origin, 0 if no other point saves enough bits.
     """
     shapes = [_median_and_spread(vertices) for vertices in position]
     centre, size, weight = np.zeros((len(placed), 3)), np.zeros(len(placed)), np.zeros(len(placed))
@@ -57,7 +59,7 @@ def scene_origin(
     usable = (size > 0) & np.isfinite(centre).all(axis=1)
     centre, size, weight = centre[usable], size[usable], weight[usable]
     zero = np.zeros(3)
-    # Most scenes end here: no origin can save more bits than are lost at 0.
+    # Return early for most scenes: no origin can save more bits than are lost with the origin 0.
     lost = _lost_bits(zero, centre, size)
     if not weight.sum() > 0 or weight @ lost <= _MIN_GAIN * weight.sum():
         return zero
@@ -68,7 +70,7 @@ def scene_origin(
     best = candidates[int(total.argmin())]
     if weight @ lost - total.min() <= _MIN_GAIN * weight.sum():
         return zero
-    # Round to a power of two: coordinates that are whole or simple numbers stay so.
+    # Round to multiples of a power of two, so that integer coordinates stay exact.
     grid = 2.0 ** np.floor(np.log2(size[best]))
     return np.asarray(np.round(centre[best] / grid) * grid, np.float64)
 
@@ -76,7 +78,10 @@ def scene_origin(
 def _lost_bits(
     point: NDArray[np.float64], centre: NDArray[np.float64], size: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the bits of float32 (n,) beyond `_UNCOUNTED_BITS` that objects lose if (3,) is the origin."""
+    """Return (n,) float64: the bits beyond `_UNCOUNTED_BITS` that each object loses with the origin `point`.
+
+    point : (3,) float64, metres; centre : (n, 3) float64, metres; size : (n,) float64, metres
+    """
     distance = np.abs(centre - point).max(axis=1)
     return np.asarray(np.maximum(np.log2(np.maximum(distance / size, 1e-9)) - _UNCOUNTED_BITS, 0.0))
 
@@ -84,8 +89,8 @@ def _lost_bits(
 def _median_and_spread(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the median (3,) of a mesh's vertices and their median distance (3,) from it along each axis.
 
-    Medians are not affected by a few distant triangles. Where they are 0 because most vertices coincide, the
-    spread is half the bounding box.
+    A few distant triangles do not affect medians. If all three median distances are 0 because most vertices
+    coincide, half the size of the bounding box is returned instead.
     """
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):

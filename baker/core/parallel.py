@@ -1,7 +1,7 @@
-"""Tiles of work on a pool of threads, with progress reports and cancellation between tiles.
+"""Runs tiles of work on a pool of threads, with progress reports and cancellation between tiles.
 
-Kernels release the GIL, so Python threads run them at the same time. Each tile writes its own part
-of the output: results do not depend on the number of threads or on the order of tiles.
+Kernels release the GIL, so several Python threads run them at the same time. Each tile writes a separate part
+of the output, so results depend neither on the number of threads nor on the order of tiles.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Protocol
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 
-# Seconds between two progress reports, at which the caller may cancel.
+# Longest time between two progress reports, seconds. The caller may cancel at each report.
 _REPORT_SECONDS = 0.1
 
 
@@ -31,7 +31,7 @@ def thread_count(threads: int | None) -> int:
     Returns
     -------
     int
-        `threads`, or else the number of cores that this process may use.
+        The requested number, or the number of cores that this process may use.
     """
     if threads:
         return threads
@@ -40,12 +40,12 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-# The result of a tile: arrays, and numbers to be summed.
+# The result of a tile: arrays with one row for each item, and numbers that are summed over tiles.
 Part = tuple[Any, ...]
 
 
 class TileRunner(Protocol):
-    """Runs all tiles of a stage: in this process (`run_tiles`), or elsewhere."""
+    """Runs all tiles of a stage, in this process (`run_tiles`) or in others."""
 
     def __call__(
         self,
@@ -78,15 +78,15 @@ def run_tiles(
     Parameters
     ----------
     n, tile : int
-        Number of items; items in a tile, of which the last tile may have fewer.
+        Number of items, and number of items in a tile. The last tile may have fewer.
     work : callable
-        `work(begin, end)` returns the result of a tile.
+        `work(begin, end)` returns the result of the tile of items `begin` to `end - 1`.
     keep : callable or None
         `keep(begin, end, part)` stores the result of a tile; None if `work` stores it itself.
     threads : int
         Number of threads.
     stage : Stage
-        Name shown by `progress`.
+        Name of the stage in progress reports.
     progress : Progress
         Receives reports, and may cancel.
     rays_per_item : float
@@ -95,7 +95,7 @@ def run_tiles(
     Raises
     ------
     Cancelled
-        If `progress` cancels; running tiles end first, waiting ones never start.
+        If `progress` cancels. Running tiles end first; waiting tiles do not start.
     """
     report(progress, stage, 0.0)
     if n == 0:
@@ -126,7 +126,7 @@ def run_tiles(
 def _work_and_keep(
     work: Callable[[int, int], Any], keep: Callable[[int, int, Any], object] | None
 ) -> Callable[[int, int], object]:
-    """Return a function that computes the part of a tile and stores it."""
+    """Return a function (begin, end) that computes the result of a tile and stores it with `keep`, if set."""
     if keep is None:
         return work
 

@@ -1,8 +1,8 @@
-"""Objects whose float32 positions are spaced too coarsely for their texels.
+"""Finds objects whose positions in float32 are too inaccurate for the size of their texels.
 
-Files store vertices as float32: at 100 km from the object's own origin the spacing of float32 numbers is
-8 mm, whatever the node's transform is. A bake traces float32 positions relative to the scene's origin: an
-object 100 km from it has the same spacing.
+Two kinds of coordinates are float32. Files store vertices in object space: at 100 km from the object's
+origin, the spacing of float32 numbers is 8 mm for any transform of the node. A bake traces positions relative
+to the scene's origin: an object 100 km from that origin has the same spacing.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from baker.core.atlas import Atlas
 from baker.core.scene import Scene, SceneWarning
 
-# Largest spacing of positions that is not reported, as a share of a texel.
+# Spacing of float32 positions above which an object is reported, as a share of a texel's side.
 COARSE = 0.1
-# Share of a mesh's vertices that may lie farther out than the extent that is used.
+# Share of a mesh's vertices that are ignored as outliers when the size of its coordinates is measured.
 _OUTLIERS = 0.1
-# Vertices read of each mesh.
+# Largest number of vertices read from each mesh.
 _VERTICES = 1 << 15
 
 
@@ -30,11 +30,11 @@ class CoarseObjects:
     Attributes
     ----------
     worst : int
-        Index of the instance whose spacing is the largest share of its texel.
+        Index of the instance with the largest ratio of spacing to texel side.
     count : int
-        Number of such instances.
+        Number of instances above `COARSE`.
     text : str
-        Defect of the worst one, with numbers.
+        Description of the worst instance's defect, with numbers.
     fix : str
         Advice to the user.
     """
@@ -53,12 +53,12 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
     scene : Scene
         The scene to check.
     texel : (I,) float64, metres
-        Side of a texel on each instance; inf where it is not known.
+        Side of a texel on each instance; inf if it is unknown.
 
     Returns
     -------
     CoarseObjects or None
-        None if there is no such object.
+        None if no object is above `COARSE`.
     """
     if not scene.instances:
         return None
@@ -89,14 +89,14 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
 
 
 def coarse_warnings(scene: Scene, atlas: Atlas) -> list[SceneWarning]:
-    """Return a warning about the object of a bake with the coarsest positions, if they are too coarse.
+    """Return a warning about the object with the coarsest positions, if any object is too coarse.
 
     Parameters
     ----------
     scene : Scene
         The baked scene.
     atlas : Atlas
-        Its lightmap uv, with the texels per metre of each instance.
+        Its atlas; the texels per metre of each instance are read.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def _median_and_extent(position: NDArray[np.float32]) -> tuple[NDArray[np.float6
 
 
 def _float32_spacing(value: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Return the distance from float32 numbers above 0 to the next larger ones."""
+    """Return the distance from each value, as a float32 number >= 0, to the next larger float32 number."""
     return np.asarray(np.spacing(np.asarray(value, np.float32)), np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Progress reports of long work: a callable that receives them and may cancel the work."""
+"""The interface of progress callbacks, which receive reports and may cancel the work."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Progress(Protocol):
     """Receives the progress of a stage; a truthy return value cancels the work."""
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> object:
-        """Report `fraction` (0 to 1) of `stage` done; `detail` is a rate or a count to show."""
+        """Receive the share of `stage` that is done, 0 to 1; `detail` is a rate or a count to show."""
 
 
 def silent(stage: str, fraction: float, detail: str = "", /) -> object:
-    """Ignore a report of progress and never cancel.
+    """Ignore a progress report and do not cancel.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def report(progress: Progress, stage: Stage, fraction: float, detail: str = "") 
     progress : Progress
         Receives the report.
     stage : Stage
-        Its value is the name that users see.
+        The current stage; its value is the name shown to users.
     fraction : float
         Share of the stage that is done, 0 to 1.
     detail : str

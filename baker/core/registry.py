@@ -1,6 +1,6 @@
-"""Plugins by name: each file of a package registers its plugin, callers look it up.
+"""Plugins by name: each file of a package registers a plugin, and callers look it up by its name.
 
-Based on: Mitsuba 3's plugin-per-file layout.
+Based on: Mitsuba 3, where each plugin is one file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ class Registry(Generic[T]):
     Parameters
     ----------
     package : str
-        Dotted name of the package whose modules register the plugins; they are imported on first use.
+        Dotted name of the package whose modules register the plugins. The modules are imported at the first
+        lookup.
     """
 
     def __init__(self, package: str) -> None:
@@ -50,7 +51,7 @@ class Registry(Generic[T]):
                 importlib.import_module(f"{self.package}.{module}")
 
     def names(self) -> list[str]:
-        """List the registered names, sorted."""
+        """Return the registered names, sorted."""
         self._search()
         return sorted(self._plugins)
 
@@ -68,14 +69,14 @@ class Registry(Generic[T]):
         what : str
             Kind of plugin in the singular, for the message: "channel".
         setting : str or None
-            The setting that gave the name, for the message.
+            Setting that contains the name, for the message.
         hidden : collection of str
-            Names that the message leaves out, because the setting does not accept them.
+            Registered names that the message does not list, because the setting does not accept them.
 
         Raises
         ------
         SettingsError
-            If there is none; the message suggests the nearest name and lists all names.
+            If no plugin has that name. The message suggests the nearest name and lists all names.
         """
         plugin = self.get(name)
         if plugin is None:
@@ -85,19 +86,19 @@ class Registry(Generic[T]):
 
 
 def names_in_source(package: str, registry: str) -> list[str]:
-    """Return the names that the files of a package register, from their source and without importing them.
+    """Return the names that the files of a package register, by parsing the files without importing them.
 
     Parameters
     ----------
     package : str
         Dotted name of the package.
     registry : str
-        Name of the registry in these files: calls `registry.register("name")` are found.
+        Name of the registry in these files, such as "EXPORTS": calls of its method `register` are found.
 
     Returns
     -------
     list of str
-        Sorted; as `Registry.names` if all names are literals.
+        Names, sorted. They are those of `Registry.names` if all calls have a literal argument.
     """
     found = set()
     for folder in importlib.import_module(package).__path__:

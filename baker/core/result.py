@@ -1,4 +1,4 @@
-"""The base of results: a short text for consoles, a table with a small picture for notebooks."""
+"""The base class of results: a line of text for consoles, a table with a small picture for notebooks."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ THUMBNAIL = 256
 class Result:
     """Base class of the return values of the Python API.
 
-    A subclass gives its rows in `summary` and, where there is one, its picture in `picture`. `repr` is one
-    line; a notebook shows a table, and the picture scaled down.
+    A subclass overrides `summary` and, if it has a picture, `picture`. `repr` shows the summary in one line;
+    a notebook shows it as a table, with the picture scaled down.
     """
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text: names and values, the most important first."""
+        """Return the names and values that `repr` and notebooks show, the most important first."""
         return {}
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return a picture (H, W), (H, W, 1) or (H, W, 3) to show, linear; None without one."""
+        """Return a picture (H, W), (H, W, 1) or (H, W, 3), linear, or None if there is no picture."""
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values: numbers, texts, lists, dicts."""
+        """Return the result as values that JSON can hold: numbers, strings, lists and dicts."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -49,13 +49,13 @@ class Result:
 
 
 class Metrics:
-    """Mixin for a dataclass with a dict `metrics`: each metric is an attribute, too."""
+    """Mixin for a dataclass with a dict `metrics`, which makes each metric an attribute as well."""
 
     metrics: dict[str, Any]
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Return `metrics`: the figures that limits name."""
+        """Return `metrics`, another name for the same dict."""
         return self.metrics
 
     def __getattr__(self, name: str) -> Any:
@@ -74,8 +74,8 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
     Parameters
     ----------
     linear : (H, W), (H, W, 1) or (H, W, 3) float32
-        One component between 0 and 1 is stored as it is. Colours x become x / (x + m), m being the median
-        of the luminance above 0, then the sRGB curve.
+        Values of one component are clipped to 0 to 1 and stored linearly. A colour x becomes x / (x + m),
+        sRGB-encoded, where m is the median of all colour means above 0.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
 
 
 def _png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return (H, W, 3) uint8 as a PNG; `core` imports no other package, `io.png` neither."""
+    """Return the PNG file of pixels (H, W, 3) uint8. `core` must not import `io.png`."""
     height, width = pixels.shape[:2]
     rows = np.zeros((height, 1 + 3 * width), np.uint8)
     rows[:, 1:] = pixels.reshape(height, -1)

@@ -1,7 +1,7 @@
-"""The scene that is baked: frozen arrays in metres, +Y up, linear Rec.709.
+"""The scene that is baked: immutable arrays in metres, +Y up, linear Rec.709.
 
-Importers build it, nothing changes it. Meshes are in object space and shared by instances; `core.geometry`
-transforms them to world space.
+Importers create it. Meshes are in object space and shared by instances; `core.geometry` transforms them to
+world space.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from baker.core.origin import scene_origin
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
-# Metres; the inverse square of a shorter range would overflow float32.
+# Smallest range of a light, metres: the inverse square of a smaller range would overflow float32.
 _SHORTEST_RANGE = 1e-12
 
 
-# Image uv beyond this many repeats: the step of float32 is coarser than 1/64 of the image there, and areas of
-# triangles overflow soon after.
+# Largest absolute image uv, repeats of the image. Beyond it, the spacing of float32 numbers exceeds 1/64 of
+# the image, and areas of triangles in uv may overflow.
 LARGEST_UV = 2.0**18
 
 
@@ -36,15 +36,15 @@ class Texture:
     Attributes
     ----------
     image : (H, W, 4) uint8 or float32
-        uint8: as stored, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is v = 0.
+        uint8: values of the image file, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is v = 0.
     texcoord : int
-        Number of the TEXCOORD set of the mesh.
+        Number of the mesh's TEXCOORD set that the texture uses.
     transform : (2, 3) float64
-        uv_image = transform @ (u, v, 1): KHR_texture_transform.
+        KHR_texture_transform: uv_image = transform @ (u, v, 1).
     wrap : (str, str)
-        "repeat", "mirror" or "clamp" along u and v.
+        "repeat", "mirror" or "clamp" along u and along v.
     nearest : bool
-        Magnification takes the nearest texel instead of interpolating.
+        Whether lookups return the nearest pixel instead of interpolating.
     """
 
     image: NDArray[Any]
@@ -61,13 +61,13 @@ class Material:
     Attributes
     ----------
     base_colour : (4,) tuple
-        Linear Rec.709 RGB and alpha, factor before texture and vertex colour.
+        Linear Rec.709 RGB and alpha, which are multiplied by texture and vertex colour.
     emission : (3,) tuple
-        Radiance in cd/m2, factor times strength, before texture.
+        Radiance in cd/m2, which is multiplied by the texture.
     double_sided : bool
-        Reflects and emits on both sides; otherwise the back is black.
+        Whether the surface reflects and emits on both sides. Otherwise its back is black.
     metallic_roughness_texture : Texture or None
-        Linear: green times `roughness`, blue times `metallic`. Bakes do not read it.
+        Linear: `roughness` is multiplied by green, `metallic` by blue. Bakes do not read it.
     alpha_mode : str
         "OPAQUE", "MASK" or "BLEND".
     """
@@ -87,21 +87,21 @@ class Material:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles in object space: the primitives of a mesh, concatenated.
+    """Triangles in object space: the concatenated primitives of a mesh.
 
     Attributes
     ----------
-    position : (V, 3) float32, object space
-    normal : (V, 3) float32, unit, object space; computed by the importer where the file has none
+    position : (V, 3) float32, metres, object space
+    normal : (V, 3) float32, unit, object space; computed by the importer if the file has no normals
     triangle : (T, 3) int32, indices into the vertices; only valid triangles
     material : (T,) int32, index into `Scene.materials`
-    primitive : (T,) int32, index of the primitive in the source mesh
-    vertex_primitive : (V,) int32, index of the primitive that the vertex belongs to
+    primitive : (T,) int32, index of each triangle's primitive in the source mesh
+    vertex_primitive : (V,) int32, index of each vertex's primitive in the source mesh
     source_vertex : (V,) int32
-        Row of each vertex in the accessors of its source primitive. Where the importer computed flat normals
-        a row may appear several times.
+        Row of each vertex in the accessors of its source primitive. If the importer computed flat normals,
+        several vertices may have the same row.
     texcoord : tuple of (V, 2) float32 or None
-        TEXCOORD sets by number. Set 1 may serve as lightmap uv.
+        TEXCOORD sets by number, None for missing sets. Set 1 may be used as lightmap uv.
     colour : (V, 4) float32, linear Rec.709, or None
     """
 
@@ -124,9 +124,9 @@ class Instance:
     Attributes
     ----------
     node : int
-        glTF node index in `scene.glb` (for other formats: the index that the writer assigns).
+        Index of the glTF node in `scene.glb`. For other formats, the writer creates this node.
     name : str
-        Name of the node, or of the mesh if the node has none.
+        Name of the node, or of the mesh if the node has no name.
     mesh : int
         Index into `Scene.meshes`.
     world_from_object : (4, 4) float64
@@ -150,12 +150,13 @@ class PunctualLight:
         Colour times intensity, in the unit of the kind.
     position : (3,) tuple, metres, world
     direction : (3,) tuple, unit, world
-        Direction in which the light travels along the axis, away from the light.
-    inner_cone, outer_cone : float, radians (spot)
+        Direction in which light travels along the axis, away from the light.
+    inner_cone, outer_cone : float, radians
+        Angles between the axis and the inner and outer cone of a spot light.
     range : float, metres
-        Distance at which a light with a position has faded to 0; inf for no limit.
+        Distance from which on a light with a position has no effect; inf for no limit.
     parameters : mapping
-        Further parameters that only this kind of light has, by name.
+        Further parameters by name, for kinds of light that have other parameters.
     """
 
     kind: str
@@ -171,7 +172,7 @@ class PunctualLight:
 
     @property
     def inverse_range(self) -> float:
-        """Return 1 / range^2, 1/m2, as kernels take it; 0 without a range."""
+        """Return 1 / range^2, 1/m2; 0 for an infinite range."""
         return float(1.0 / max(self.range, _SHORTEST_RANGE) ** 2)
 
 
@@ -198,7 +199,17 @@ class Camera:
 
 @dataclass(frozen=True)
 class SceneWarning:
-    """A problem that does not stop the work: a stable code, a sentence, the object concerned."""
+    """A problem that does not stop the work.
+
+    Attributes
+    ----------
+    code : str
+        Name of the kind of warning; it does not change between versions.
+    message : str
+        One sentence.
+    object : str
+        Name of the object concerned.
+    """
 
     code: str
     message: str
@@ -207,20 +218,20 @@ class SceneWarning:
 
 @dataclass(frozen=True)
 class SourceDocument:
-    """The glTF document of a scene, from which the writer copies everything that baking does not change.
+    """The glTF document of a scene. The writer copies from it everything that a bake does not change.
 
     Attributes
     ----------
     json : dict
-        The document as parsed; never changed.
+        The parsed document; it must not be changed.
     buffers : tuple of bytes
-        The bytes of each buffer, read from the BIN chunk, files or data URIs.
+        Content of each buffer, read from the BIN chunk, a file or a data URI.
     folder : Path or None
         Folder that relative image URIs refer to.
     missing, missing_images : frozenset of int
-        Buffers and image files that cannot be read; baking does not need them.
+        Indices of buffers and images that cannot be read and that the bake does not need.
     chunks : tuple of (int, bytes)
-        Type and content of the GLB chunks that glTF does not define.
+        Type and content of all GLB chunks other than JSON and BIN.
     """
 
     json: dict[str, Any]
@@ -238,11 +249,11 @@ class Scene(Result):
     Attributes
     ----------
     source : SourceDocument or None
-        None for formats other than glTF: the writer builds a new document.
+        None for formats other than glTF, for which the writer creates a new document.
     sha256 : str
-        Hash of the scene file and of every file that it refers to, in the order of the references.
+        Hash of the scene file and of all files that it refers to, in the order of the references.
     source_scene : SourceScene or None
-        The triangles as the file holds them, if the scene was loaded leniently.
+        All triangles of the file, invalid ones included, if the scene was loaded with `lenient=True`.
     """
 
     name: str
@@ -258,7 +269,7 @@ class Scene(Result):
     source_scene: SourceScene | None = None
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that `repr` and notebooks show."""
         return {
             "name": self.name,
             "objects": len(self.instances),
@@ -270,7 +281,7 @@ class Scene(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return names and counts as plain values."""
+        """Return names, counts and warnings as values that JSON can hold."""
         return {
             "name": self.name,
             "path": None if self.path is None else str(self.path),
@@ -287,7 +298,7 @@ class Scene(Result):
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
-        """Return the point (3,) float64, metres, world, that positions of a bake are relative to."""
+        """Return (3,) float64, metres, world: the point that float32 positions of a bake are relative to."""
         return scene_origin(
             [mesh.position for mesh in self.meshes],
             [len(mesh.triangle) for mesh in self.meshes],
@@ -302,7 +313,7 @@ class Scene(Result):
         return tuple(replace(light, position=self.to_local(light.position)) for light in self.lights)
 
     def to_local(self, position: Sequence[float]) -> tuple[float, float, float]:
-        """Return a world position (3,) relative to `origin`."""
+        """Return `position` (3,), metres, world, minus `origin`."""
         x, y, z = (float(v) for v in np.asarray(position, np.float64) - self.origin)
         return x, y, z
 

@@ -1,7 +1,7 @@
-"""The settings of a bake, with meaning, unit, range and default.
+"""The settings of a bake, with description, unit, range and default.
 
-The command line, the configuration file, the keywords of `baker.bake` and the settings page of the docs are
-made from this class.
+The flags of the command line, the keys of the configuration file, the keywords of `baker.bake` and the
+settings page of the docs are generated from `BakeSettings`.
 """
 
 from __future__ import annotations
@@ -14,60 +14,68 @@ from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
 from baker.core.settings_model import Names, Numbers, Settings, Text, seed_setting, setting, threads_setting
 
-# Hemisphere rays per texel of each preset. Light samples per texel are as many.
+# Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
 
 class CommonSettings(Settings):
-    """Holds the settings of a bake that no plugin brings."""
+    """All settings of a bake except the options of encodings."""
 
     table: ClassVar[str] = "bake"
 
     channels: Names = setting(("irradiance", "ao"), "Channels to bake.")
-    resolution: int = setting(1024, "Page width and height, exact.", unit="texels", ge=16, le=16384)
+    resolution: int = setting(1024, "Width and height of each page.", unit="texels", ge=16, le=16384)
     density: float | None = setting(
-        None, "Texels per metre; pages overflow into more.", unit="texels/m", gt=0, allow_inf_nan=False
+        None, "Texels per metre; adds pages as needed.", unit="texels/m", gt=0, allow_inf_nan=False
     )
-    max_pages: int = setting(16, "Most pages that `density` may fill.", ge=1, le=256)
+    max_pages: int = setting(16, "Largest number of pages if `density` is set.", ge=1, le=256)
     padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64)
-    uv: Literal["auto", "keep", "unwrap"] = setting("auto", "Keep a valid TEXCOORD_1, or unwrap.")
-    unwrapper: Literal["xatlas"] = setting("xatlas", "Library that cuts and packs charts.")
-    quality: Literal["preview", "medium", "high", "ultra"] = setting(
-        "medium", "Preset of samples: preview 16, medium 64, high 256, ultra 1024."
+    uv: Literal["auto", "keep", "unwrap"] = setting(
+        "auto", "Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid."
     )
-    samples: int | None = setting(None, "Hemisphere rays per texel; default by quality.", ge=1, le=65536)
-    light_samples: int | None = setting(None, "Shadow rays per texel; default: samples.", ge=1, le=65536)
-    ao_samples: int | None = setting(None, "AO rays per texel; default: samples.", ge=1, le=65536)
+    unwrapper: Literal["xatlas"] = setting("xatlas", "Library that cuts surfaces into charts and packs them.")
+    quality: Literal["preview", "medium", "high", "ultra"] = setting(
+        "medium", "Preset of `samples`: preview 16, medium 64, high 256, ultra 1024."
+    )
+    samples: int | None = setting(None, "Hemisphere rays per texel; default: by `quality`.", ge=1, le=65536)
+    light_samples: int | None = setting(None, "Shadow rays per texel; default: `samples`.", ge=1, le=65536)
+    ao_samples: int | None = setting(None, "AO rays per texel; default: `samples`.", ge=1, le=65536)
     ao_distance: Text = setting(
         "10%", "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
     )
     sky: Numbers | None = setting(None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2")
-    sky_strength: float = setting(1.0, "Factor on the sky.", ge=0, allow_inf_nan=False)
-    bounces: int | None = setting(None, "Reflections of light; default: until converged.", ge=0, le=1000)
+    sky_strength: float = setting(1.0, "Factor of the sky radiance.", ge=0, allow_inf_nan=False)
+    bounces: int | None = setting(
+        None, "Number of reflections of light; default: until converged.", ge=0, le=1000
+    )
     denoise: bool = setting(True, "Denoise with Open Image Denoise.")
-    encode: Names = setting((), f"Further files of each page: {encodings_in_words()}.")
+    encode: Names = setting((), f"Additional file formats of each page: {encodings_in_words()}.")
     export: Names = setting(
-        (), "Folders ready for engines: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
+        (), "Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
     )
     include: Names = setting(
         (),
-        "Bake only objects with these names or paths of nodes (`*` and `?` stand for others).",
+        "Bake only objects with these node names or node paths; `*` and `?` are wildcards.",
         repeated=True,
     )
     exclude: Names = setting(
         (),
-        "Leave out objects and lights with these names or paths of nodes, and their descendants.",
+        "Leave out objects and lights with these node names or node paths, and their descendants.",
         repeated=True,
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of files whose format defines none.")
+    up: Literal["y", "z"] = setting("y", "Up axis of files in formats that do not specify it.")
     scale: float = setting(
-        1.0, "Metres per unit of files whose format defines none.", unit="m", gt=0, allow_inf_nan=False
+        1.0,
+        "Metres per unit of files in formats that do not specify it.",
+        unit="m",
+        gt=0,
+        allow_inf_nan=False,
     )
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 
     def check(self) -> None:
-        """Raise `SettingsError` for values that do not go together."""
+        """Raise `SettingsError` if `sky`, `ao_distance` or `channels` is invalid."""
         super().check()
         if max(self.sky_radiance) > BRIGHTEST:
             raise SettingsError(f"`sky` is above {BRIGHTEST:.0e} cd/m2 (was '{self.sky}')", object="sky")
@@ -77,31 +85,31 @@ class CommonSettings(Settings):
 
     @property
     def hemisphere_samples(self) -> int:
-        """Return the hemisphere rays per texel, from `samples` or else from `quality`."""
+        """Return the hemisphere rays per texel: `samples`, or the preset `quality` if `samples` is None."""
         return self.samples if self.samples is not None else QUALITY_SAMPLES[self.quality]
 
     @property
     def sky_radiance(self) -> tuple[float, float, float]:
-        """Return the constant sky's radiance in cd/m2 (black if `sky` is not set)."""
+        """Return the radiance of the constant sky, RGB, cd/m2; 0 if `sky` is None."""
         if self.sky is None:
             return (0.0, 0.0, 0.0)
         red, green, blue = parse_sky(self.sky)
         return (red * self.sky_strength, green * self.sky_strength, blue * self.sky_strength)
 
     def ao_reach(self, diagonal: float) -> float:
-        """Return the AO distance in metres for a scene of this diagonal (may be inf)."""
+        """Return the AO distance in metres (may be inf) for a scene whose bounding box has this diagonal."""
         return ao_metres(self.ao_distance, diagonal)
 
 
 if TYPE_CHECKING:
 
     class BakeSettings(CommonSettings):
-        """All settings of a bake, validated; those of plugins are unknown to type checkers."""
+        """All settings of a bake. Type checkers see only the common settings."""
 
 else:
 
     class BakeSettings(*reversed(encoding_options().values()), CommonSettings):
-        """All settings of a bake, checked: common ones, and the options of each encoding."""
+        """All settings of a bake: the common settings and the options of each encoding."""
 
 
 def ao_metres(distance: str, diagonal: float) -> float:
@@ -110,7 +118,7 @@ def ao_metres(distance: str, diagonal: float) -> float:
     Parameters
     ----------
     distance : str
-        Metres, per cent of the diagonal ("10%"), or "inf".
+        Metres, a percentage of the diagonal such as "10%", or "inf".
     diagonal : float
         Diagonal of the scene's bounding box, metres.
 
@@ -122,7 +130,7 @@ def ao_metres(distance: str, diagonal: float) -> float:
     Raises
     ------
     SettingsError
-        If the text is none of these.
+        If `distance` has another form, or is not positive.
     """
     text = distance.strip()
     try:
@@ -143,7 +151,7 @@ def parse_sky(text: str) -> tuple[float, float, float]:
     Parameters
     ----------
     text : str
-        Three numbers with commas, or one for all three.
+        Three numbers separated by commas, or one number for all three.
 
     Returns
     -------
@@ -153,7 +161,7 @@ def parse_sky(text: str) -> tuple[float, float, float]:
     Raises
     ------
     SettingsError
-        If the text is something else.
+        If the text has another form, or a number is negative or infinite.
     """
     try:
         values = [float(part) for part in text.split(",")]
@@ -168,12 +176,12 @@ def parse_sky(text: str) -> tuple[float, float, float]:
 
 
 def make_settings(values: Mapping[str, Any]) -> BakeSettings:
-    """Return the settings of a bake, checked.
+    """Return the settings of a bake; an invalid value raises `SettingsError`.
 
     Parameters
     ----------
     values : mapping of str to object
-        Setting names and values; a dash in a name counts as an underscore.
+        Values by name of the setting. Dashes in names are read as underscores.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """The base of all settings: pydantic models whose fields become flags, configuration keys and docs.
 
-Every command declares its settings as one subclass of `Settings`. A field is made with `setting`, which keeps
-its meaning, unit, range and default in one place; `docs/make_settings_page.py` prints them, `cli/command.py`
-makes flags of them, and `docs/make_keywords.py` makes the keywords of the Python API.
+Every command declares its settings as one subclass of `Settings`. Each field is made with `setting`, which
+takes its description, unit, range and default. `docs/make_settings_page.py` prints the fields,
+`cli/command.py` turns them into flags, and `docs/make_keywords.py` into keywords of the Python API.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 
-# Characters of a wrong value that an error repeats.
+# Number of characters of an invalid value that an error quotes.
 _LONGEST = 80
 
 
@@ -34,59 +34,59 @@ def setting(
     Parameters
     ----------
     default : object
-        Value of the setting where nothing is given.
+        Default value.
     description : str
-        Effect of the setting, a sentence.
+        Effect of the setting, one sentence.
     unit : str
-        Unit of its value, empty for numbers without one.
+        Unit of the value; empty for values without a unit.
     metavar : str
-        Placeholder of the value in the help; made from the type if empty.
+        Placeholder of the value in the help; by default, it is derived from the type.
     repeated : bool
-        The flag may be given several times; the values are joined.
+        Whether the flag may be given several times, in which case its values are concatenated.
     **bounds : object
-        Limits as pydantic names them: ge, gt, le, lt, allow_inf_nan.
+        Limits of the value by pydantic's names: ge, gt, le, lt, allow_inf_nan.
 
     Returns
     -------
     FieldInfo
-        Typed as Any, so that a field can be annotated with the type of its value.
+        Declared as Any, so that the field can be annotated with the type of its value.
     """
     extra: dict[str, Any] = {"unit": unit, "metavar": metavar, "repeated": repeated}
     return Field(default, description=description, json_schema_extra=extra, **bounds)
 
 
 def same_setting(model: type[Settings], name: str) -> Any:
-    """Return a field of another model, for a model that has the same setting.
+    """Return a copy of a field of another model, so that two models can share a setting.
 
     Parameters
     ----------
     model : type of Settings
         The model that declares the setting.
     name : str
-        Of the setting.
+        Name of the setting.
 
     Returns
     -------
     FieldInfo
-        Typed as Any, as that of `setting`.
+        Declared as Any, like the result of `setting`.
     """
     return copy(model.model_fields[name])
 
 
 def _split(value: Any) -> Any:
-    """Return the names in a text with commas, or in a list of such texts; other values as they are."""
+    """Split a text, or each text of a list, at commas into a list of names; return other values unchanged."""
     if isinstance(value, list | tuple) and all(isinstance(part, str) for part in value):
         value = ",".join(value)
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
 
 def _one_name(value: Any) -> Any:
-    """Return a text as a list of one; other values as they are."""
+    """Return a text as a list with one element; return other values unchanged."""
     return [value] if isinstance(value, str) else value
 
 
 def _as_list_text(value: Any) -> Any:
-    """Return numbers, and lists of them with commas, as text; other values as they are."""
+    """Return a number, or a flat list joined with commas, as text; return other values unchanged."""
     value = _plain(value)
     if isinstance(value, list | tuple) and all(not isinstance(part, list | tuple | dict) for part in value):
         return ",".join(map(str, value))
@@ -94,35 +94,35 @@ def _as_list_text(value: Any) -> Any:
 
 
 def _as_text(value: Any) -> Any:
-    """Return a number as text; other values as they are."""
+    """Return a number as text; return other values unchanged."""
     value = _plain(value)
     return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
 def _plain(value: Any) -> Any:
-    """Return a number or an array of numpy as a number or a list of Python; other values as they are."""
+    """Convert a NumPy number or array to a Python number or list; return other values unchanged."""
     return value.tolist() if hasattr(value, "dtype") and hasattr(value, "tolist") else value
 
 
-# A list of names, written with commas in one text or as a list.
+# A list of names, given as a list or as one text with commas.
 Names = Annotated[tuple[str, ...], BeforeValidator(_split)]
-# A list of texts that may hold commas.
+# A list of texts that may contain commas, given as a list or as one text.
 Texts = Annotated[tuple[str, ...], BeforeValidator(_one_name)]
-# A text that may be given as a number.
+# A text, given as a text or as a number.
 Text = Annotated[str, BeforeValidator(_as_text)]
-# A text of numbers with commas, which may be given as a number or a list of numbers.
+# A text of numbers separated by commas, given as a text, as a number or as a list of numbers.
 Numbers = Annotated[str, BeforeValidator(_as_list_text)]
 
 
 class Settings(BaseModel):
-    """Holds the settings of one kind of work; an invalid value raises `SettingsError`.
+    """Base class of settings models; an invalid value raises `SettingsError`.
 
     Attributes
     ----------
     table : str
-        Table of a configuration file that holds these settings, empty if there is none.
+        Table of the configuration file with these settings; empty if there is none.
     what : str
-        Word for an unknown name in the error message.
+        Kind of setting in messages about unknown names: "there is no {what} 'x'".
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -156,28 +156,28 @@ class Settings(BaseModel):
         )
 
     def check(self) -> None:
-        """Raise `SettingsError` for values that do not go together; a subclass may override it."""
+        """Raise `SettingsError` for invalid values or combinations that types and bounds allow."""
 
     @classmethod
     def make(cls, values: Mapping[str, Any], *, file: str | None = None) -> Self:
-        """Return settings of values by name.
+        """Return the settings with given values.
 
         Parameters
         ----------
         values : mapping of str to object
-            Names and values; a dash in a name counts as an underscore.
+            Values by name of the setting. Dashes in names are read as underscores.
         file : str or None
-            The file they come from, for the error.
+            File that contains the values, for the error.
 
         Returns
         -------
         Settings
-            An object of the class itself.
+            An object of the class that the method is called on.
 
         Raises
         ------
         SettingsError
-            For an unknown name (with the nearest known one) or a value out of range.
+            For an unknown name (the message suggests the nearest known name) or a value out of range.
         """
         try:
             return cls(**values)
@@ -187,12 +187,12 @@ class Settings(BaseModel):
             raise SettingsError(error.message, file=file, object=error.object) from None
 
     def changed(self, **values: Any) -> Self:
-        """Return a checked copy with other values.
+        """Return a validated copy with some values replaced.
 
         Parameters
         ----------
         **values : object
-            Settings by name.
+            New values by name of the setting.
 
         Returns
         -------
@@ -221,11 +221,11 @@ def threads_setting() -> Any:
     FieldInfo
         For `threads: int | None`.
     """
-    return setting(None, "Threads; default: all cores.", ge=1, le=1024)
+    return setting(None, "Number of threads; default: all cores.", ge=1, le=1024)
 
 
 class RunSettings(Settings):
-    """Holds the settings that every command takes."""
+    """The settings that every command accepts."""
 
     seed: int = seed_setting()
     threads: int | None = threads_setting()

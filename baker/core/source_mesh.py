@@ -1,4 +1,4 @@
-"""A scene's triangles as its file holds them, invalid ones included, for checks and repairs of the file."""
+"""All triangles of a scene file, invalid ones included, for checks and repairs of the file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class SourcePrimitive:
-    """One primitive as its file holds it.
+    """One primitive of a scene file, without validation.
 
     Attributes
     ----------
@@ -20,17 +20,18 @@ class SourcePrimitive:
         Index into the scene's materials.
     position : (V, 3) float32, metres, object space
     triangle : (T, 3) int64
-        Indices into the vertices, not yet checked to be in range.
+        Indices into the vertices; they may be out of range.
     normal : (V, 3) float32 or None, object space
-        None for flat normals.
+        None if the file has no normals, which means flat normals.
     texcoord : dict of int to (V, 2) float32
         TEXCOORD sets by number.
     colour : (V, 4) float32 or None, linear Rec.709
     further : (V, B) uint8 or None
-        Bytes of all other vertex attributes; only where a file is read leniently.
+        The B bytes of all other attributes of each vertex; None unless the file is loaded with
+        `lenient=True`.
     stitched : bool
-        True for strips: a triangle with a repeated index joins two parts of a strip and is dropped without
-        a warning.
+        True for triangle strips. A strip's triangles with a repeated index only join two parts of the strip,
+        so they are dropped without a warning.
     """
 
     index: int
@@ -46,7 +47,7 @@ class SourcePrimitive:
 
 @dataclass(frozen=True)
 class SourceMesh:
-    """A mesh with all primitives of its file, unchecked."""
+    """A mesh with all primitives that the file contains, without validation."""
 
     name: str
     primitives: tuple[SourcePrimitive, ...]
@@ -54,14 +55,14 @@ class SourceMesh:
 
 @dataclass(frozen=True)
 class SourceInstance:
-    """A node that shows a mesh, including a mesh without a valid triangle.
+    """A node with a mesh. Unlike an `Instance`, its mesh may have no valid triangle.
 
     Attributes
     ----------
     node : int
-        As in `Instance`.
+        See `Instance`.
     name : str
-        As in `Instance`.
+        See `Instance`.
     mesh : int
         Index into `SourceScene.meshes`.
     world_from_object : (4, 4) float64
@@ -75,7 +76,7 @@ class SourceInstance:
 
 @dataclass(frozen=True)
 class SourceScene:
-    """All meshes that a scene's nodes show, in the order of their first instance."""
+    """All meshes that nodes of the scene refer to, in the order of their first instance."""
 
     meshes: tuple[SourceMesh, ...]
     instances: tuple[SourceInstance, ...]

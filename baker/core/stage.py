@@ -1,4 +1,4 @@
-"""Names of the stages of a bake and of other work, as progress, timings and ray counts show them."""
+"""Names of the stages of a bake and of other work, used in progress reports, timings and ray counts."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from enum import StrEnum
 class Stage(StrEnum):
     """A step of work that reports its progress.
 
-    The manifest's `timings` and `rays` have these names as keys.
+    The values are keys of `timings` and `rays` in the manifest.
     """
 
-    # Stages of a bake, in their order.
+    # Stages of a bake, in the order in which they run.
     LOAD = "load"
     UNWRAP = "unwrap"
     TEXELS = "texels"

@@ -1,8 +1,9 @@
-"""The texels that lie on surfaces, with the data of each that the ray stages read.
+"""The texels that lie on surfaces, with the data of each texel that the ray stages read.
 
-Entries 0 to n_front - 1 are the texels of the pages. They are followed by the back sides of texels on
-double-sided surfaces, then by further sides of texels that another surface passes through
-(`radiosity.sides`): these take part in light transport but are not stored in any map.
+A texel buffer has n entries. Entries 0 to n_front - 1 are the front sides, one for each texel of the pages.
+Then follow the back sides of texels on double-sided surfaces. If another surface passes through a texel,
+`radiosity.sides` splits it and appends an entry for each further side. Only front entries are stored in maps;
+all entries take part in light transport.
 """
 
 from __future__ import annotations
@@ -16,29 +17,40 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class TexelBuffer:
-    """Texels in Morton order of their pages (neighbours in the list are neighbours on the surface).
+    """The n texel entries. Front entries are in Morton order within each page, so neighbours are close by.
 
     Attributes
     ----------
     resolution, n_pages, n_front : int
+        Side of a page in texels, number of pages, number of front entries.
     pixel : (n,) int64
-        (page * resolution + row) * resolution + column; a back entry has its front's pixel.
-    back : (n,) bool, True for back sides
-    first : (n_front + 1,) int64, `entry` : (m,) int32, `entry_area` : (m,) float32
-        Triangles that each front texel's square touches, and their areas inside it in texels.
+        (page * resolution + row) * resolution + column; a back entry has the pixel of its front.
+    back : (n,) bool
+        Whether the entry is a back side.
+    first : (n_front + 1,) int64
+    entry : (m,) int32
+    entry_area : (m,) float32
+        The square of front texel k touches the triangles entry[first[k] : first[k + 1]]; their areas inside
+        the square, in texels, are in the same slice of `entry_area`.
     chart, instance : (n,) int32
-    area : (n,) float32, m2 of surface inside the texel, times opacity
-    centroid : (n_front, 2) float32, of that surface in the page, texels, relative to the texel's centre
-    position : (n, 3) float32, metres, at that centroid
-    normal : (n, 3) float32, unit, shading, flipped on back entries
+        Indices of chart and instance.
+    area : (n,) float32, m2
+        Area of the surface inside the texel, times its opacity.
+    centroid : (n_front, 2) float32, texels
+        Centroid (column, row) of that surface in the page, relative to the texel's centre.
+    position : (n, 3) float32, metres, world, relative to `Geometry.origin`
+        Position of that centroid.
+    normal : (n, 3) float32
+        Unit shading normal, world; reversed on back entries.
     albedo : (n, 3) float32, linear Rec.709
     lookup : (P * H * W,) int32
-        Entry of each pixel. Pixels just outside a chart, to which rounding may move a hit on its border, have
-        the entry of a covered neighbour; all others -1.
-    back_entry : (n_front,) int32, entry of the back side of each front texel, or -1
+        Front entry of each pixel. Rounding may move a hit on a chart's border to a pixel just outside the
+        chart, so these pixels have the entry of a covered neighbour. All other pixels have -1.
+    back_entry : (n_front,) int32
+        Entry of the back side of each front texel, or -1.
     region : (n_front,) int32
-        Number of the part of its chart in which neighbouring texels see each other along the surface
-        (`radiosity.sides`); the number of the chart where no other surface cuts it.
+        Index of a connected part of the chart that no other surface cuts, see `radiosity.sides`. If no
+        surface cuts the chart, it is the index of the chart.
     """
 
     resolution: int
@@ -62,14 +74,17 @@ class TexelBuffer:
 
     @property
     def n(self) -> int:
-        """Return the number of entries, back sides included."""
+        """Return the number of entries."""
         return len(self.pixel)
 
     def hit_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
-        """Copy values of entries (n, ...) to the pixels (P * H * W, ...) at which `lookup` finds them.
+        """Return (P * H * W, ...): for each pixel the value of its entry in `lookup`.
 
-        If there are back sides, their pixels follow, twice P * H * W rows in all. This is the order of
-        `kernels.triangle_lookup.hit_pixel`. Pixels without a texel get `fill`.
+        Pixels without an entry have the value `fill`. If the buffer has back sides, P * H * W rows with the
+        values of the pixels' back entries follow. The index of a row is the result of
+        `kernels.triangle_lookup.hit_pixel`.
+
+        value : (n, ...), values of all entries
         """
         sides = [self.lookup]
         if self.n > self.n_front:
@@ -81,7 +96,10 @@ class TexelBuffer:
         return image
 
     def page_image(self, value: NDArray[Any], fill: float | int = 0, page: int | None = None) -> NDArray[Any]:
-        """Scatter values of front texels (n_front, ...) to images (P, H, W, ...), or one page (H, W, ...)."""
+        """Return values of front texels (n_front, ...) as images (P, H, W, ...), or as one image (H, W, ...).
+
+        Texels without an entry have the value `fill`. If `page` is given, only that page is returned.
+        """
         pixels = self.resolution * self.resolution
         pixel, value = self.pixel[: self.n_front], value[: self.n_front]
         n_pages = self.n_pages
@@ -95,7 +113,7 @@ class TexelBuffer:
         return image.reshape(shape if page is not None else (n_pages, *shape))
 
     def with_copies(self, entry: NDArray[np.int32]) -> TexelBuffer:
-        """Return the buffer with copies of entries (m,) appended; `lookup` does not refer to them."""
+        """Return the buffer with copies of the given entries (m,) appended. `lookup` has no copies."""
         names = ("pixel", "back", "chart", "instance", "area", "position", "normal", "albedo")
         longer: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(self, name)[entry]]) for name in names
@@ -103,7 +121,7 @@ class TexelBuffer:
         return replace(self, **longer)
 
     def without_surface(self) -> TexelBuffer:
-        """Return the buffer without the arrays of the ray stages: triangles, positions, normals, albedo."""
+        """Return the buffer with empty arrays for triangles, positions, normals, albedo and lookup."""
         none = np.zeros((0, 3), np.float32)
         return replace(
             self,

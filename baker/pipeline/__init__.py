@@ -1,1 +1,1 @@
-"""The stages of a bake in order, and the data passed between them."""
+"""Runs the stages of a bake in order, and passes data between them."""

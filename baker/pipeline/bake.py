@@ -1,4 +1,4 @@
-"""The stages of a bake, in order; the only place that connects them.
+"""Runs the stages of a bake in order; the only module that connects them.
 
 scene -> atlas -> texels -> valid points -> texel sides -> direct light -> patches -> form factors -> solve
 -> final gather -> finished pages -> output folder
@@ -45,7 +45,7 @@ def bake(
     executor: TileExecutor | None = None,
     atlas: Atlas | None = None,
 ) -> BakeResult:
-    """Bake a scene: lightmap uv, light transport, finished maps, and the output folder if `out` is set.
+    """Make lightmap uv, compute light transport, finish the maps, and write a folder if `out` is set.
 
     Parameters
     ----------
@@ -54,13 +54,13 @@ def bake(
     settings : BakeSettings
         Settings of the bake.
     out : path, optional
-        Folder to write; None keeps everything in memory.
+        Folder to write; None keeps the result in memory.
     progress : Progress
         Called with the stage, the share of it that is done, and a detail; a truthy return value cancels.
     force : bool
-        Replace an `out` that baker did not write.
+        Replace `out` even if baker did not write it.
     executor : TileExecutor, optional
-        Runs the tiles of the ray stages; None is this process.
+        Runs the tiles of the ray stages; by default, they run in this process.
     atlas : Atlas, optional
         Lightmap uv of the scene; its resolution and padding replace those of `settings`.
 
@@ -104,7 +104,7 @@ def _folder(
     channels: Mapping[str, Channel],
     force: bool,
 ) -> Path | None:
-    """Return the output folder; raises an error now if the bake could not be written in the end."""
+    """Return the output folder; raise an error before the bake if the result could not be written."""
     if out is None:
         return None
     check_encodings(settings.encode, channels)
@@ -115,7 +115,7 @@ def _folder(
 
 
 def _load(scene: Scene | str | Path, settings: BakeSettings, record: Record) -> Scene:
-    """Return the scene, read from a file unless it is loaded already."""
+    """Return the scene; read it if `scene` is a path."""
     with record.stage(Stage.LOAD):
         if not isinstance(scene, Scene):
             return load_for_bake(scene, settings)
@@ -124,7 +124,7 @@ def _load(scene: Scene | str | Path, settings: BakeSettings, record: Record) -> 
 
 
 def _layout(scene: Scene, atlas: Atlas | None, settings: BakeSettings, record: Record) -> Atlas:
-    """Return the lightmap uv, unwrapped unless it is given, and record the warnings so far."""
+    """Return `atlas`, or unwrap the scene if it is None; record the warnings about scene and atlas."""
     record.warnings.extend([*scene.warnings, *bake_warnings(scene, settings), *cache_warnings()])
     with record.stage(Stage.UNWRAP):
         atlas = atlas or unwrap_scene(scene, settings, record.progress)
@@ -141,7 +141,7 @@ def _trace(
     executor: TileExecutor,
     compiling: precompile.Process,
 ) -> TracedTexels:
-    """Run the ray stages, then free arrays that finishing does not read: 1 GB at 4096 texels a side."""
+    """Run the ray stages. Free arrays that finishing does not read, 1 GB for a page of 4096 texels a side."""
     executor.open(scene, atlas, settings)
     prepared = prepare_scene(scene, atlas, settings, record)
     if any(channel.needs_light for channel in channels.values()):
@@ -154,7 +154,7 @@ def _trace(
 
 
 def _write(result: BakeResult, folder: Path, force: bool, record: Record) -> BakeResult:
-    """Write the output folder and return the result with its manifest."""
+    """Write the output folder; return the result with `out` and `manifest`."""
     with record.stage(Stage.WRITE):
         manifest = write_bake(result, folder, force=force, progress=record.progress)
     return replace(result, out=folder, manifest=manifest)

@@ -1,4 +1,4 @@
-"""Finished pages from the values of texels, with the status and the statistics of each map."""
+"""Turns texel values into finished pages, and computes the status of texels and the statistics of maps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from baker.finish.finish import (
 from baker.finish.oidn import denoiser_name
 from baker.pipeline.record import Record
 
-# A texel counts as not converged if its standard error before denoising exceeds this share of its value.
+# Relative standard error before denoising above which a texel gets the status UNCONVERGED.
 UNCONVERGED = 0.25
 
 
@@ -35,8 +35,8 @@ class TracedTexels(NamedTuple):
     """Result of the ray stages.
 
     texels : TexelBuffer
-    valid : (n_front,) bool, texels with a valid point
-    transport : Transport
+    valid : (n_front,) bool, whether a front texel has a valid point
+    transport : Transport, values of the front texels
     """
 
     texels: TexelBuffer
@@ -61,18 +61,18 @@ def finish_pages(
     atlas : Atlas
         Its lightmap uv.
     traced : TracedTexels
-        Texels and their light.
+        Texels and their values.
     channels : mapping of str to Channel
-        Maps to make.
+        Channels to bake, by name.
     settings : BakeSettings
-        Of the bake.
+        Settings of the bake.
     record : Record
-        Timings, ray counts and warnings, which the result takes over.
+        Timings, ray counts and warnings, which are copied to the result.
 
     Returns
     -------
     BakeResult
-        Not written yet.
+        The result in memory; no file is written.
     """
     texels, valid = traced.texels, traced.valid
     n_front = texels.n_front
@@ -113,7 +113,10 @@ def _finished(
     progress: Progress,
     status: NDArray[np.uint8],
 ) -> dict[str, NDArray[np.float32]]:
-    """Return pages (n_pages, H, W, C) of each channel; mark dilated texels in `status` (n_pages, H, W)."""
+    """Return the pages (n_pages, H, W, C) float32 of each channel.
+
+    status : (n_pages, H, W) uint8, set to DILATED at dilated texels
+    """
     texels = traced.texels
     region = texels.page_image(texels.region, fill=-1)
     valid = texels.page_image(traced.valid, fill=False)
@@ -139,7 +142,7 @@ def _finished(
 
 
 def _page_layer(texels: TexelBuffer, layer: Layer, page: int) -> PageLayer:
-    """Return one page of a layer."""
+    """Return a layer's values, errors and mask on one page, as images."""
     return PageLayer(
         texels.page_image(layer.value, page=page),
         texels.page_image(layer.error, page=page),
@@ -149,10 +152,13 @@ def _page_layer(texels: TexelBuffer, layer: Layer, page: int) -> PageLayer:
 
 
 def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32], signed: bool) -> NDArray[np.bool_]:
-    """Return the texels whose summed standard error exceeds a share of their value, (n_front,) bool.
+    """Return (n_front,) bool: lit texels whose relative standard error exceeds `UNCONVERGED`.
 
-    The value is the mean of the components, of their sizes if they are signed. Values of dark texels are
-    raised to a twentieth of the geometric mean of their `chart`, (n_front,) int32.
+    The error is that of the sum of all layers. The value is the mean of the components, or of their absolute
+    values if they are signed. It is raised to at least a twentieth of the geometric mean over lit texels of
+    the chart.
+
+    chart : (n_front,) int32, chart of each texel
     """
     value = sum((np.abs(layer.value) if signed else layer.value).mean(axis=1) for layer in layers)
     error = np.sqrt(sum(_mean_square(layer.error) for layer in layers))
@@ -166,14 +172,14 @@ def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32], signed: bo
 
 
 def _mean_square(error: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (n,) float32: the squared error, its mean over groups if there are several."""
+    """Return (n,) float32: the square of errors (n,), or the mean square over groups of errors (n, G)."""
     square = np.square(error)
     mean: NDArray[np.float32] = square if square.ndim == 1 else square.mean(axis=1)
     return mean
 
 
 def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:
-    """Return the figures of one channel over its covered texels (n, C)."""
+    """Return the statistics of one channel over the values (n, C) of its covered texels."""
     if not value.size:
         return {"min": 0.0, "max": 0.0, "mean": 0.0, "clipped": 0, "invalid": invalid}
     return {

@@ -1,11 +1,11 @@
 """Compiles kernels in a second process while the first bake after an install reads its scene.
 
-Numba compiles one function at a time per process, and stores machine code on disk, where other processes find
-it. Run as `python -m baker.pipeline.precompile`: computes light from a single emitter at a few points and
-finishes a small page, so that these kernels are compiled and stored; it writes nothing else. The bake itself
-compiles the kernels of uv and texels meanwhile.
+Numba compiles one function at a time per process and stores the machine code on disk, from where other
+processes load it. The second process runs `python -m baker.pipeline.precompile`. It computes light from one
+emitter at a few points and finishes a small page, which compiles and stores these kernels. At the same time,
+the bake compiles the kernels for uv and texels.
 
-Kernels are imported inside functions: the process calls `skip_blas` first.
+Kernels are imported inside functions, because the process must call `skip_blas` before the import.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from baker.core.progress import Progress, report
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.stage import Stage
 
-# Seconds between two polls of the process.
+# Time between two polls of the process, seconds.
 _POLL = 0.1
-# Pixels along the side of the page, and number of texels lit.
+# Side of the small page, texels.
 _PAGE = 48
+# Number of texels at which light is computed.
 _TEXELS = 16
-# The process, or None where nothing has to be compiled.
+# The process, or None if nothing has to be compiled.
 Process = subprocess.Popen[bytes] | None
 
 
@@ -37,17 +38,17 @@ def start() -> Process:
     Returns
     -------
     Process
-        None if the kernels are on disk already, or if they cannot be stored there.
+        None if the compiled kernels are already on disk, or if they cannot be stored there.
     """
     from baker.finish.kernels.page_guard import hold_to_samples
     from baker.trace.kernel_cache import is_stored
 
-    # A kernel of the last step, `finish_pages`.
+    # Test a kernel of `finish_pages`, the last step.
     return _run() if is_stored(hold_to_samples) is False else None
 
 
 def restart_for_materials(process: Process, scene: Scene) -> Process:
-    """Restart if the scene has surfaces that let light through: their kernels are compiled differently.
+    """Restart the process if a material of the scene lets light through, because other kernels are needed.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
     Returns
     -------
     Process
-        The same one if no surface lets light through.
+        The given process if no material lets light through.
     """
     passing = [material for material in scene.materials if _passes(material)]
     if process is None or not passing:
@@ -70,7 +71,7 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
 
 
 def _passes(material: Material) -> bool:
-    """Return whether light passes a surface of the material, vertex colours aside."""
+    """Return whether factor and texture of the material have alpha below 1; vertex colours are ignored."""
     lowest = material.base_colour[3]
     if material.base_colour_texture is not None:
         alpha = material.base_colour_texture.image[..., 3]
@@ -85,7 +86,7 @@ def _run(*kind: str) -> Process:
 
 
 def wait_for_rays(process: Process, progress: Progress) -> None:
-    """Wait until the ray kernels are compiled, so that both processes do not compile the same ones.
+    """Wait until the ray kernels are compiled, so that this process does not compile the same kernels.
 
     Parameters
     ----------
@@ -97,12 +98,12 @@ def wait_for_rays(process: Process, progress: Progress) -> None:
     from baker.radiosity.kernels.gather import gather
     from baker.trace.kernel_cache import is_stored
 
-    # The last kernel that `cast_rays` compiles.
+    # Test the last kernel that `cast_rays` compiles.
     _wait(process, progress, lambda: is_stored(gather) is not False)
 
 
 def finish(process: Process, progress: Progress) -> None:
-    """Wait for the process to end. If it failed, kernels are compiled where they are used.
+    """Wait for the process to end. If it failed, this process compiles the kernels at their first call.
 
     Parameters
     ----------
@@ -139,12 +140,12 @@ def stop(process: Process) -> None:
 
 
 def cast_rays(kind: str = "") -> None:
-    """Compute the light of one emitter in empty space at a few texels: by shadow rays, then by gathering.
+    """Compute the light of one emitter at a few texels, first by shadow rays, then by a final gather.
 
     Parameters
     ----------
     kind : str
-        "holes" for an emitter with a MASK material, "glass" for one with a BLEND material.
+        "holes" for an emitter with a MASK material, "glass" for an emitter with a BLEND material.
     """
     from baker.core.atlas import Atlas, InstanceLayout
     from baker.core.geometry import world_geometry
@@ -170,16 +171,16 @@ def cast_rays(kind: str = "") -> None:
     rays = build_ray_tree(geometry, shading, threads=1)
     lookup = TriangleLookup(np.zeros((1, 16), np.float32), 16, 256)
 
-    # Points a metre in front of the emitter, facing it.
+    # Place the points one metre in front of the emitter, with normals towards it.
     origin, normal = np.zeros((_TEXELS, 16, 3), np.float32), np.zeros((_TEXELS, 16, 3), np.float32)
     origin[..., 2], normal[..., 2] = 1.0, -1.0
     buffers, points, shared = new_packet_buffers(rays.tracer), sobol_reversed(16, 0, 1), shared_bits_mask(16)
     seen, analytic = tile_emitters(emitters, origin), np.zeros(_TEXELS, np.uint8)
     needed = needed_shading(emitters, shading)
 
-    # Compile in the order in which a bake calls: choice of emitters, shadow rays, gather. In about
-    # the same time the bake compiles everything before direct light, the rays of gaps and form factors, and
-    # the matrix.
+    # Compile kernels in the order in which a bake calls them: choice of emitters, shadow rays, gather. The
+    # bake takes about the same time to compile the kernels of all stages before direct light, and those of
+    # narrow gaps and form factors.
     widest_view(emitters, origin)
     counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
     bounds = np.array([0, _TEXELS])
@@ -233,8 +234,8 @@ if __name__ == "__main__":
     from baker.trace.numba_start import skip_blas
 
     skip_blas()
-    # Compiling allocates millions of small objects but few cycles: garbage collection would take 5 % of the
-    # time.
+    # Disable garbage collection, which takes 5 % of the time: compilation allocates millions of small
+    # objects, but few reference cycles.
     gc.disable()
     cast_rays(*sys.argv[1:])
     finish_pages()

@@ -1,4 +1,4 @@
-"""Prepares a scene for the ray stages: texels with their valid points and sides, ray tree, lookup tables."""
+"""Prepares a scene for the ray stages: texels, their valid points and sides, ray tree, lookup tables."""
 
 from __future__ import annotations
 
@@ -33,30 +33,31 @@ from baker.trace.embree import RayScene
 
 @dataclass(frozen=True)
 class PreparedScene:
-    """A scene in the form that the ray stages of its bake read.
+    """The input of the ray stages.
 
     Attributes
     ----------
     scene : Scene
     settings : BakeSettings
     geometry : Geometry
-        Triangles, world space.
+        Triangles in world space.
     shading : Shading
         Materials of all triangles.
     texels : TexelBuffer
         The n texel entries: fronts, backs, and further sides of split texels.
     rays : RayScene
-        Ray tree; whoever prepared the scene closes it.
+        Ray tree; the caller of `prepare_scene` closes it.
     emitters : Emitters
-        Emissive triangles in clusters.
+        Emissive triangles, grouped in clusters.
     hit_kind : (T,) uint8
         Meaning of a first hit on each triangle, see `kernels.probe`.
     outside : (n_uncut,) uint16
-        Bit k is set where point k is outside geometry, of the entries before texels were split into sides.
+        For each of the n_uncut entries before texels were split into sides, a mask of its 16 points: bit k is
+        set if point k is outside geometry.
     sides : Sides
-        Result of the split.
+        Result of splitting texels into sides.
     job : TraceJob
-        Shared data of all ray stages, for the n entries.
+        Data of the n entries that all ray stages share.
     """
 
     scene: Scene
@@ -73,7 +74,7 @@ class PreparedScene:
 
     @property
     def sampling(self) -> EmitterSampling:
-        """Return the emitters with the numbers of rays that find them."""
+        """Return the emitters with the numbers of light and hemisphere rays per texel."""
         settings = self.settings
         n_light = settings.light_samples or settings.hemisphere_samples
         return EmitterSampling(self.emitters, self.shading, n_light, settings.hemisphere_samples)
@@ -95,16 +96,16 @@ def prepare_scene(
     atlas : Atlas
         Its lightmap uv.
     settings : BakeSettings
-        Of the bake.
+        Settings of the bake.
     record : Record
-        Takes timings and ray counts.
+        Receives timings and ray counts.
     outside : (n_uncut,) uint16, optional
-        Points outside geometry if they are known already, see `PreparedScene`.
+        Points outside geometry, see `PreparedScene`; computed here by default.
 
     Returns
     -------
     PreparedScene
-        To be closed by `rays.close()`.
+        The caller closes it with `rays.close()`.
     """
     threads = thread_count(settings.threads)
     with record.stage(Stage.TEXELS):

@@ -1,4 +1,4 @@
-"""Timings, ray counts and warnings of one bake, collected while its stages run."""
+"""Collects timings, ray counts and warnings while the stages of a bake run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.core.stage import Stage
 
 @dataclass
 class Record:
-    """Collects data about the run of a bake for the result and the manifest.
+    """Timings, ray counts, solve statistics and warnings of a bake, for the result and the manifest.
 
     Attributes
     ----------
@@ -24,11 +24,11 @@ class Record:
     timings : dict of str to float
         Seconds of each stage.
     rays : dict of str to int
-        Rays that each stage cast.
+        Number of rays that each stage cast.
     solve : dict
-        Figures of the radiosity solve.
+        Size, residual and energy of the radiosity solve.
     warnings : list of SceneWarning
-        In the order in which they were found.
+        Warnings in the order in which they occurred.
     """
 
     progress: Progress
@@ -39,7 +39,7 @@ class Record:
 
     @contextmanager
     def stage(self, name: Stage) -> Iterator[None]:
-        """Time a stage; the times of several visits are added.
+        """Measure the time of the body and add it to `timings`.
 
         Parameters
         ----------
@@ -49,7 +49,6 @@ class Record:
         Yields
         ------
         None
-            Nothing; the stage runs in the body.
         """
         report(self.progress, name, 0.0)
         start = time.perf_counter()

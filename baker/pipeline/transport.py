@@ -1,4 +1,4 @@
-"""Light transport of all texels: direct light, radiosity, final gather, ambient occlusion."""
+"""Computes the light transport of all texels: direct light, radiosity, final gather, ambient occlusion."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def trace_transport(
     channels : mapping of str to Channel
         Channels to bake, by name.
     record : Record
-        Takes timings, ray counts, figures of the solve, and warnings.
+        Receives timings, ray counts, statistics of the solve, and warnings.
     executor : TileExecutor, optional
-        Works on the tiles; None is this process.
+        Runs the tiles; by default, they run in this process.
 
     Returns
     -------
     Transport
-        Values of the front texels; None for those that no channel needs.
+        Values of the front texels. Quantities that no channel needs are None.
     """
     executor = executor or LocalTileExecutor()
     transport = Transport()
@@ -69,7 +69,7 @@ def trace_transport(
 
 
 def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> Transport:
-    """Direct light, radiosity and final gather."""
+    """Return the result of direct light, radiosity and final gather."""
     texels, sky = prepared.texels, np.array(prepared.settings.sky_radiance)
     if not prepared.scene.lights and not len(prepared.emitters.power) and not sky.any():
         record.warnings.append(
@@ -86,7 +86,7 @@ def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> T
     exitance = np.zeros((texels.n, 4), np.float32)
     if prepared.settings.bounces != 0:
         exitance[:, :3] = _reflected(prepared, direct.complete, level, record, executor)
-    # Free it: unused from here on.
+    # Free the direct light of all entries, which is not used below.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage(Stage.FINAL_GATHER):
         run = executor.runner(
@@ -108,12 +108,12 @@ def trace_direct_light(prepared: PreparedScene, run: TileRunner) -> DirectLight:
     prepared : PreparedScene
         The scene and the settings of the bake.
     run : TileRunner
-        Works on the tiles; what it leaves out stays 0.
+        Runs the tiles. Results of tiles that it skips stay 0.
 
     Returns
     -------
     DirectLight
-        Of all n entries.
+        Direct light of all n entries.
     """
     return direct_light(prepared.job.on(run), prepared.scene.local_lights, prepared.sampling)
 
@@ -128,16 +128,16 @@ def trace_final_gather(
     prepared : PreparedScene
         The scene and the settings of the bake.
     seen : SeenLight
-        Light that entries reflect, as rays find it.
+        Light that entries reflect, in a table that gather rays look up.
     analytic : (n,) uint8
-        1 for entries that have all light of emitters already.
+        1 for entries whose light from emitters is complete, so that the gather must not add it.
     run : TileRunner
-        Works on the tiles; what it leaves out stays 0.
+        Runs the tiles. Results of tiles that it skips stay 0.
 
     Returns
     -------
     Gathered
-        Of all front texels.
+        Light and ambient occlusion of all front texels.
     """
     settings = prepared.settings
     return final_gather(
@@ -152,19 +152,19 @@ def trace_final_gather(
 
 
 def trace_ambient_occlusion(prepared: PreparedScene, run: TileRunner) -> NDArray[np.float32]:
-    """Return the ambient occlusion of the front texels, from rays of its own.
+    """Return the ambient occlusion of the front texels, computed with separate rays.
 
     Parameters
     ----------
     prepared : PreparedScene
         The scene and the settings of the bake.
     run : TileRunner
-        Works on the tiles; what it leaves out stays 0.
+        Runs the tiles. Results of tiles that it skips stay 0.
 
     Returns
     -------
     (n_front,) float32
-        From 0, closed, to 1, open.
+        Ambient occlusion from 0, fully occluded, to 1, unoccluded.
     """
     settings = prepared.settings
     return ambient_occlusion(
@@ -182,9 +182,10 @@ def _reflected(
     record: Record,
     executor: TileExecutor,
 ) -> NDArray[np.float32]:
-    """Return (n, 3) float32, lx: light that each entry reflects, without the bounce of the final gather.
+    """Return (n, 3) float32, lx: the radiosity of each entry, which the final gather then reads.
 
-    complete : (n, 3) float32, lx, direct light; level : (n,) uint8, of each entry in gaps, see `gap_level`
+    complete : (n, 3) float32, lx, direct light of each entry
+    level : (n,) uint8, how narrow the gap at each entry is, see `gap_level`
     """
     texels, settings = prepared.texels, prepared.settings
     sky: NDArray[np.float64] = np.array(settings.sky_radiance, np.float64)
@@ -199,7 +200,8 @@ def _reflected(
         albedo = patches.mean(texels.albedo, weight)
         from_sky = np.pi * matrix.open * sky
         direct = patches.mean(complete, weight) + from_sky
-        # Direct light is multiplied by the albedo of its own texel; the sky's share is known per patch.
+        # Multiply direct light by the albedo of each texel, and light of the sky, known per patch only, by
+        # the mean albedo of the patch.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
         solution = solve_radiosity(
             matrix,
