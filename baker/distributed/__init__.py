@@ -1,1 +1,1 @@
-"""The tiles of one bake, or whole bakes, on a dask.distributed cluster."""
+"""Runs the tiles of one bake, or whole bakes, on the workers of a dask.distributed cluster."""

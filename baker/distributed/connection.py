@@ -1,6 +1,7 @@
-"""Connects to a dask.distributed cluster; the only file that imports it.
+"""Connects to a dask.distributed cluster; no other file imports `distributed`.
 
-The scheduler sends the data of tasks to each worker once, and reruns the tasks of a lost worker on others.
+The scheduler sends the data that tasks share to each worker once. If a worker is lost, its tasks are rerun on
+other workers.
 """
 
 from __future__ import annotations
@@ -18,29 +19,31 @@ from baker.core.stage import Stage
 from baker.distributed.tile_worker import Result, Span, TileWorker
 from baker.io.bake.manifest import library_versions
 
-# Seconds to find a scheduler, and seconds without any worker before the work is cancelled.
+# Timeout for connecting to a scheduler with workers, and for closing the connection, seconds.
 _CONNECT = 10
+# Time without any worker after which the work is cancelled, seconds.
 _ALONE = 30.0
-# Seconds between two checks of the workers.
+# Time between two checks for workers, seconds.
 _POLL = 1.0
 
 
 class Cluster:
-    """Many workers of one or more machines.
+    """A connection to the workers of a cluster.
 
     Parameters
     ----------
     address : str
         "tcp://HOST:8786" of a scheduler, or "local:N" for N worker processes of this machine.
     threads : int
-        Threads of all workers of "local:N" together.
+        Number of threads that the N workers of "local:N" share.
 
     Raises
     ------
     SettingsError
-        If the address is neither.
+        If the address has neither of these forms.
     ResourceError
-        If dask.distributed is not installed, there is no scheduler or worker, or a worker has other versions.
+        If dask.distributed is not installed, no scheduler with a worker answers, or a worker has different
+        library versions.
     """
 
     def __init__(self, address: str, *, threads: int = 1) -> None:
@@ -54,7 +57,7 @@ class Cluster:
             message = "a cluster needs dask.distributed; install it with: pip install distributed"
             raise ResourceError(message) from None
         dask: Any = distributed  # its functions have no type annotations
-        # Failures of workers are reported by this file, as sentences.
+        # Suppress the log, because `result` raises an error for each failure of a worker.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._local: Any = None
         if kind == "local":
@@ -85,7 +88,7 @@ class Cluster:
             raise
 
     def workers(self) -> dict[str, int]:
-        """Return the threads of each worker, by its address."""
+        """Return the number of threads of each worker, by address of the worker."""
         found: dict[str, int] = dict(self._client.nthreads())
         return found
 
@@ -94,7 +97,7 @@ class Cluster:
         return self._client.scatter([value], broadcast=True, hash=False)[0]
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Run `work(*arguments)` in some worker and return the task."""
+        """Run `work(*arguments)` in a worker that the scheduler chooses; return the task."""
         return self._client.submit(_checked, library_versions(), work, *arguments, pure=False)
 
     def finished(self, tasks: Sequence[Any]) -> list[Any]:
@@ -107,9 +110,10 @@ class Cluster:
         Raises
         ------
         BakerError
-            If the task raised one, or its workers died.
+            If the task raised a `BakerError`, or if workers died repeatedly while they ran it.
         KeyError
-            If its data were lost with the worker that held them: send and submit again.
+            If data of the task were lost together with a worker. Send the data again, and submit the task
+            again.
         """
         try:
             if task.status == "finished":
@@ -131,7 +135,7 @@ class Cluster:
         return bool(self._client.scheduler_info()["workers"])
 
     def close(self) -> None:
-        """Disconnect; workers of "local:N" end."""
+        """Disconnect, and stop the workers of "local:N"."""
         for part in (getattr(self, "_client", None), self._local):
             if part is not None:
                 # The cluster kills a worker that does not respond.
@@ -155,7 +159,7 @@ def _compare(address: str, here: Mapping[str, Any], there: Mapping[str, Any]) ->
 
 
 def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any) -> Any:
-    """Run in a worker: refuse if its versions differ (it may have joined later)."""
+    """Run in a worker: check its versions first, because it may have joined after `_check_versions`."""
     from distributed import get_worker
 
     _compare(get_worker().address, versions, library_versions())
@@ -163,7 +167,7 @@ def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any
 
 
 class WorkerWatch:
-    """Raises an error when a cluster has had no worker for too long."""
+    """Raises an error if a cluster has had no worker for `_ALONE` seconds."""
 
     def __init__(self, cluster: Cluster) -> None:
         self.cluster = cluster
@@ -188,7 +192,7 @@ class WorkerWatch:
 
 
 def held_bakes() -> dict[str, TileWorker]:
-    """Run in a worker: return its bakes, by hash."""
+    """Run in a worker: return the `TileWorker` objects that the worker keeps, by hash of the bake."""
     from distributed import get_worker
 
     held: dict[str, TileWorker] = vars(get_worker()).setdefault("baker_bakes", {})
@@ -209,11 +213,11 @@ def work_on_tiles(
     arrays: Mapping[str, NDArray[Any]],
     spans: list[Span],
 ) -> Result:
-    """Run in a worker: return the results of tiles of the bake with this hash."""
+    """Run in a worker: return the results of the tiles `spans` of the bake with the hash `key`."""
     held = held_bakes()
     if key not in held:
         scene, atlas, settings = parts
-        # One bake at a time: free the ray tree of the last one.
+        # Keep one bake at a time: free the ray tree of the previous bake.
         held.clear()
         threads = {"threads": worker_threads()}
         held.setdefault(key, TileWorker(scene, atlas, settings.model_copy(update=threads)))

@@ -1,4 +1,4 @@
-"""Runs whole bakes on a cluster: sends the scene, receives the finished pages, and writes them here."""
+"""Runs whole bakes on a cluster: sends scenes to workers, receives pages, and writes output folders."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from baker.pipeline.bake import bake
 
 
 class DistributedJobExecutor:
-    """Runs whole bakes on the workers of a cluster, one at a time on each; an executor of `jobs.executor`.
+    """Runs one bake at a time on each worker of a cluster; implements `jobs.executor.JobExecutor`.
 
     Parameters
     ----------
     cluster : Cluster
-        Connected.
+        A connected cluster.
     """
 
     def __init__(self, cluster: Cluster) -> None:
@@ -36,7 +36,7 @@ class DistributedJobExecutor:
         self._failed: list[Event] = []
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Read the scene and send it; a worker uses all its threads."""
+        """Read the scene and send it to a worker, which bakes with all its threads and ignores `threads`."""
         assert job.out is not None
         try:
             check_out(job.out, force=force, scene_path=job.scene)
@@ -46,7 +46,7 @@ class DistributedJobExecutor:
             self._failed.append(Event(ticket, ended=True, error=describe(error)))
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait until a bake has ended, and write it."""
+        """Wait at most `timeout` seconds for the end of a bake, and write its output folder."""
         end = time.monotonic() + timeout
         while not self._failed:
             for task in self.cluster.finished(list(self._tasks)):
@@ -58,12 +58,12 @@ class DistributedJobExecutor:
         return self._failed.pop(0)
 
     def close(self) -> None:
-        """Disconnect; running bakes are not written."""
+        """Disconnect; the output folders of running bakes are not written."""
         self._tasks.clear()
         self.cluster.close()
 
     def _send(self, ticket: int, job: Job, scene: Scene, force: bool) -> None:
-        # Source file and path are needed for writing only.
+        # Do not send the source document and the path, which only `write_bake` needs.
         light = replace(scene, source=None, path=None)
         task = self.cluster.submit(bake_scene, light, job.settings)
         self._tasks[task] = (ticket, job, scene, force)

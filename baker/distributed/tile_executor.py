@@ -20,21 +20,20 @@ from baker.core.stage import Stage
 from baker.distributed.connection import Cluster, WorkerWatch, work_on_tiles
 from baker.distributed.tile_worker import Span
 
-# Tasks per thread and stage: few, since each has an overhead, but enough that all threads end at about the
-# same time.
+# Number of tasks per thread and stage. More tasks balance the threads better, but each task has an overhead.
 _TASKS_PER_THREAD = 8
-# Largest number of tiles in a task: a lost worker loses one task per thread.
+# Largest number of tiles in a task. It limits the work that is repeated if a worker is lost.
 _MAX_TILES = 64
 _POLL = 0.02
 
 
 class DistributedTileExecutor:
-    """Runs tiles on the workers of a cluster; a `core.executor.TileExecutor`.
+    """Runs tiles on the workers of a cluster; implements `core.executor.TileExecutor`.
 
     Parameters
     ----------
     cluster : Cluster
-        Connected.
+        A connected cluster.
     """
 
     def __init__(self, cluster: Cluster) -> None:
@@ -45,7 +44,7 @@ class DistributedTileExecutor:
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
         """Send scene, atlas and settings to each worker, once."""
-        # Source file and path are needed for writing only.
+        # Do not send the source document and the path, which only writing needs.
         self._parts = (replace(scene, source=None, path=None), atlas, settings)
         self._key = hashlib.sha256(pickle.dumps(self._parts, 5)).hexdigest()
         self._sent = self.cluster.send(self._parts)
@@ -73,7 +72,7 @@ class DistributedTileExecutor:
         return run
 
     def close(self) -> None:
-        """Release the scene; workers keep it until the next bake."""
+        """Release the scene in this process; workers keep their copy until the next bake."""
         self._parts = self._sent = None
 
     def _submitter(self, stage: Stage, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:
@@ -82,7 +81,7 @@ class DistributedTileExecutor:
         def submit(spans: list[Span], again: bool) -> Any:
             nonlocal sent
             if again:
-                # The data were lost with the only worker that held them.
+                # Send the data again, because they were lost together with a worker.
                 self._sent, sent = self.cluster.send(self._parts), self.cluster.send(arrays)
             return self.cluster.submit(work_on_tiles, self._key, self._sent, stage, sent, spans)
 
@@ -90,7 +89,7 @@ class DistributedTileExecutor:
 
 
 class _Stage:
-    """The tasks of one stage."""
+    """Submits the tasks of one stage and collects their results."""
 
     def __init__(self, cluster: Cluster, submit: Callable[[list[Span], bool], Any]) -> None:
         self.cluster = cluster

@@ -1,7 +1,7 @@
-"""Works on tiles of a bake that is distributed over several workers; runs in a worker.
+"""Computes tiles of a distributed bake; runs in a worker.
 
-The worker builds texels, ray tree and tables from the same scene, atlas and settings as the process that
-started the bake, so both have the same bytes. Only results of earlier stages have to be sent.
+The worker builds texels, ray tree and lookup tables from the same scene, atlas and settings as the process
+that started the bake, so both have identical arrays. Only results of earlier stages are sent in addition.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from baker.radiosity.patches import build_patches
 
 Span = tuple[int, int]
 Result = list[tuple[int, int, Part]]
-# Results of earlier stages, by name.
+# Results of earlier stages: name -> array.
 Arrays = Mapping[str, NDArray[Any]]
-# Runs a stage with a tile runner.
+# Function that runs a prepared stage with the given tile runner.
 StageWork = Callable[[TileRunner], object]
 
 
 @dataclass
 class TileWorker:
-    """Works on tiles of one bake.
+    """Computes tiles of one bake; the scene is prepared at the first call of `work`.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class TileWorker:
     atlas : Atlas
         Its lightmap uv.
     settings : BakeSettings
-        Of the bake.
+        The settings of the bake.
     """
 
     scene: Scene
@@ -61,7 +61,7 @@ class TileWorker:
     _ready: tuple[Stage, StageWork] | None = None
 
     def work(self, stage: Stage, arrays: Arrays, spans: list[Span]) -> Result:
-        """Return the results of some tiles of a stage.
+        """Return the results of the tiles `spans` of a stage.
 
         Parameters
         ----------
@@ -70,12 +70,12 @@ class TileWorker:
         arrays : mapping of str to array
             Results of earlier stages, the same for all tiles of a stage.
         spans : list of (begin, end)
-            Tiles as the stage itself cuts them.
+            Tiles as ranges of items, end exclusive, with the bounds that the stage would use itself.
 
         Returns
         -------
         list of (begin, end, part)
-            Of each tile.
+            One for each tile; `part` is the result of the tile.
         """
         run_stage = self._stage(stage, arrays)
         found: Result = []
@@ -87,12 +87,12 @@ class TileWorker:
         return found
 
     def _stage(self, stage: Stage, arrays: Arrays) -> StageWork:
-        """Return the stage, prepared once for all tiles; other threads of this worker wait for it."""
+        """Return the function that runs a stage, prepared once; other threads of this worker wait for it."""
         with self._lock:
             if self._prepared is None:
                 record = Record(silent)
                 prepared = prepare_scene(self.scene, self.atlas, self.settings, record, arrays["outside"])
-                # No point cache here: it is complete only where one process works on every tile.
+                # Remove the point cache, which is complete only if one process computes every tile.
                 self._prepared = replace(prepared, job=replace(prepared.job, point_cache=None))
             if self._ready is None or self._ready[0] != stage:
                 self._ready = stage, STAGES[stage](self._prepared, arrays)
@@ -111,7 +111,7 @@ def _form_factors(prepared: PreparedScene, arrays: Arrays) -> StageWork:
 
 
 def _final_gather(prepared: PreparedScene, arrays: Arrays) -> StageWork:
-    # Arrays of a task are read-only, and `seen_light` writes a column.
+    # Copy the array, because arrays of a task are read-only and `seen_light` writes to a column.
     seen = prepared.sides.seen_light(np.array(arrays["exitance"]))
     return lambda run: trace_final_gather(prepared, seen, arrays["analytic"], run)
 
@@ -120,7 +120,7 @@ def _ambient_occlusion(prepared: PreparedScene, arrays: Arrays) -> StageWork:
     return lambda run: trace_ambient_occlusion(prepared, run)
 
 
-# Of each stage with tiles, the function that prepares it from results of earlier stages.
+# Stage with tiles -> function that prepares it from the results of earlier stages.
 STAGES: dict[Stage, Callable[[PreparedScene, Arrays], StageWork]] = {
     Stage.DIRECT_LIGHT: _direct_light,
     Stage.FORM_FACTORS: _form_factors,

@@ -1,1 +1,1 @@
-"""Bakes many scenes: which are out of date, worker processes, limits on memory."""
+"""Bakes the scenes of a job file that are not up to date, in worker processes, within a memory limit."""

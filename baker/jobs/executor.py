@@ -1,4 +1,4 @@
-"""Where jobs are baked: worker processes of this machine."""
+"""Defines `JobExecutor`, and implements it with worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from baker.jobs.jobs_file import Job
 
 @dataclass(frozen=True)
 class Event:
-    """Progress or the end of a job.
+    """A progress report of a job, or its end.
 
     Attributes
     ----------
     ticket : int
-        The job's number.
+        Number of the job, as given to `start`.
     stage : str
     fraction : float
-        Share of the stage that is done, 0 to 1.
+        Completed share of the stage, 0 to 1.
     ended : bool
     error : dict or None
-        {kind, message, file, object, code} if it failed.
+        {kind, message, file, object, code} if the job failed.
     """
 
     ticket: int
@@ -41,29 +41,29 @@ class Event:
 
 
 class JobExecutor(Protocol):
-    """Bakes a few jobs at a time."""
+    """Bakes up to `slots` jobs at the same time."""
 
     @property
     def slots(self) -> int:
-        """Count the jobs that may run at a time."""
+        """Return the number of jobs that may run at the same time."""
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Begin a job; no more than `slots` at a time."""
+        """Start a job; the caller never has more than `slots` jobs running."""
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait at most `timeout` seconds for an event of any job."""
+        """Return the next event of any job, or None if there is none within `timeout` seconds."""
 
     def close(self) -> None:
-        """Stop all jobs immediately; their output folders are unchanged."""
+        """Stop all jobs immediately; the output folders of unfinished jobs are unchanged."""
 
 
 class LocalJobExecutor:
-    """Bakes in worker processes that stay alive from job to job.
+    """Bakes in worker processes; each process bakes one job after another.
 
     Parameters
     ----------
     slots : int
-        Largest number of processes; each is started for its first job.
+        Largest number of processes. A process is started when a job needs it.
     """
 
     def __init__(self, slots: int) -> None:
@@ -73,13 +73,13 @@ class LocalJobExecutor:
         self._busy: dict[_Worker, tuple[int, Job]] = {}
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Send a job to an idle worker, or to a new one."""
+        """Send a job to an idle worker, or to a new worker if none is idle."""
         worker = self._idle.pop() if self._idle else _Worker(self._heard)
         self._busy[worker] = (ticket, job)
         worker.begin(job, threads=threads, force=force)
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait at most `timeout` seconds for an event of any worker."""
+        """Return the next event of any worker, or None if there is none within `timeout` seconds."""
         try:
             worker, message = self._heard.get(timeout=timeout)
         except queue.Empty:
@@ -109,7 +109,7 @@ class LocalJobExecutor:
 
 
 class _Worker:
-    """One process, and the thread that reads its messages."""
+    """A worker process, and the thread that reads its messages."""
 
     def __init__(self, heard: queue.SimpleQueue[tuple[_Worker, dict[str, Any]]]) -> None:
         self.heard = heard
@@ -121,7 +121,7 @@ class _Worker:
         settings = job.settings.model_dump(mode="json", exclude_none=True) | {"threads": threads}
         task = {"scene": os.fspath(job.scene), "out": str(job.out), "settings": settings, "force": force}
         assert self.process.stdin is not None
-        # If it has died meanwhile, the listening thread reports it.
+        # If the process has died, writing fails, and the listening thread reports the death.
         with contextlib.suppress(OSError):
             self.process.stdin.write(json.dumps(task).encode() + b"\n")
             self.process.stdin.flush()
@@ -133,7 +133,7 @@ class _Worker:
         self.heard.put((self, {"dead": True, "error": _death(self.process.wait())}))
 
     def end(self, job: Job | None) -> None:
-        """Kill the process, and remove its unfinished output of `job`."""
+        """Kill the process, and remove the unfinished output of `job`, its current job."""
         self.process.kill()
         self.process.wait()
         self.listener.join()
@@ -147,7 +147,7 @@ class _Worker:
 
 
 def _death(status: int) -> dict[str, Any]:
-    # SIGKILL is sent by a user or by the operating system; other signals are crashes of native code.
+    # A user or the operating system (out of memory) sends SIGKILL; other signals are crashes of native code.
     if status == -9:
         why = "its process was killed from outside, most likely for want of memory"
     else:

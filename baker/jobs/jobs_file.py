@@ -1,9 +1,9 @@
-"""Reads JOBS.toml: which scenes are baked into which folders, with which settings.
+"""Reads a job file (TOML): scenes, their output folders and their settings.
 
     [defaults]             any setting of a bake, and `out`
     [[job]]                `scene` or `glob`, `out`, any setting
 
-Paths begin at the folder of the file, so that the whole tree can be moved.
+Paths are relative to the folder of the job file, so that the folder can be moved with its scenes.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ _WILD = re.compile(r"[*?\[]")
 
 @dataclass(frozen=True)
 class Job:
-    """One scene to be baked into one folder.
+    """A scene to bake and its output folder.
 
     Attributes
     ----------
     scene : Path
-        The scene file; the pattern itself where a glob found nothing.
+        The scene file. If a glob matched no file, the pattern.
     out : Path or None
-        The output folder; None where a glob found nothing.
+        The output folder. None if a glob matched no file.
     settings : BakeSettings
     problem : str
-        Why the job cannot even be tried; empty for most.
+        Why the job cannot be started; empty if it can.
     """
 
     scene: Path
@@ -45,21 +45,22 @@ class Job:
 
 
 def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
-    """Return the jobs of a file, in its order; a glob's scenes are sorted by name.
+    """Return the jobs of a file, in the order of the file; the scenes of a glob are sorted by name.
 
     Parameters
     ----------
     path : Path
-        TOML file.
+        The job file.
     overrides : dict
-        Settings from the command line; they override those of every job.
+        Settings from the command line; they override the settings of every job.
 
     Raises
     ------
     InputError
         If the file is missing or unreadable.
     SettingsError
-        If it is not TOML, names an unknown key, or gives two jobs one output folder.
+        If the file is not TOML, contains an unknown key or an invalid setting, gives two jobs the same output
+        folder, or puts one output folder inside another.
     """
     document = _parse(path)
     defaults = document.get("defaults", {})
@@ -110,7 +111,7 @@ def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, .
 
 
 def _expand(path: Path, where: str, table: dict[str, Any], overrides: dict[str, Any]) -> list[Job]:
-    """Return the jobs of one table."""
+    """Return the jobs of one `[[job]]` table: one for each scene."""
     values = {key.replace("-", "_"): value for key, value in table.items()}
     given = {key: _words(path, where, key, values.pop(key)) for key in ("scene", "glob") if key in values}
     if len(given) != 1:
@@ -145,14 +146,14 @@ def _words(path: Path, where: str, key: str, value: Any) -> list[str]:
 
 
 def _find(path: Path, where: str, pattern: str) -> list[Path]:
-    """Return the scene files that match a pattern, without hidden files and files written by bakes."""
+    """Return the scene files that match a pattern, except hidden files and files that bakes have written."""
     import glob
 
     from baker.io.load import IMPORTERS
 
     base = path.parent
     found = []
-    # Not Path.glob: it takes no absolute pattern and finds hidden files.
+    # Path.glob does not fit: it accepts no absolute pattern, and finds hidden files.
     for name in sorted(glob.glob(pattern, root_dir=base, recursive=True)):  # noqa: PTH207
         scene = base / name
         if not scene.is_file() or scene.suffix.lower() not in IMPORTERS.names():
@@ -163,7 +164,7 @@ def _find(path: Path, where: str, pattern: str) -> list[Path]:
 
 
 def _written_by_a_bake(scene: Path, base: Path) -> bool:
-    # `**/*.glb` must not find the `scene.glb` of yesterday's bakes.
+    # A pattern such as `**/*.glb` must not match the `scene.glb` in the output folders of earlier bakes.
     for folder in scene.parents:
         if (folder / "bake.json").is_file():
             own = own_files(folder)
@@ -175,7 +176,7 @@ def _written_by_a_bake(scene: Path, base: Path) -> bool:
 
 
 def _output(path: Path, where: str, pattern: str, scene: Path) -> Path:
-    """Return the output folder of a scene: `{stem}` is its name, `{parent}` the name of its folder."""
+    """Return `pattern` with `{stem}` (scene's file name) and `{parent}` (name of its folder) filled in."""
     words = {"stem": scene.stem, "parent": scene.resolve().parent.name}
 
     def put(match: re.Match[str]) -> str:
@@ -188,7 +189,7 @@ def _output(path: Path, where: str, pattern: str, scene: Path) -> Path:
 
 
 def _check_outputs(path: Path, jobs: list[Job]) -> None:
-    """Refuse two jobs with one output folder, and an output folder inside another."""
+    """Raise if two jobs have the same output folder, or if an output folder is inside another."""
     owner: dict[str, Job] = {}
     for job in jobs:
         if job.out is None:

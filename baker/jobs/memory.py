@@ -1,4 +1,4 @@
-"""The memory that a bake takes at its peak, and sizes as people write them."""
+"""Estimates the peak memory of a bake; parses and formats sizes such as "8G"."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def parse_size(text: str) -> int:
     Raises
     ------
     SettingsError
-        If the text is no such size.
+        If the text is not a size, or the size is 0.
     """
     match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([KMGT]?)(?:I?B)?\s*", text.upper())
     size = 0 if match is None else int(float(match.group(1)) * _UNITS[match.group(2)])
@@ -30,7 +30,7 @@ def parse_size(text: str) -> int:
 
 
 def size_words(size: int) -> str:
-    """Return a size as one would type it."""
+    """Return a size in bytes as text, such as "1.5G", with three digits."""
     for unit in ("T", "G", "M", "K"):
         if size >= _UNITS[unit]:
             return f"{size / _UNITS[unit]:.3g}{unit}"
@@ -38,12 +38,12 @@ def size_words(size: int) -> str:
 
 
 def estimate_peak(path: Path, settings: BakeSettings) -> int:
-    """Estimate the most memory that a bake of this scene takes, bytes.
+    """Estimate the peak memory of a bake of this scene, bytes.
 
     Parameters
     ----------
     path : Path
-        The scene is read, but nothing of it is kept.
+        The scene file, which is read for the estimate.
     settings : BakeSettings
 
     Raises

@@ -1,4 +1,4 @@
-"""A batch as one call, and its report."""
+"""Runs a batch with one function, and reports the outcomes."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ class BatchReport(Result):
     Attributes
     ----------
     outcomes : list of Outcome
-        One for each job, in their order.
+        One for each job, in the order of the job file.
     dry_run : bool
-        Whether nothing was baked, and the states are those that a batch would give.
+        Whether this was a dry run: nothing was baked, and the states are those that a batch is expected to
+        give.
     """
 
     outcomes: list[Outcome]
@@ -43,7 +44,7 @@ class BatchReport(Result):
         return {state: counts[state] for state in ("baked", "unchanged", "failed")}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as plain values, the object of `baker batch` as JSON."""
+        """Return the report as plain values: the JSON object that `baker batch --json` prints."""
         return batch_json(self.outcomes, dry_run=self.dry_run)
 
 
@@ -62,13 +63,13 @@ def run_jobs_file(
     jobs_file : Path
         TOML file of scenes and settings.
     settings : BatchSettings
-        Processes, memory, seed, and the jobs to bake.
+        Settings of the batch: processes, memory, seed and others.
     progress : Progress
-        Called with all jobs as one stage; a truthy return value stops them all.
+        Called with the progress of all jobs as one stage; a truthy return value stops the batch.
     executor : callable, optional
-        Returns the executor of the jobs; default: processes on this machine. Not called in a dry run.
+        Returns the executor of the jobs. The default runs processes on this machine. Not called in a dry run.
     starting : callable
-        Called with each output folder before anything is done there.
+        Called with each output folder before anything is written to it.
 
     Returns
     -------
@@ -80,7 +81,7 @@ def run_jobs_file(
     InputError
         If the file cannot be read.
     SettingsError
-        If it is not TOML, or a setting in it is wrong.
+        If the file is not TOML, or a setting in it is invalid.
     Cancelled
         If `progress` returned a truthy value.
     """

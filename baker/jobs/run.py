@@ -1,4 +1,4 @@
-"""Runs the bakes that are not up to date, within limits on processes and memory."""
+"""Runs the jobs that are not up to date, within limits on the number of processes and on memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from baker.jobs.executor import Event, JobExecutor
 from baker.jobs.jobs_file import Job
 from baker.jobs.up_to_date import Freshness, check_output
 
-# Seconds between two polls of locks held by other runs, and of the progress callback.
+# Time between two progress reports, and between two attempts to acquire a lock, seconds.
 _LOOK = 0.1
 
 
@@ -31,11 +31,11 @@ class BatchOptions:
     Attributes
     ----------
     threads : int or None
-        Threads of all bakes together; None is all cores.
+        Threads that all running bakes share; None uses all cores.
     memory : int or None
-        Bytes that all bakes together may take; None is no limit.
+        Limit of the estimated memory of all running bakes together, bytes; None is no limit.
     force : bool
-        Also bake jobs that are up to date, and into folders that baker did not write.
+        Also bake jobs that are up to date, and write into folders that baker did not write.
     fail_fast : bool
         Start no further jobs after a failure.
     dry_run : bool
@@ -57,11 +57,11 @@ class Outcome:
     ----------
     job : Job
     state : str
-        "baked", "unchanged" or "failed"; of a dry run, the expected state.
+        "baked", "unchanged" or "failed"; in a dry run, the expected state.
     why : str
     seconds : float
     code : int
-        The exit code of a failure, else 0.
+        Exit code for a failed job; 0 otherwise.
     """
 
     job: Job
@@ -73,7 +73,7 @@ class Outcome:
 
 @dataclass
 class _Ticket:
-    """A job on its way."""
+    """A job that needs a bake, and its progress."""
 
     number: int
     job: Job
@@ -94,18 +94,18 @@ def run_batch(
     progress: Progress,
     starting: Callable[[Path], None] = lambda out: None,
 ) -> list[Outcome]:
-    """Bake the jobs that are not up to date, in their order, several at a time.
+    """Bake the jobs that are not up to date; start them in order, several at a time.
 
     Parameters
     ----------
     jobs : sequence of Job
     executor : JobExecutor
-        Does the work; closed at the end.
+        Bakes the jobs; it is closed at the end.
     options : BatchOptions
     progress : Progress
-        Called with all jobs as one stage; a truthy return value stops them all.
+        Called with the progress of all jobs as one stage; a truthy return value stops the batch.
     starting : callable
-        Called with each output folder before anything is written there.
+        Called with each output folder before anything is written to it.
 
     Returns
     -------
@@ -115,8 +115,8 @@ def run_batch(
     Raises
     ------
     Cancelled
-        If `progress` returned a truthy value. Finished jobs are kept; the output folders of the others are
-        unchanged.
+        If `progress` returned a truthy value. The output of finished jobs is kept; the output folders of
+        other jobs are unchanged.
     """
     try:
         return _Run(jobs, executor, options, progress, starting).run()
@@ -136,7 +136,7 @@ class _Run:
     running: dict[int, _Ticket] = field(default_factory=dict)
 
     def run(self) -> list[Outcome]:
-        """Examine every job, then bake."""
+        """Examine every job, bake those that need it, and return the outcomes."""
         self.survey()
         if not self.options.dry_run:
             try:
@@ -148,14 +148,14 @@ class _Run:
                         self.hear(event)
                     self.report_all(blocked=blocked)
             finally:
-                # Keep the locks until running jobs have ended and their unfinished output is removed.
+                # Keep the locks until running jobs are stopped and their unfinished output is removed.
                 self.executor.close()
                 for ticket in self.running.values():
                     _release(ticket)
         return [self.outcomes[number] for number in range(len(self.jobs))]
 
     def survey(self) -> None:
-        """Sort the jobs into unchanged, failed already, and to be baked."""
+        """Examine all jobs in parallel: store the outcome, or queue the job if it needs a bake."""
         pool = ThreadPoolExecutor(thread_count(self.options.threads))
         try:
             examined = [pool.submit(self.examine, number, job) for number, job in enumerate(self.jobs)]
@@ -172,7 +172,7 @@ class _Run:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def examine(self, number: int, job: Job) -> Outcome | _Ticket:
-        """Return the outcome of one job that needs no bake, else a ticket for the bake."""
+        """Return the outcome of a job that is up to date or cannot be baked, else a ticket for the bake."""
         start = time.perf_counter()
         if job.out is None:
             return Outcome(job, "failed", job.problem, code=3)
@@ -188,7 +188,7 @@ class _Run:
             return _failure(job, error, time.perf_counter() - start)
 
     def peak(self, job: Job) -> int:
-        """Estimate the memory of a job, bytes; 0 without a memory limit."""
+        """Estimate the peak memory of a job, bytes; return 0 if there is no memory limit."""
         limit = self.options.memory
         if limit is None:
             return 0
@@ -201,7 +201,7 @@ class _Run:
         return peak
 
     def start_some(self) -> None:
-        """Start waiting jobs while there are slots and memory; pass over those locked by other runs."""
+        """Start waiting jobs while slots and memory are free; skip jobs locked by another run."""
         for ticket in list(self.waiting):
             if len(self.running) >= self.executor.slots:
                 return
@@ -211,7 +211,7 @@ class _Run:
             self.start(ticket)
 
     def start(self, ticket: _Ticket) -> None:
-        """Start a job if its output folder is free and still needs it."""
+        """Start a job if its output folder is not locked and still out of date."""
         job = ticket.job
         assert job.out is not None
         try:
@@ -226,11 +226,11 @@ class _Run:
             sweep(job.out)
             if not self.options.force:
                 seen = check_output(job.out, ticket.sha256, job.settings)
-                # Another run may have baked it meanwhile.
+                # Another run may have baked the job in the meantime.
                 if seen.fresh:
                     self.finish(ticket, Outcome(job, "unchanged", seen.why))
                     return
-            # Threads are shared by those that will run at the same time.
+            # Divide the threads by the number of jobs that will run at the same time.
             beside = min(self.executor.slots, len(self.running) + 1 + len(self.waiting))
             threads = max(thread_count(self.options.threads) // beside, 1)
             ticket.started = time.perf_counter()
@@ -246,7 +246,7 @@ class _Run:
             self.finish(ticket, _failure(job, error, 0.0))
 
     def hear(self, event: Event) -> None:
-        """Take news of a job."""
+        """Store the progress of a running job, or its outcome if it has ended."""
         ticket = self.running[event.ticket]
         if not event.ended:
             ticket.stage, ticket.fraction = event.stage, event.fraction
@@ -271,7 +271,7 @@ class _Run:
         _release(ticket)
 
     def report_all(self, *, blocked: bool) -> None:
-        """Report all jobs as one stage."""
+        """Report the progress of all jobs as one stage; `blocked`: all jobs wait for locks of other runs."""
         n = len(self.jobs)
         names = [f"{t.job.scene.stem}: {t.stage} {t.fraction:.0%}" for t in self.running.values()]
         if blocked:
@@ -293,7 +293,7 @@ def _failure(job: Job, error: BaseException, seconds: float) -> Outcome:
 
 
 def batch_json(outcomes: Sequence[Outcome], *, dry_run: bool) -> dict[str, Any]:
-    """Return the JSON object of `batch --json`."""
+    """Return the JSON object that `baker batch --json` prints."""
     rows = [
         {
             "scene": str(outcome.job.scene),
@@ -315,7 +315,7 @@ def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
     path : Path
         File to write.
     outcomes : sequence of Outcome
-        In the order of the jobs.
+        Outcomes in the order of the jobs.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Checks whether an output folder is up to date, by hashes of contents, not by times or paths.
+"""Checks whether an output folder is up to date, by hashes of file contents and not by file times or paths.
 
-The manifest of a bake holds the hash of the scene and of the files that it refers to, the settings, the
-versions of baker and the libraries, and the hash of each file written. An output folder is up to date if all
-of them are equal to the current ones.
+The manifest of a bake contains one hash of the scene and the files that it refers to, the settings, the
+versions of baker and its libraries, and the hash of each written file. An output folder is up to date if all
+of these are equal to the current values.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from baker.core.settings import BakeSettings
 from baker.io.bake.manifest import library_versions, resolved_settings
 from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
 
-# `quality` only sets the default of `samples`, and `ao_distance_metres` follows from `ao_distance` and the
-# scene; these are compared.
+# Settings in the manifest that are not compared, because values that are compared determine them. `quality`
+# only sets the default of `samples`, and `ao_distance_metres` follows from `ao_distance` and the scene.
 _NOT_COMPARED = {"quality", "ao_distance_metres"}
-# Largest number of differences listed in `why`.
+# Largest number of differences that `why` lists.
 _TOLD = 3
 
 
@@ -32,7 +32,7 @@ class Freshness:
     fresh : bool
         Whether the folder is up to date.
     why : str
-        The differences, as text for users.
+        The reason, as text for users, such as a list of differences.
     manifest : bytes
         Content of `bake.json`, empty if there is none.
     """
@@ -50,14 +50,14 @@ def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
     out : Path
         The output folder; need not exist.
     sha256 : str
-        Hash of the scene and the files that it refers to, see `io.scene_hash`.
+        Hash of the scene and of the files that it refers to; see `io.scene_hash`.
     settings : BakeSettings
         Settings of the bake.
 
     Returns
     -------
     Freshness
-        Not fresh if the manifest is missing or unreadable.
+        The result; not fresh if the manifest is missing or unreadable.
     """
     try:
         data = (out / MANIFEST_NAME).read_bytes()

@@ -1,9 +1,9 @@
-"""A process that bakes one job after the other, so that libraries and kernels are loaded once.
+"""A process that bakes one job after another, so that libraries and kernels are loaded only once.
 
-Protocol: one line of JSON for each job on stdin, lines of JSON on stdout. A job is
-{"scene", "out", "settings", "force"}. The worker writes {"stage", "fraction"} while the job runs, and
-{"done": true} or {"error": {"kind", "message", "file", "object", "code"}} at its end. The process exits when
-stdin ends.
+The process reads one line of JSON for each job from stdin, and writes lines of JSON to stdout. A job is
+{"scene", "out", "settings", "force"}. While a job runs, the process writes {"stage", "fraction"}. At the end
+of the job it writes {"done": true} or {"error": {"kind", "message", "file", "object", "code"}}. The process
+exits when stdin ends.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from typing import Any, TextIO
 from baker.core.error_mapping import bug, explain
 from baker.core.errors import BakerError
 
-# Seconds between two lines about progress.
+# Shortest time between two progress messages, seconds.
 _INTERVAL = 0.1
-# Seconds from the end of stdin to the exit of the process, in which a running bake can stop.
+# Time that a running bake has to stop between the end of stdin and the exit of the process, seconds.
 _GRACE = 0.6
 
 
 def main() -> None:
     """Bake jobs until stdin ends."""
-    # Ctrl-C is sent to the whole process group, but only the parent stops this process.
+    # Ignore Ctrl-C, which the whole process group receives; the parent stops this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Redirect descriptor 1 to stderr, since native libraries may print to it; keep a copy for the protocol.
+    # Native libraries may print to stdout: redirect descriptor 1 to stderr, and keep a copy for the messages.
     sink = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     jobs: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
@@ -54,7 +54,7 @@ def _listen(jobs: queue.SimpleQueue[dict[str, Any] | None], stop: threading.Even
 
 
 def _run(job: dict[str, Any], sink: TextIO, stop: threading.Event) -> dict[str, Any]:
-    """Bake one job and return the last message of the protocol."""
+    """Bake one job, and return the last message about it."""
     from baker.core.settings import make_settings
     from baker.pipeline.bake import bake
 
@@ -82,7 +82,7 @@ def describe(error: BaseException) -> dict[str, Any]:
     Parameters
     ----------
     error : BaseException
-        Any exception; one that `explain` does not map to a `BakerError` has the kind `internal`.
+        Any exception. If `explain` does not map it to a `BakerError`, its kind is `internal`.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def _answer(sink: TextIO, message: dict[str, Any]) -> None:
         sink.write(json.dumps(message) + "\n")
         sink.flush()
     except OSError:
-        # The parent has closed the pipe; the end of stdin stops the work.
+        # The parent has closed the pipe. It has closed stdin as well, which stops the work.
         return
 
 

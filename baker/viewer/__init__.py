@@ -1,1 +1,1 @@
-"""The local page that shows a bake, its server, and the data that it serves."""
+"""Shows a bake in a browser: the page, the local server, and the data that it serves."""

@@ -1,6 +1,6 @@
-"""Lightmap pages as numbers that a browser uploads unchanged.
+"""Converts lightmap pages to arrays that the browser uploads to the GPU unchanged.
 
-Half floats stay half floats, so that the values in the page are those of the EXR, bit by bit.
+Values from a half-float EXR are sent as half floats, so that the browser has exactly the values of the EXR.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 
 def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
-    """Return a page with one or four components per texel, as half floats if they are exact.
+    """Return a page with one or four components per texel, as half floats if that loses nothing.
 
     Parameters
     ----------
@@ -21,7 +21,8 @@ def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
     Returns
     -------
     (H, W, 1) or (H, W, 4) float16 or float32
-        Added components are 1: not all graphics hardware can draw from three-component float textures.
+        Pages with two or three components get four, because not all graphics hardware supports
+        three-component float textures. Added components are 1.
     """
     height, width, channels = page.shape
     wide = page

@@ -1,6 +1,8 @@
-"""The data of the viewer page: one JSON object, and flat arrays that the browser uploads unchanged.
+"""Builds the data of the viewer page: one JSON object, and arrays that the browser uploads to the GPU
+unchanged.
 
-World-space triangles are sorted by page and material, so that the page makes one draw call for each pair.
+World-space triangles are sorted by page and material, so that the browser needs one draw call for each pair
+of page and material.
 """
 
 from __future__ import annotations
@@ -20,23 +22,23 @@ from baker.core.scene import Material, Texture
 from baker.io.bake.read_bake import StoredBake
 from baker.shading.materials import corner_uv, vertex_colour
 
-# Rec.709 luminance.
+# Rec.709 luminance weights of linear R, G, B.
 LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 _TYPES = {"float32": "float", "uint32": "uint"}
 
 
 @dataclass(frozen=True)
 class SceneData:
-    """The header, geometry and textures of a bake.
+    """The header, geometry and textures of a bake, as the browser receives them.
 
     Attributes
     ----------
     header : dict
-        `scene.json`.
+        The content of `scene.json`.
     geometry : bytes
-        The arrays that `header["sections"]` names, with their offsets.
+        All arrays, concatenated; `header["sections"]` has the name, byte offset, shape and type of each.
     images : tuple of (H, W, 4) uint8 or float32
-        Textures of base colour and emission, as `Texture.image` has them.
+        Textures of base colour and emission: the arrays of `Texture.image`.
     """
 
     header: dict[str, Any]
@@ -45,7 +47,7 @@ class SceneData:
 
 
 def scene_data(bake: StoredBake) -> SceneData:
-    """Return the data that the page shows.
+    """Return the data of a bake for the viewer page.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ def scene_data(bake: StoredBake) -> SceneData:
     position = geometry.position[np.unique(geometry.triangle)] if len(order) else np.zeros((1, 3), np.float32)
     source = str(bake.manifest.get("input", {}).get("path") or "")
     header = {
-        # The name of the input: `scene.glb` has the same name in every bake.
+        # Use the name of the input file, because `scene.glb` has the same name in every bake.
         "name": PurePath(source).stem or bake.folder.resolve().name,
         "folder": str(bake.folder.resolve()),
         "input": source,
@@ -74,7 +76,7 @@ def scene_data(bake: StoredBake) -> SceneData:
         "pages": bake.atlas.n_pages,
         "triangles": len(geometry.triangle),
         "box": {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()},
-        # Positions, the box and the camera are relative to this point of the world.
+        # World position of the origin that vertex positions, the box and the camera are relative to.
         "origin": geometry.origin.tolist(),
         "camera": _camera(bake),
         "channels": [_channel(bake, name) for name in bake.maps],
@@ -102,7 +104,7 @@ def _arrays(bake: StoredBake, geometry: Geometry, order: NDArray[Any]) -> dict[s
         "colour": vertex_colour(bake.scene, geometry),
     }
     n_vertices = len(geometry.position)
-    wide = {  # an attribute that no mesh has is one row for all vertices
+    wide = {  # expand attributes with one row for all vertices
         name: np.broadcast_to(array, (n_vertices, array.shape[1])) if len(array) == 1 else array
         for name, array in arrays.items()
     }
@@ -179,7 +181,7 @@ def _camera(bake: StoredBake) -> dict[str, Any] | None:
 
 
 def _channel(bake: StoredBake, name: str) -> dict[str, Any]:
-    """Return a channel's unit and the spread of its luminance over the texels that surfaces cover."""
+    """Return a channel's unit, files and the 1, 50 and 99 % percentiles of luminance over covered texels."""
     pages = [page for page in bake.manifest["pages"] if page["channel"] == name]
     value = bake.maps[name]
     covered = (bake.status != TexelStatus.EMPTY) & (bake.status != TexelStatus.DILATED)

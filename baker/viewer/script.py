@@ -1,7 +1,7 @@
-"""Finds three.js on this machine: the page works without a network.
+"""Finds three.js on this machine, so that the page works without a network.
 
-The package `jupyter-threejs-sage`, a dependency, contains the library as one file. A copy installed by npm
-works as well. The file is a script that sets `THREE` or an ES module.
+The package `jupyter-threejs-sage`, a dependency, contains three.js as one file. A copy that npm installed can
+be used instead. The file is either an ES module or a script that sets the global `THREE`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from baker.core.errors import InputError, ResourceError
 
-# Paths of the library in a folder, in the order of preference: npm's package, node_modules, single files.
+# Paths of three.js in a folder, in order of preference: in npm's package, in node_modules, as a single file.
 _PATHS = (
     "build/three.module.min.js",
     "build/three.module.js",
@@ -43,19 +43,19 @@ class ThreeScript:
 
     @property
     def files(self) -> dict[str, Path]:
-        """Return the files the page may request, by name: a module imports files beside it."""
+        """Return the files that the page may request, by name; a module may import the files beside it."""
         if not self.module:
             return {self.path.name: self.path}
         return {path.name: path for path in sorted(self.path.parent.glob("*.js"))}
 
 
 def find_three(location: Path | None) -> ThreeScript:
-    """Return the copy of three.js in `location`, or the installed one.
+    """Return the copy of three.js at `location`, or the copy in the installed package.
 
     Parameters
     ----------
     location : Path or None
-        A file, or a folder with npm's package in it; None for the installed package.
+        A file, or a folder that contains npm's package; None uses the installed Python package.
 
     Returns
     -------
@@ -65,15 +65,15 @@ def find_three(location: Path | None) -> ThreeScript:
     Raises
     ------
     InputError
-        If there is no three.js in `location`.
+        If there is no three.js at `location`.
     ResourceError
-        If none is installed.
+        If `location` is None and the package is not installed.
     """
     if location is not None:
         return _named(location)
     package = find_spec("jupyter_threejs_sage")
     for folder in (package.submodule_search_locations or ()) if package is not None else ():
-        # There is a folder for each release, r122, r130 ...; take the newest.
+        # The package has a folder for each release (r122, r130 ...): use the newest.
         found = sorted(
             Path(folder).glob("static/r*/three.min.js"), key=lambda path: int(path.parent.name[1:])
         )

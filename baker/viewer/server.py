@@ -1,6 +1,7 @@
-"""Serves the page and the bake to a browser on this machine.
+"""Serves the viewer page and the files of a bake to a browser on this machine.
 
-Every address is a key of a table that is complete before the first request, so no other file can be read.
+A request is answered only if its path is in a table that is filled before the first request, so no other file
+can be read.
 Requests whose Host header names another machine are refused, so that a foreign site cannot read the bake
 through a host name that resolves to 127.0.0.1 (DNS rebinding).
 """
@@ -41,15 +42,15 @@ _MIME = {
     ".glb": "model/gltf-binary",
 }
 _BYTES = "application/octet-stream"
-# No script, style or request from another origin.
+# Content-Security-Policy: forbid scripts, styles and requests from other origins.
 _POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'"
 
-# The response of an address: media type, and a function that returns the bytes.
+# Response to a request: media type, and a function that returns the bytes.
 Answer = tuple[str, Callable[[], bytes]]
 
 
 class ViewServer(ThreadingHTTPServer):
-    """An HTTP server with a table of addresses and responses."""
+    """An HTTP server with a table of URL paths and responses."""
 
     daemon_threads = True
 
@@ -62,16 +63,16 @@ class ViewServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Return the address of the page."""
+        """Return the URL of the page."""
         return f"http://{HOST}:{self.server_port}/"
 
     @property
     def names(self) -> set[str]:
-        """Return the host names that a request may use."""
+        """Return the values of the Host header that are accepted."""
         return {f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"}
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore connections that the browser closed."""
+        """Ignore errors, which arise when the browser closes a connection."""
 
 
 def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewServer:
@@ -84,17 +85,17 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     three : ThreeScript
         The files of three.js that the page loads.
     port : int
-        0 for any free one.
+        TCP port; 0 uses any free port.
 
     Returns
     -------
     ViewServer
-        Call `serve_forever` to start it.
+        The server; call `serve_forever` to start it.
 
     Raises
     ------
     ResourceError
-        If the port is taken.
+        If the port is in use or not permitted.
     """
     answers = _answers(bake, three)
     try:
@@ -128,7 +129,7 @@ def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
                 answers[f"/page/{name}/{page}"] = (_BYTES, partial(_page_bytes, value[page]))
     folder = bake.folder.resolve()
     for name in own_files(folder) or ():
-        # A manifest may name files outside of the folder: leave them out.
+        # Leave out files outside the folder, which a manifest may name through links.
         path = (folder / name).resolve()
         if path.is_relative_to(folder) and path.is_file():
             answers[f"/out/{name}"] = _file(path)

@@ -1,9 +1,9 @@
-// Colours with a meaning: the false-colour ramp, what texels are, and one hue for each object.
+// The false-colour ramp, and the colours of the texel states.
 
-// Dark to light in even steps of lightness, so that it still reads in grey and for the colour-blind.
+// Stops of the ramp. Lightness increases evenly, so that values stay ordered in grey and with colour blindness.
 const STOPS = ["#140b3d", "#2d2d8f", "#1f68b5", "#179e9e", "#53c06d", "#c4d54c", "#fff2bf"];
 
-// In the order of the numbers in status_N.png.
+// Texel states; the index is the value in status_N.png.
 export const STATUS = [
   { name: "empty", colour: "#20262f", says: "no surface" },
   { name: "covered", colour: "#3f8fcb", says: "baked" },
@@ -12,12 +12,12 @@ export const STATUS = [
   { name: "not converged", colour: "#ffb454", says: "still noisy" },
 ];
 
-/** Returns red, green, blue, 0 to 1, of "#rrggbb". */
+/** Returns [red, green, blue], each 0 to 1, of a colour "#rrggbb". */
 export function rgb(hex) {
   return [1, 3, 5].map((start) => parseInt(hex.slice(start, start + 2), 16) / 255);
 }
 
-/** Returns the ramp as 256 RGBA bytes. */
+/** Returns the ramp as 256 RGBA colours, 4 bytes each. */
 export function rampBytes() {
   const stops = STOPS.map(rgb);
   const bytes = new Uint8Array(256 * 4);
@@ -38,7 +38,7 @@ export function rampGradient() {
   return `linear-gradient(90deg, ${STOPS.join(", ")})`;
 }
 
-/** Returns the sRGB-encoded value of a linear one, 0 to 1. */
+/** Returns the sRGB encoding, 0 to 1, of a linear value. */
 export function srgb(linear) {
   const value = Math.min(Math.max(linear, 0), 1);
   return value <= 0.0031308 ? value * 12.92 : 1.055 * value ** (1 / 2.4) - 0.055;

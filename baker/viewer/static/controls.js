@@ -1,4 +1,4 @@
-// Buttons, sliders, keys and gestures: changes what the user chose, then asks for a new picture.
+// Handles buttons, sliders, keys and gestures: changes the application's state, then redraws.
 
 import { firstView, fly, frame, ray, shift, turn, zoom } from "./orbit.js";
 import { listen, ownsArrows, typing } from "./input.js";
@@ -10,7 +10,7 @@ const at = (id) => document.getElementById(id);
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const FLIGHT = { a: [-1, 0, 0], d: [1, 0, 0], q: [0, -1, 0], e: [0, 1, 0], s: [0, 0, -1], w: [0, 0, 1] };
 
-/** Makes the page's controls act on the application. */
+/** Creates the mode buttons, and adds event listeners to all controls of the page. */
 export function bindControls(app) {
   const { state } = app;
   state.modes.forEach((mode, number) => {
@@ -30,7 +30,7 @@ export function bindControls(app) {
   at("help-button").addEventListener("click", () => at("help").showModal());
 }
 
-/** Shows what was chosen in the controls. */
+/** Updates the controls from the state. */
 export const controls = {
   showMode({ state }) {
     for (const radio of at("modes").querySelectorAll("input")) radio.checked = radio.value === state.mode.id;
@@ -126,7 +126,7 @@ function bindAtlas(app) {
     wheel(steps, place) {
       const [u, v] = uv(place);
       state.atlas.zoom = Math.min(Math.max(state.atlas.zoom / 0.86 ** steps, 0.5), state.scene.resolution / 8);
-      // What is under the mouse stays under it.
+      // Keep the uv under the mouse at the same position.
       state.atlas.u = u - place.x / (2 * state.atlas.zoom);
       state.atlas.v = v + place.y / (2 * state.atlas.zoom);
       app.redraw();

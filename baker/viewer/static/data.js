@@ -1,8 +1,8 @@
-// What the server hands out, decoded: the scene, its arrays, and pages of numbers.
+// Fetches and decodes the data of the server: the scene, its arrays, textures and lightmap pages.
 
 const TYPES = { float: Float32Array, uint: Uint32Array };
 
-/** Fetches the description of the bake and its arrays; rows of array `name` are `width` numbers long. */
+/** Fetches scene.json and the arrays; `sections[name].width` is the number of components of array `name`. */
 export async function loadScene() {
   const scene = await (await ask("scene.json")).json();
   const bytes = await (await ask("geometry")).arrayBuffer();
@@ -13,7 +13,7 @@ export async function loadScene() {
   return scene;
 }
 
-/** Fetches a lightmap page: {numbers, width (numbers a texel), half}. Halves stay halves. */
+/** Fetches a lightmap page: {numbers, width, half}; `width` is components per texel, `half` means 16-bit floats. */
 export async function loadPage(scene, channel, page) {
   const bytes = await (await ask(`page/${encodeURIComponent(channel.name)}/${page}`)).arrayBuffer();
   const width = channel.width === 1 ? 1 : 4;
@@ -21,7 +21,7 @@ export async function loadPage(scene, channel, page) {
   return { numbers: half ? new Uint16Array(bytes) : new Float32Array(bytes), width, half };
 }
 
-/** Fetches what the texels of a page are, one byte each. */
+/** Fetches the texel states of a page, one byte for each texel. */
 export async function loadStatus(page) {
   return new Uint8Array(await (await ask(`status/${page}`)).arrayBuffer());
 }
@@ -33,14 +33,14 @@ export async function loadImage(scene, number) {
   return { ...image, numbers: image.srgb ? new Uint8Array(bytes) : new Float32Array(bytes) };
 }
 
-/** Returns the numbers of one texel, exactly as they are stored. */
+/** Returns the components of one texel, without rounding. */
 export function texelValue(loaded, channel, resolution, row, column) {
   const first = (row * resolution + column) * loaded.width;
   const stored = loaded.numbers.subarray(first, first + channel.width);
   return Array.from(stored, (number) => (loaded.half ? fromHalf(number) : number));
 }
 
-/** Returns the number that 16 bits of IEEE 754 mean. */
+/** Returns the value of a 16-bit float (IEEE 754) from its bits. */
 export function fromHalf(bits) {
   const sign = bits & 0x8000 ? -1 : 1;
   const exponent = (bits >> 10) & 31;

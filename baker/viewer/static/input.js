@@ -1,8 +1,11 @@
-// Mouse, touch and wheel on a window: what was meant, told in parts of the window's height.
+// Converts mouse, touch and wheel events of an element to drag, zoom, click and double-click calls.
 
-const CLICK = 4; // pixels that a hand may shake during a click
+const CLICK = 4; // largest movement during a click, pixels
 
-/** Listens on `window_`; `on` has drag(x, y, shifting), wheel(steps, place), click(place), double(place). */
+/**
+ * Adds listeners to the element `window_`, which call drag(x, y, shifting), wheel(steps, place), click(place) and
+ * double(place) of `on`. x and y are fractions of the element's height; for `place` see the function of that name.
+ */
 export function listen(window_, on) {
   const down = new Map();
   let moved = 0;
@@ -45,7 +48,7 @@ export function listen(window_, on) {
     "wheel",
     (event) => {
       event.preventDefault();
-      // Lines and pages of a wheel in pixels; a notch of most mice is 100.
+      // Convert lines (33) and pages (400) to pixels. A notch of most mice is 100 pixels.
       const pixels = event.deltaY * [1, 33, 400][event.deltaMode];
       on.wheel(Math.min(Math.max(-pixels / 60, -3), 3), place(window_, event));
     },
@@ -53,19 +56,19 @@ export function listen(window_, on) {
   );
 }
 
-/** Tells whether a key was meant for a field that is being filled in. */
+/** Returns whether a key is not a shortcut: it goes to an input field, or has a modifier such as Ctrl. */
 export function typing(event) {
   const target = event.target;
   if (event.ctrlKey || event.metaKey || event.altKey) return true;
   return target.tagName === "SELECT" || (target.tagName === "INPUT" && target.type === "number");
 }
 
-/** Tells whether arrows already mean something to what has the focus. */
+/** Returns whether the focused control uses the arrow keys itself: a slider or a radio button. */
 export function ownsArrows(event) {
   return event.target.tagName === "INPUT" && (event.target.type === "range" || event.target.type === "radio");
 }
 
-// From the middle, -1 to 1, x to the right and y upwards.
+// Returns the position of an event in the element: -1 to 1, x to the right, y upwards, 0 in the middle.
 function place(window_, event) {
   const box = window_.getBoundingClientRect();
   return {

@@ -1,4 +1,4 @@
-// The page: loads the bake, holds what the user chose, and passes it on to the drawing.
+// Entry point of the page: loads the bake, keeps the user's choices, and passes them to the renderer.
 
 import { bindControls, controls } from "./controls.js";
 import { loadImage, loadPage, loadScene, loadStatus, texelValue } from "./data.js";
@@ -48,14 +48,14 @@ async function start() {
   say(scene.warnings.join("; ") || "drag turns, wheel zooms, click picks; ? for keys");
   document.documentElement.dataset.ready = "yes";
 
-  /** Shows another quantity; its pages are fetched when they are first wanted. */
+  /** Switches to another display mode; the pages of its channel are fetched at the first use. */
   async function setMode(mode) {
     if (!mode || !mode.enabled) return;
     state.mode = mode;
     controls.showMode(app);
     if (mode.channel) {
       const pages = await channelPages(state, mode.channel);
-      if (state.mode !== mode) return; // another was chosen meanwhile
+      if (state.mode !== mode) return; // the user has chosen another mode in the meantime
       pages.forEach((page, number) => {
         page.texture ??= pageTexture(state.view, page.loaded, scene.resolution);
         state.view.pages[number].page.value = page.texture;
@@ -70,7 +70,7 @@ async function start() {
     update();
   }
 
-  /** Picks texel (row, column) of a page; `surface` where it is known already. */
+  /** Picks texel (row, column) of a page; without `surface`, the surface at the centre of the texel is searched. */
   async function pick(page, row, column, surface = null) {
     const size = scene.resolution;
     [row, column] = [row, column].map((value) => Math.min(Math.max(value, 0), size - 1));
@@ -90,7 +90,7 @@ async function start() {
     showPicked(at("picked-body"), { page, row, column, status, surface, values, colour });
   }
 
-  /** Passes every choice on to the shaders and the panel. */
+  /** Updates the uniforms of the shaders, the legend and the controls from the state, and redraws. */
   function update() {
     const { mode, view } = state;
     const channel = mode.channel;
@@ -111,7 +111,7 @@ async function start() {
     redraw();
   }
 
-  /** Asks for a new picture; many wishes of one moment make one. */
+  /** Requests a redraw; several requests before the next animation frame cause one redraw. */
   function redraw() {
     if (waiting || !state.mode) return;
     waiting = true;
@@ -122,7 +122,7 @@ async function start() {
   }
 }
 
-/** Returns the pages of a channel, numbers fetched, each {loaded, texture}. */
+/** Returns a promise of the pages of a channel, each {loaded, texture}; they are fetched once. */
 function channelPages(state, channel) {
   if (!state.channels.has(channel.name)) {
     const fetchAll = async () => {
@@ -201,7 +201,7 @@ function firstRange(channel) {
   if (channel.name === "ao") return { low: 0, high: 1, log: false };
   const high = channel.high > 0 ? channel.high : 1;
   const low = Math.max(channel.low, high * 1e-4);
-  // Light of more than two decades reads better on a logarithmic scale.
+  // Use a logarithmic scale if the values span more than two decades.
   return { low: short3(low), high: short3(high), log: high / low > 100 };
 }
 
@@ -209,7 +209,7 @@ function short3(value) {
   return Number(value.toPrecision(3));
 }
 
-// The median texel, if it were white, is drawn at this linear value.
+// Linear display value, 0 to 1, of a white surface with the median irradiance at exposure 0.
 const MIDDLE = 0.35;
 
 function exposureOf(scene) {
@@ -219,7 +219,7 @@ function exposureOf(scene) {
 }
 
 function brightnessOf(state) {
-  // Ambient occlusion is between 0 and 1 already; other channels are scaled by the exposure.
+  // Ambient occlusion is from 0 to 1 and is not scaled; other channels are scaled by the exposure.
   return state.mode.id === "ao" ? 1 : 2 ** state.exposure;
 }
 

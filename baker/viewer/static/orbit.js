@@ -1,8 +1,9 @@
-// A camera that turns about a point, in plain numbers: no part of three.js is needed to think about it.
+// An orbit camera, {target, yaw, pitch, distance, fov, radius}, without three.js. Angles are in radians, except fov:
+// the vertical field of view in degrees. `radius` is half the diagonal of the scene's box.
 
 const LIMIT = (Math.PI / 2) * 0.999;
 
-/** Returns a camera that sees the whole box, or the file's own camera. */
+/** Returns the first camera of the scene file; if there is none, a camera that sees the whole box. */
 export function firstView(scene) {
   const low = scene.box.min;
   const high = scene.box.max;
@@ -14,7 +15,7 @@ export function firstView(scene) {
     camera.distance = 1.06 * farEnough(camera, low, high);
     return camera;
   }
-  // The file's camera turns about the point of its axis that is nearest to the middle of the scene.
+  // The target is the point on the axis of the file's camera that is nearest to the middle of the scene.
   const { position, forward } = scene.camera;
   const along = middle.reduce((sum, value, axis) => sum + (value - position[axis]) * forward[axis], 0);
   const distance = Math.max(along, radius * 0.1);
@@ -28,7 +29,7 @@ export function firstView(scene) {
   };
 }
 
-// The distance from which all corners of the box are in the picture, if it is at least as wide as high.
+// Returns the distance at which all corners of the box are visible, if the view is at least as wide as high.
 function farEnough(camera, low, high) {
   const { right, up, forward } = frame(camera);
   const tall = Math.tan((camera.fov * Math.PI) / 360);
@@ -37,7 +38,7 @@ function farEnough(camera, low, high) {
   return Math.max(...corners.map((c) => Math.max(Math.abs(dot(c, right)), Math.abs(dot(c, up))) / tall - dot(c, forward)));
 }
 
-/** Returns {eye, right, up, forward} of a camera. */
+/** Returns {eye, right, up, forward} of a camera: its position, and unit vectors. */
 export function frame(camera) {
   const [sy, cy, sp, cp] = [Math.sin(camera.yaw), Math.cos(camera.yaw), Math.sin(camera.pitch), Math.cos(camera.pitch)];
   const back = [sy * cp, sp, cy * cp];
@@ -49,20 +50,20 @@ export function frame(camera) {
   };
 }
 
-/** Turns by radians. */
+/** Rotates the camera about its target by angles in radians. */
 export function turn(camera, yaw, pitch) {
   camera.yaw += yaw;
   camera.pitch = Math.min(Math.max(camera.pitch + pitch, -LIMIT), LIMIT);
 }
 
-/** Shifts along the picture, in parts of its height. */
+/** Shifts the target parallel to the image plane; x and y are fractions of the view's height. */
 export function shift(camera, x, y) {
   const { right, up } = frame(camera);
   const tall = 2 * camera.distance * Math.tan((camera.fov * Math.PI) / 360);
   camera.target = camera.target.map((value, axis) => value + (right[axis] * x + up[axis] * y) * tall);
 }
 
-/** Comes nearer (steps > 0); close to the target it takes the target along, so one can enter rooms. */
+/** Moves nearer (steps > 0) or away; close to the target, moves the target as well, so that one can enter rooms. */
 export function zoom(camera, steps) {
   const wanted = camera.distance * 0.86 ** steps;
   const nearest = camera.radius * 0.04;
@@ -76,7 +77,7 @@ export function fly(camera, x, y, z) {
   camera.target = camera.target.map((value, axis) => value + right[axis] * x + up[axis] * y + forward[axis] * z);
 }
 
-/** Returns the ray {origin, direction} through a place of the picture; x and y go from -1 to 1, y upwards. */
+/** Returns the ray {origin, direction} through the image point (x, y); both are -1 to 1, y upwards. */
 export function ray(camera, x, y, aspect) {
   const { eye, right, up, forward } = frame(camera);
   const tall = Math.tan((camera.fov * Math.PI) / 360);
@@ -85,7 +86,7 @@ export function ray(camera, x, y, aspect) {
   return { origin: eye, direction: direction.map((value) => value / length) };
 }
 
-/** Returns where a point falls in the picture, as `ray` counts it; null behind the camera. */
+/** Returns the image point {x, y} of a point, in the coordinates of `ray`; null if it is behind the camera. */
 export function project(camera, point, aspect) {
   const { eye, right, up, forward } = frame(camera);
   const away = point.map((value, axis) => value - eye[axis]);

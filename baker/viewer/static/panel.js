@@ -1,8 +1,8 @@
-// Words and figures beside the picture: the legend and what is known of the picked texel.
+// Fills the legend and the panel about the picked texel.
 
 import { rampGradient, srgb, STATUS } from "./colours.js";
 
-/** Makes an element; `parts` are its text and children. Names from files only ever become text. */
+/** Creates an element; `parts` are text and children. Strings become text nodes, so names in files cannot add HTML. */
 export function element(tag, attributes = {}, ...parts) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -10,7 +10,7 @@ export function element(tag, attributes = {}, ...parts) {
   return made;
 }
 
-/** Returns a number in at most four digits that matter. */
+/** Returns a number as text with at most four significant digits. */
 export function short(value) {
   if (!Number.isFinite(value)) return String(value);
   const size = Math.abs(value);
@@ -23,7 +23,7 @@ export function count(value) {
   return String(value).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 }
 
-/** Fills the legend for what is shown: {title, unit, kind, at (0 to 1 -> value)}. */
+/** Fills the legend; `at` maps a position on the colour bar, 0 to 1, to a value, or is the text of a note. */
 export function showLegend(legend, { title, unit, kind, at }, status) {
   const heading = element("h3", {}, title);
   if (unit) heading.append(element("span", {}, ` ${unit}`));
@@ -56,7 +56,7 @@ export function showLegend(legend, { title, unit, kind, at }, status) {
   }
 }
 
-/** Fills the list of what is known of a texel. `found` has place, status, surface, values, colour. */
+/** Fills the list of properties of the picked texel. `surface` is null if no surface covers the texel. */
 export function showPicked(body, { page, row, column, status, surface, values, colour }) {
   const list = element("dl");
   const add = (term, field, ...parts) => {
@@ -89,7 +89,7 @@ export function showPicked(body, { page, row, column, status, surface, values, c
         const number = element("span", { "data-part": letter }, String(value[k]));
         row.append(element("span", { class: "part" }, name, number), " ");
       });
-      row.lastElementChild.append(unit); // never on a line of its own
+      row.lastElementChild.append(unit); // keeps the unit on the line of the number
     } else {
       add(title, channel.name, `${value.join("  ")}${unit}`).classList.add("value");
     }

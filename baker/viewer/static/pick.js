@@ -1,6 +1,6 @@
 // Finds the surface under the mouse and the surface under a texel.
 
-/** Returns the first surface that a ray meets: {triangle, weights, position, world, uv}, or null. */
+/** Returns the nearest surface that a ray hits, or null: {triangle, weights (barycentric), position, world, uv, ...}. */
 export function pickRay(scene, images, { origin, direction }) {
   const hits = [];
   for (const group of scene.groups) {
@@ -11,12 +11,12 @@ export function pickRay(scene, images, { origin, direction }) {
     }
   }
   hits.sort((a, b) => a.distance - b.distance);
-  // A click goes through what is not drawn: the holes of a leaf.
+  // Skip hits on parts that are not drawn, such as the holes in a MASK texture.
   const found = hits.find((hit) => alphaAt(scene, images, hit) >= (hit.material.alphaMode === "MASK" ? hit.material.alphaCutoff : 0));
   return found ? surface(scene, found.triangle, found.weights) : null;
 }
 
-/** Returns the surface that covers a place of a page, or null. */
+/** Returns the surface at (u, v) of a page, or null. */
 export function pickTexel(scene, page, u, v) {
   const { triangle, pageUv } = scene.arrays;
   for (const group of scene.groups) {
@@ -30,7 +30,7 @@ export function pickTexel(scene, page, u, v) {
   return null;
 }
 
-/** Returns base colour, vertex colour and texture included: linear red, green, blue, alpha. */
+/** Returns factor x vertex colour x texture of the base colour: linear red, green, blue, and alpha. */
 export function colourAt(scene, images, { triangle, weights, material }) {
   const vertex = blend(scene, "colour", triangle, weights);
   let colour = material.colour.map((value, k) => value * vertex[k]);
@@ -51,7 +51,7 @@ function surface(scene, triangle, weights) {
     page: group.page,
     instance: scene.instances[scene.arrays.instance[triangle]],
     position,
-    // Positions are relative to an origin among the scene's detail.
+    // Positions are relative to `scene.origin`.
     world: position.map((value, axis) => value + scene.origin[axis]),
     uv: blend(scene, "pageUv", triangle, weights),
   };

@@ -1,4 +1,4 @@
-// The shaders of both windows: the scene through a camera, and the same triangles unfolded onto a page.
+// The shaders of both views: the 3D view, and the atlas view with the same triangles at their lightmap uv.
 
 export const MODES = { lit: 0, light: 1, plain: 2, checker: 3, status: 4 };
 
@@ -12,7 +12,7 @@ in vec2 emissionUv;
 in vec4 colour;
 in float owner;
 uniform mat4 projectionMatrix, modelViewMatrix;
-uniform vec3 atlasWindow;  // uv in the middle, zoom
+uniform vec3 atlasWindow;  // xy: uv in the middle of the atlas view; z: zoom, 1 shows the whole page
 uniform bool unfolded;
 out vec2 vPageUv, vColourUv, vEmissionUv;
 out vec4 vColour;
@@ -28,7 +28,7 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(position, 1.0);
   vNormal = mat3(modelViewMatrix) * normal;
   vToEye = -seen.xyz;
-  // The first row of a page, v = 0, is drawn on top.
+  // Flip v, so that the first row of a page, v = 0, is at the top.
   vec2 flatPlace = (pageUv - atlasWindow.xy) * vec2(2.0, -2.0) * atlasWindow.z;
   gl_Position = unfolded ? vec4(flatPlace, 0.0, 1.0) : projectionMatrix * seen;
 }`;
@@ -40,8 +40,8 @@ precision highp sampler2D;
 uniform int mode;
 uniform sampler2D page, statusPage, ramp;
 uniform vec3 statusColour[5];
-uniform float exposure;    // linear, 1 / pi is in it
-uniform float brightness;  // linear, for what is no light
+uniform float exposure;    // linear factor of irradiance, including 1 / pi
+uniform float brightness;  // linear factor of other channels and of emission
 uniform bool smoothed, falseColour, logarithmic, grey;
 uniform vec2 range;
 out vec4 fragment;
@@ -56,7 +56,7 @@ vec3 texel(ivec2 place) {
   return grey ? value.rrr : value;
 }
 
-// Bilinear as an engine does it; by hand, since not all hardware filters 32 bit numbers.
+// Bilinear lookup in the shader, because not all hardware can filter 32-bit float textures.
 vec3 lookUp(vec2 uv) {
   vec2 place = uv * vec2(textureSize(page, 0));
   if (!smoothed) return texel(ivec2(floor(place)));
@@ -72,7 +72,7 @@ vec3 statusAt(vec2 uv) {
   return statusColour[clamp(int(texelFetch(statusPage, place, 0).r * 255.0 + 0.5), 0, 4)];
 }
 
-// sRGB-encoded colour of a value that is shown as it is or on the ramp.
+// Returns the sRGB-encoded colour of a value: scaled and encoded, or from the false-colour ramp.
 vec3 shown(vec3 value) {
   if (any(isnan(value)) || any(isinf(value))) return vec3(1.0, 0.0, 1.0);
   if (falseColour) {
@@ -94,23 +94,23 @@ uniform sampler2D colourMap, emissionMap;
 uniform vec4 baseColour;
 uniform vec3 emission;
 uniform bool hasColourMap, hasEmissionMap, unfolded;
-uniform float alphaCutoff;  // below zero: alpha is not looked at
+uniform float alphaCutoff;  // -1: blend with alpha; otherwise discard fragments with a smaller alpha
 
 vec3 hue(float number) {
   float h = fract(number * 0.61803398875 + 0.08) * 6.0;
   return clamp(vec3(abs(h - 3.0) - 1.0, 2.0 - abs(h - 2.0), 2.0 - abs(h - 4.0)), 0.0, 1.0);
 }
 
-// Light from the eye: only there to show shape where no light is shown.
+// Shading by a light at the eye, which shows the shape in modes without baked light.
 float headlight() {
   return unfolded ? 1.0 : 0.55 + 0.45 * abs(dot(normalize(vNormal), normalize(vToEye)));
 }
 
-// Squares of 8 texels, each object in a hue of its own.
+// A checker of squares of 8 x 8 texels, with a different hue for each object.
 vec3 checker() {
   vec2 square = vPageUv * vec2(textureSize(statusPage, 0)) / 8.0;
   vec2 wide = max(fwidth(square), 1e-6);
-  // The average over a pixel, so that far squares turn grey and do not flicker.
+  // Average the pattern over a pixel, so that distant squares do not flicker.
   vec2 wave = clamp((abs(fract(square * 0.5 + 0.25) - 0.5) - 0.25) * 2.0 / wide, -0.5, 0.5);
   float light = 0.5 + 2.0 * wave.x * wave.y * step(max(wide.x, wide.y), 1.0);
   vec3 colour = mix(vec3(0.75), hue(vOwner), 0.62);
@@ -126,7 +126,7 @@ void main() {
   if (mode == ${MODES.lit}) {
     vec3 emitted = emission;
     if (hasEmissionMap) emitted *= texture(emissionMap, vEmissionUv).rgb;
-    // exposure holds the 1 / pi of a diffuse surface: emission is radiance already.
+    // The exposure includes the 1 / pi that converts radiosity to radiance. Emission is radiance already.
     vec3 light = lookUp(vPageUv);
     seen = any(isnan(light)) ? vec3(1.0, 0.0, 1.0) : encode(colour.rgb * light * exposure + emitted * brightness);
   } else if (mode == ${MODES.checker}) {
@@ -149,7 +149,7 @@ void main() {
   gl_Position = vec4((position.xy - atlasWindow.xy) * vec2(2.0, -2.0) * atlasWindow.z, 0.0, 1.0);
 }`;
 
-// The page itself, behind the unfolded triangles or alone.
+// Draws the whole page in the atlas view; the unfolded triangles are drawn over it in some modes.
 export const SHEET = `${COMMON}
 in vec2 vPageUv;
 void main() {
@@ -158,7 +158,7 @@ void main() {
   } else if (mode == ${MODES.status}) {
     fragment = vec4(statusAt(vPageUv), 1.0);
   } else {
-    // Texels smaller than a pixel are averaged: 16 places of the pixel.
+    // If texels are smaller than a pixel, average 4 x 4 samples of the pixel.
     vec2 dx = dFdx(vPageUv) / 4.0, dy = dFdy(vPageUv) / 4.0;
     vec2 size = vec2(textureSize(page, 0));
     if (max(length(dx * size), length(dy * size)) * 4.0 < 1.5) {

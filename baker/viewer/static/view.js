@@ -1,11 +1,11 @@
-// Draws both windows with three.js: one canvas, one scene of triangles, two ways to place them.
+// Draws the 3D view and the atlas view into one canvas with three.js, from the same triangles.
 
 import { rampBytes, rgb, STATUS } from "./colours.js";
 import { MODES, SHEET, SHEET_VERTEX, SURFACE, VERTEX } from "./shaders.js";
 
 const WRAP = { repeat: "RepeatWrapping", mirror: "MirroredRepeatWrapping", clamp: "ClampToEdgeWrapping" };
 
-/** Loads three.js, whichever kind of file the server found. */
+/** Loads three.js from an ES module or from a script that sets the global THREE. */
 export async function loadThree({ file, module }) {
   const address = new URL(file, document.baseURI).href;
   if (module) return import(address);
@@ -19,7 +19,7 @@ export async function loadThree({ file, module }) {
   return window.THREE;
 }
 
-/** Makes the renderer and everything it draws. `images` are the decoded textures. */
+/** Creates the renderer and all objects that it draws. `images` are the decoded textures. */
 export function makeView(THREE, scene, images, canvas) {
   const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
   if (scene.resolution > renderer.capabilities.maxTextureSize) {
@@ -74,7 +74,7 @@ export function makeView(THREE, scene, images, canvas) {
         emissionMap: { value: texture(material.emissionMap) },
         hasColourMap: { value: Boolean(material.colourMap) },
         hasEmissionMap: { value: Boolean(material.emissionMap) },
-        // Opaque surfaces have alpha 1, whatever their texture says.
+        // OPAQUE materials ignore alpha: a cutoff of 0 discards nothing.
         alphaCutoff: { value: { OPAQUE: 0, MASK: material.alphaCutoff, BLEND: -1 }[material.alphaMode] },
       };
       const blend = material.alphaMode === "BLEND" && !unfolded;
@@ -85,7 +85,7 @@ export function makeView(THREE, scene, images, canvas) {
           vertexShader: VERTEX,
           fragmentShader: SURFACE,
           uniforms,
-          // In space, backs are left out as an engine does: one looks into rooms from outside.
+          // Cull back faces in the 3D view, as engines do, so that rooms are visible from outside.
           side: unfolded || material.doubleSided ? THREE.DoubleSide : THREE.FrontSide,
           transparent: blend,
           depthWrite: !blend && !unfolded,
@@ -102,7 +102,7 @@ export function makeView(THREE, scene, images, canvas) {
   return { THREE, renderer, canvas, shared, pages, space, sheet, quad, flat };
 }
 
-/** Puts a page of numbers, as `loadPage` gives them, on the graphics card. */
+/** Returns a texture of a lightmap page that `loadPage` has returned. */
 export function pageTexture(view, loaded, resolution) {
   return dataTexture(view.THREE, loaded.numbers, resolution, resolution, {
     format: loaded.width === 1 ? "RedFormat" : "RGBAFormat",
@@ -110,12 +110,12 @@ export function pageTexture(view, loaded, resolution) {
   });
 }
 
-/** Puts a page of texel kinds on the graphics card. */
+/** Returns a texture of the texel states of a page. */
 export function statusTexture(view, bytes, resolution) {
   return dataTexture(view.THREE, bytes, resolution, resolution, { format: "RedFormat", type: "UnsignedByteType" });
 }
 
-/** Draws the scene into the rectangle of one element and page number `page` into that of another. */
+/** Draws the scene into the rectangle of the element `stage`, and page number `page` into that of `atlas`. */
 export function draw(view, camera, stage, atlas, page) {
   const { renderer, pages, quad, sheet } = view;
   const width = window.innerWidth;
@@ -155,7 +155,7 @@ function colourTexture(THREE, image, wrap) {
   const texture = dataTexture(THREE, image.numbers, image.width, image.height, { format: "RGBAFormat", type });
   [texture.wrapS, texture.wrapT] = wrap.map((name) => THREE[WRAP[name]]);
   if (image.srgb) {
-    // The card decodes before it filters, so that colours are mixed as light.
+    // With this format the GPU decodes sRGB before it filters, so that linear values are interpolated.
     texture.internalFormat = "SRGB8_ALPHA8";
     texture.generateMipmaps = true;
     texture.minFilter = THREE.LinearMipmapLinearFilter;
