@@ -1,4 +1,4 @@
-"""Embree's C API, ray packets, and how kernels are compiled and cached; no other package calls Embree."""
+"""Embree's C API, ray packets, and compilation and caching of kernels. No other package calls Embree."""
 
 from baker.trace.kernel_cache import keep_kernels
 

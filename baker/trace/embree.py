@@ -1,7 +1,7 @@
 """Embree's C API, loaded from the library in the `embreex` wheel.
 
-No other file uses Embree's functions and constants. `RayScene` owns the device, its scenes and the vertex
-memory; kernels get integers (function addresses and scene pointers).
+Other files do not use Embree's functions and constants. `RayScene` owns the Embree device, its scenes and the
+vertex memory. Kernels receive integers: addresses of functions and of scenes.
 
 Based on: Embree 4 API reference (Intel, 2023), rtcore.h of Embree 4.4.
 """
@@ -24,10 +24,12 @@ _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
 _SCENE_ROBUST = 1 << 2
-# Up to this number of triangles rays of neighbouring texels hit the same ones, and their packets are traced
-# as coherent. *Measured*, final gather at 512 with 64 rays, time relative to incoherent: 0.79 with 36
-# triangles, 0.81 with 446, 0.77 with 986, 0.74 with 2714, 0.93 to 1.2 with 11 thousand, 1.35 with 70
-# thousand.
+# Number of triangles up to which packets are traced as coherent, because rays of neighbouring texels then hit
+# the same triangles. Measured: final gather of one 512 x 512 page with 64 rays per texel, time with coherent
+# packets divided by time with incoherent ones:
+#
+#     triangles   36     446    986    2714   11,000        70,000
+#     time        0.79   0.81   0.77   0.74   0.93 to 1.2   1.35
 MAX_COHERENT_TRIANGLES = 4096
 _QUALITY_MEDIUM = 1
 _ERROR_OUT_OF_MEMORY = 4
@@ -40,7 +42,8 @@ _ERRORS = {
     6: "cancelled",
 }
 
-# name: (result type, argument types); p pointer, i int, u unsigned, z size_t, l ssize_t
+# Name of each function: (result type, argument types). One letter is one type: p pointer, i int, u unsigned,
+# z size_t, l ssize_t.
 _SIGNATURES = {
     "rtcNewDevice": ("p", "p"), "rtcReleaseDevice": ("", "p"), "rtcGetDeviceProperty": ("l", "pi"),
     "rtcGetDeviceError": ("i", "p"), "rtcNewScene": ("p", "p"), "rtcReleaseScene": ("", "p"),
@@ -58,7 +61,7 @@ _TYPES: dict[str, Any] = {
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Load Embree 4 from embreex's installed files."""
+    """Load Embree 4 from the installed files of the package `embreex`."""
     try:
         installed = files("embreex") or []
     except PackageNotFoundError:
@@ -73,7 +76,7 @@ def _library() -> ctypes.CDLL:
     try:
         library = ctypes.CDLL(str(named[0].locate()))
     except OSError:
-        # Its dependency TBB is found after the import of the extension module that links both.
+        # Embree's dependency TBB was not found. Importing the extension module loads it.
         import embreex.rtcore  # noqa: F401
 
         library = ctypes.CDLL(str(named[0].locate()))
@@ -85,12 +88,12 @@ def _library() -> ctypes.CDLL:
 
 
 def embree_version() -> str:
-    """Return the version of the Embree library in use, for example "4.4.0".
+    """Return the version of the Embree library in use.
 
     Returns
     -------
     str
-        Major, minor and patch number.
+        Major, minor and patch number, for example "4.4.0".
     """
     library = _library()
     device = library.rtcNewDevice(None)
@@ -100,23 +103,22 @@ def embree_version() -> str:
 
 
 class Tracer(NamedTuple):
-    """Addresses that a kernel needs to trace rays; valid while the `RayScene` exists.
+    """Addresses that a kernel needs to trace rays. They are valid until the `RayScene` is closed.
 
     Attributes
     ----------
     scene : int
-        RTCScene.
+        Address of the RTCScene of all triangles.
     intersect, occluded : int
         Addresses of rtcIntersectN and rtcOccludedN.
     width : int
-        N, the widest packet that this CPU traces natively.
+        N, the widest packet that this CPU traces natively: 4, 8 or 16.
     blend_scene : int or None
-        RTCScene of the BLEND triangles that let light through; None without any.
+        Address of the RTCScene of the BLEND triangles that let light through; None without such triangles.
     coherent : bool
-        Whether packets are traced as coherent: the scene has at most `MAX_COHERENT_TRIANGLES`, and rays of
-        neighbouring texels hit the same ones.
+        Whether packets are traced as coherent: the scene has at most `MAX_COHERENT_TRIANGLES` triangles.
     coloured : bool
-        Whether any triangle of `blend_scene` colours the light that passes.
+        Whether any triangle of `blend_scene` colours the light that passes through it.
     """
 
     scene: int
@@ -128,7 +130,7 @@ class Tracer(NamedTuple):
     coloured: bool = False
 
     def without_transmittance(self) -> Tracer:
-        """Return a tracer without coloured transmittance, for occlusion and distance queries."""
+        """Return a tracer that computes no transmittance, for occlusion and distance queries."""
         return self._replace(blend_scene=None)
 
 
@@ -138,15 +140,15 @@ class HitFilter(NamedTuple):
     Attributes
     ----------
     chosen : (T,) bool
-        Triangles with the callback.
+        Whether each triangle has the callback.
     function : int
-        Address of `void f(RTCFilterFunctionNArguments*)`; it sets `valid` of rejected hits to 0.
+        Address of `void f(RTCFilterFunctionNArguments*)`, which sets `valid` of rejected hits to 0.
     data : int
         `geometryUserPtr` of the callback.
     owner : object
-        Keeps function and data alive.
+        A reference that prevents the release of function and data.
     coloured : bool
-        Whether any of the triangles colours the light that passes.
+        Whether any of these triangles colours the light that passes through it.
     """
 
     chosen: NDArray[np.bool_]
@@ -157,32 +159,32 @@ class HitFilter(NamedTuple):
 
 
 class RayScene:
-    """Triangles that rays are traced against.
+    """The Embree scene of T triangles.
 
-    A hit on a triangle of `hit_filter` has geometry 1, on one of `blend_filter` geometry 2, on another one 0.
-    Triangles keep their numbers.
+    A hit has `geomID` 2 on triangles of `blend_filter`, 1 on the other triangles of `hit_filter`, and 0 on
+    the remaining triangles. Its `primID` is the index of the triangle in `triangle`.
 
     Parameters
     ----------
     position : (V, 3) float32, metres, world
         Vertices.
     triangle : (T, 3) uint32 or int32
-        Their corners.
+        Indices of the triangles' vertices.
     robust : bool
-        Embree's ROBUST flag: rays through shared edges never leak. Of rays aimed exactly at a vertex 0.7 % do
-        (17 % without the flag): Embree's own limit.
+        Embree's ROBUST flag. With it, no ray leaks through a shared edge. Of rays aimed exactly at a vertex,
+        0.7 % leak with the flag and 17 % without it.
     threads : int
-        Threads of the tree's build; 0 means all.
+        Number of threads that build the tree; 0 means all.
     hit_filter : HitFilter, optional
-        Triangles that do not block everywhere.
+        Triangles that may let rays pass.
     blend_filter : HitFilter, optional
-        Those of them that let a share of the light through. They also form a second tree,
+        The triangles of `hit_filter` that let a share of the light through. They also form a second scene,
         `Tracer.blend_scene`, in which this filter is called.
 
     Raises
     ------
     ResourceError
-        If Embree is absent, of another major version, or runs out of memory.
+        If Embree is absent, has another major version, or runs out of memory.
     """
 
     def __init__(
@@ -199,8 +201,8 @@ class RayScene:
         self._library = library
         self._owners = hit_filter, blend_filter
         n = len(position)
-        # Row n is NaN: triangles that a geometry leaves out get it as vertices, and Embree skips them. The
-        # last row is spare: Embree reads 16 bytes at each vertex.
+        # With filters, vertex n is NaN. Triangles that are not in a geometry have it as all their vertices,
+        # so that Embree skips them. The last row is padding, because Embree reads 16 bytes at each vertex.
         self._position = np.zeros((n + (1 if hit_filter is None else 2), 3), np.float32)
         self._position[:n] = position
         whole = np.ascontiguousarray(triangle, np.uint32)
@@ -222,7 +224,7 @@ class RayScene:
             raise ResourceError("Embree 4 is needed; install embreex 4.4 or newer")
         filters = (None, hit_filter, hit_filter)
         parts = zip(range(3), self._triangles, filters, strict=False) if len(triangle) else ()
-        # Leave out a filtered geometry without triangles; the others keep their numbers.
+        # Omit geometry 1 if it has no triangles. The other geometries keep their numbers.
         scene = self._add_scene([part for part in parts if part[0] != 1 or kept[1].any()], robust)
         blend_scene = None
         if blend_filter is not None:
@@ -301,6 +303,6 @@ class RayScene:
             self._device = None
 
     def __del__(self) -> None:
-        """Release them if `close` was not called."""
+        """Release scenes and device if `close` was not called."""
         if getattr(self, "_device", None):
             self.close()

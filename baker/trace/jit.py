@@ -1,13 +1,13 @@
 """Decorators and primitives of kernels, chosen for short compile times.
 
-The first bake after an install has to compile them. Measured with Numba 0.68:
+The first bake after an install compiles all kernels that it uses. Compile times measured with Numba 0.68:
 
-- A wrapper that makes a function callable from Python or C takes 40 ms. A `kernel` has one, an `inner`
-  function none.
-- Both are compiled without reference counts: their arrays are owned by Python, and they store none.
-- `np.zeros` compiles three functions (0.2 s), `scratch` none.
-- `min` and `max` compile a function for each combination of types (40 ms) and call it; `smaller` and `larger`
-  are one instruction.
+- A wrapper that makes a function callable from Python takes 40 ms. A `kernel` has a wrapper, an `inner`
+  function has none.
+- Kernels and inner functions are compiled without reference counts, because Python owns all their arrays.
+- `np.zeros` compiles three functions in 0.2 s. `scratch` compiles none.
+- `min` and `max` compile a function for each combination of types in 40 ms. `smaller` and `larger` compile
+  to a comparison and a selection.
 """
 
 from __future__ import annotations
@@ -28,28 +28,29 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wra
 
 # Decorator of a function that Python calls.
 kernel: Any = njit(cache=True, **_OPTIONS)
-# Decorator of a function that kernels call: it remains a Python function, and is compiled into each kernel.
+# Decorator of a function that kernels call. It stays a Python function and is compiled into each kernel.
 inner: Any = register_jitable(**_OPTIONS)
-# The same, always inlined by LLVM: literal arguments become constants of its code.
+# Decorator of an inner function that LLVM always inlines, so that literal arguments become constants in its
+# code.
 pasted: Any = register_jitable(forceinline=True, **_OPTIONS)
 
 
 def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
-    """Return a function for kernels that makes a zeroed array on the stack of the calling kernel.
+    """Return a function, callable in kernels, that allocates an array of zeros on the stack.
 
-    The array must not be returned. Its shape is part of the code, so loops over it need no checks.
+    The kernel must not return the array. The shape is a compile-time constant of the kernel.
 
     Parameters
     ----------
     shape : tuple of int
         Shape of the array.
     dtype : data-type
-        Type of its items.
+        Type of the array's items.
 
     Returns
     -------
     intrinsic
-        Takes no arguments, and returns the array.
+        A function without arguments that returns the array.
     """
     element = from_dtype(np.dtype(dtype))
     array = types.Array(element, len(shape), "C")
@@ -80,7 +81,7 @@ def scratch(shape: tuple[int, ...], dtype: DTypeLike) -> Any:
 
 
 def _choice(comparison: str) -> Any:
-    """Return an intrinsic `choose(a, b)`: b if `b comparison a`, else a."""
+    """Return an intrinsic `choose(a, b)` that returns b if `b <comparison> a` is true, else a."""
 
     def choose(typing_context, a, b):  # type: ignore[no-untyped-def]
         common = typing_context.unify_types(a, b)
@@ -103,6 +104,7 @@ def _choice(comparison: str) -> Any:
     return intrinsic(choose)
 
 
-# The smaller and the larger of two numbers, for kernels; the first one if either is NaN.
+# Functions for kernels that return the smaller and the larger of two numbers; the first number if either is
+# NaN.
 smaller = _choice("<")
 larger = _choice(">")

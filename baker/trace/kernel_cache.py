@@ -1,12 +1,12 @@
 """Deletes outdated cached kernels, and allows kernels without a cache folder.
 
-Numba compiles a cached kernel again only if the kernel's own file has changed. Functions compiled into it may
-be in other files: after an update of those it would run outdated code, on arrays of another layout. So
-importing a package with kernels deletes cache files that are older than any file they depend on.
+Numba compiles a cached kernel again only if the file of the kernel has changed. The functions compiled into
+the kernel may be in other files. If only those change, Numba runs outdated code. So importing a package with
+kernels deletes all cache files that are older than a source file they may depend on.
 
-Numba also refuses to define a function with `cache=True` where no cache folder can be written, as in a
-read-only install. Then this file replaces a method of Numba's dispatcher classes for the process
-(`allow_no_cache`), and the kernels of this program are compiled in memory, in every process.
+Numba also raises an error for a function with `cache=True` if no cache folder is writable, for example in a
+read-only install. In that case `allow_no_cache` replaces a method of Numba's dispatcher classes. The kernels
+of this program are then compiled in memory, in every process.
 """
 
 from __future__ import annotations
@@ -21,16 +21,14 @@ from typing import Any
 
 
 def keep_kernels(package_file: str, *made_of: str) -> None:
-    """Prepare a package whose kernels are about to be defined.
-
-    Deletes outdated cache files of the package, and lets its kernels be defined where nothing can be cached.
+    """Call `drop_stale` and `allow_no_cache` for a package, before its kernels are defined.
 
     Parameters
     ----------
     package_file : str
-        `__file__` of the package, or of the only file in it that has kernels.
+        `__file__` of the package, or of the only module in it that has kernels.
     *made_of : str
-        Dotted names of the other packages that its kernels take functions from.
+        Dotted names of the other packages whose functions are compiled into its kernels.
     """
     folder = Path(package_file).parent
     drop_stale(folder, [folder, *map(_folder_of, made_of)])
@@ -38,7 +36,7 @@ def keep_kernels(package_file: str, *made_of: str) -> None:
 
 
 def _folder_of(package: str) -> Path:
-    """Return the folder of a package without running its code."""
+    """Return the folder of a package without importing it."""
     found = importlib.util.find_spec(package)
     if found is None or not found.submodule_search_locations:
         raise ImportError(f"{package} is no package")
@@ -46,44 +44,44 @@ def _folder_of(package: str) -> Path:
 
 
 def drop_stale(folder: Path, made_of: list[Path]) -> None:
-    """Delete cache files of a package that are older than a file that its kernels may depend on.
+    """Delete the cache indices of a package that are older than a source file its kernels may depend on.
 
     Parameters
     ----------
     folder : Path
-        The package.
+        Folder of the package.
     made_of : list of Path
-        Packages with those files.
+        Folders of all packages whose functions are compiled into its kernels, including `folder`.
     """
     newest = max((file.stat().st_mtime for part in made_of for file in part.glob("*.py")), default=0.0)
     if newest > time.time():
-        # A source is from the future (wrong clock): every cached kernel would be deleted in each run.
+        # A source file has a time in the future, because a clock was wrong. Every cached kernel is older than
+        # it and would be deleted in each run.
         return
     for index in folder.glob("__pycache__/*.nbi"):
-        # Another process may have deleted it, or the folder is read-only.
+        # Ignore the error if another process has deleted the file, or if the folder is read-only.
         with contextlib.suppress(OSError):
             if index.stat().st_mtime < newest:
                 index.unlink()
 
 
 def is_stored(kernel: Any) -> bool | None:
-    """Return whether machine code of a kernel is on disk.
+    """Return whether the cache of a kernel on disk has both an index and machine code.
 
     Parameters
     ----------
     kernel : numba dispatcher
-        A function that `trace.jit.kernel` made.
+        A function decorated with `trace.jit.kernel`.
 
     Returns
     -------
     bool or None
-        None if this install has no folder in which compiled kernels can be stored.
+        None if this install has no writable cache folder.
 
     Notes
     -----
-    Numba names the files after the module, the function, its first line and the Python version, and has no
-    public name for them; they are read from the function's own cache, so a renamed kernel has renamed files.
-    An index without machine code is not enough: `drop_stale` removes only indices.
+    Numba has no public function for the names of the cache files, so they are read from private attributes of
+    the kernel. `drop_stale` deletes an index (.nbi) and leaves the machine code (.nbc), so both are required.
     """
     folder = kernel._cache.cache_path
     if folder is None:
@@ -93,18 +91,18 @@ def is_stored(kernel: Any) -> bool | None:
 
 
 def allow_no_cache(folder: Path) -> None:
-    """Let kernels of this program be defined where they cannot be cached.
+    """Allow the definition of kernels that cannot be cached on disk.
 
     Parameters
     ----------
     folder : Path
-        Package whose kernels are about to be defined.
+        Folder of a package whose kernels are about to be defined.
 
     Notes
     -----
-    Does nothing where the package's own cache folder can be written, which is nearly always. Else, since
-    Numba has no setting for it, `enable_caching` of its two classes of compiled functions is replaced for
-    this process. The replacement suppresses Numba's error for functions of `baker` only.
+    If the cache folder of the package is writable, this function does nothing. Otherwise, it replaces
+    `enable_caching` of Numba's two classes of compiled functions in this process, because Numba has no
+    setting for this case. The replacement suppresses Numba's error for functions of `baker` only.
     """
     kept = folder / "__pycache__"
     if os.access(kept if kept.exists() else folder, os.W_OK):
@@ -118,7 +116,10 @@ def allow_no_cache(folder: Path) -> None:
 
 
 def _suppress_error(kind: Any, function: str) -> None:
-    """Replace `enable_caching` of a class of Numba by one without its error for functions of `baker`."""
+    """Replace `enable_caching` of a Numba class `kind` by a method that ignores its error in `baker`.
+
+    function : name of the attribute of `kind` that is the Python function
+    """
     keep = kind.enable_caching
 
     def enable_caching(self: Any) -> None:

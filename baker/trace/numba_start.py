@@ -1,7 +1,7 @@
-"""A faster start of Numba for processes of the command line.
+"""Starts Numba without scipy.linalg, for processes of the command line.
 
-Before Numba compiles its first function it imports scipy.linalg, for `np.dot` in kernels. That takes 0.15 to
-0.3 s, a tenth of a small bake, and no kernel here uses it.
+Before Numba compiles its first function, it imports scipy.linalg to support `np.dot` in kernels. The import
+takes 0.15 to 0.3 s, and no kernel of this program uses `np.dot`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import sys
 def skip_blas() -> None:
     """Import Numba's array functions without scipy.linalg.
 
-    `sys.modules["scipy"]` is None while they are imported, and restored afterwards. Kernels of this process
-    can then not use `np.dot` and `np.linalg`, so a program that imports `baker` as a library must not call
-    this. It has no effect if scipy.linalg is loaded already.
+    `sys.modules["scipy"]` is None during the import, and restored afterwards. Later, kernels of this process
+    cannot use `np.dot` and `np.linalg`. So a program that imports `baker` as a library must not call this
+    function. If scipy.linalg is already loaded, this function does nothing.
     """
     if "scipy.linalg" in sys.modules:
         return
-    # An entry of None makes the import fail at once. `import numba` loads scipy, but not scipy.linalg.
+    # With the entry None, `import scipy.linalg` raises ImportError, which Numba handles. `import numba`
+    # itself has loaded scipy, but not scipy.linalg.
     loaded = sys.modules.get("scipy")
     sys.modules["scipy"] = None  # type: ignore[assignment]
     try:

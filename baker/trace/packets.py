@@ -1,12 +1,12 @@
 """Ray packets in Numba kernels: memory layout, and calls through function addresses.
 
-A packet of width N is 12 rows (ray) and 9 rows (hit) of N four-byte numbers, laid out as RTCRayN and
-RTCRayHitN. Kernels call Embree through an address held in an integer: with a ctypes object Numba could not
-cache them.
+A packet of N rays is an array of 21 rows of N four-byte numbers: 12 rows for the rays and 9 rows for their
+hits, laid out as RTCRayHitN. Lane i is column i, which holds ray i. Kernels call Embree through integer
+addresses, because Numba cannot cache kernels that call ctypes objects.
 
 The kernels of a bake trace PACKET_WIDTH rays at a time, whatever width the processor traces natively
-(`trace_lanes`): with rows at constant offsets in one array, loops over lanes are vectorised. Generating a
-cosine-weighted ray takes 3.5 ns that way, and 28 ns where the width is a variable.
+(`trace_lanes`). The rows of a packet are then at constant offsets, so that the compiler vectorises loops over
+lanes. Generating a cosine-weighted ray takes 3.5 ns with a constant width, and 28 ns with a variable one.
 
 Based on: Embree 4 API reference, RTCRayHitN.
 """
@@ -24,31 +24,32 @@ from numpy.typing import NDArray
 from baker.trace.embree import Tracer
 from baker.trace.jit import inner
 
-# Rows of a packet, in units of its width.
+# Rows of a packet: those of RTCRayN, then those of RTCHitN. ROWS is their number.
 ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = range(12)
 NG_X, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID = range(12, 19)
 ROWS = 21
 MAX_WIDTH = 16
-# Rays that the kernels of a bake trace together.
+# Number of rays that the kernels of a bake trace together.
 PACKET_WIDTH = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
-# Fields of RTCFilterFunctionNArguments, 8 bytes each; FILTER_WIDTH has 4.
+# Fields of RTCFilterFunctionNArguments, in units of 8 bytes. FILTER_WIDTH is a field of 4 bytes.
 FILTER_VALID, FILTER_DATA, FILTER_CONTEXT, FILTER_RAY, FILTER_HIT, FILTER_WIDTH = range(6)
-# Geometry of BLEND triangles.
+# `geomID` of BLEND triangles, see `RayScene`.
 BLEND_GEOMETRY = np.uint32(2)
-# Values of a ray's ID row: treatment of BLEND surfaces of alpha a and colour c.
+# Values of a ray's ID row. They select what the hit filter does at a BLEND surface of alpha a and colour c.
+# T = (1 - a) lerp(1, c, a) is the transmittance of the surface, t is `BlendBuffers.transmittance` of ray n -
+# 1:
 #
-#     tree of all triangles    0             stops with probability a
-#                              n = 1 to 16   passes; T = (1 - a) lerp(1, c, a) is multiplied into
-#                                            `BlendBuffers.transmittance` of ray n - 1
-#                              UNAWARE       stops only where a = 1
-#                              SOLID         passes only where a = 0
-#     tree of BLEND triangles  n = 1 to 16   passes; lerp(1, c, a) is multiplied
-#                              PASSES + n    passes; T is multiplied
+#     scene of all triangles     0             the ray stops with probability a
+#                                n = 1 to 16   the ray passes, t is multiplied by T
+#                                UNAWARE       the ray stops if a = 1, else it passes
+#                                SOLID         the ray passes if a = 0, else it stops
+#     scene of BLEND triangles   n = 1 to 16   the ray passes, t is multiplied by lerp(1, c, a)
+#                                PASSES + n    the ray passes, t is multiplied by T
 PASSES, UNAWARE, SOLID = PACKET_WIDTH, np.uint32(2 * PACKET_WIDTH + 1), np.uint32(2 * PACKET_WIDTH + 2)
-# Four-byte words that filter functions of BLEND triangles read at the address of the query context:
-# RTCRayQueryContext, then `BlendBuffers.stop`, `.transmittance` and `.edges`, then EDGE_HITS pairs for each
-# ray, distance and surface of a hit on an edge (`edge_hits`).
+# Memory at the address of the query context, which filter functions of BLEND triangles read. Offsets in
+# four-byte words: first RTCRayQueryContext, then `BlendBuffers.stop`, `.transmittance` and `.edges`, then
+# EDGE_HITS pairs for each ray. A pair is the distance and the surface of a hit on an edge.
 EDGE_HITS = 32
 BLEND_STOP, BLEND_TRANSMITTANCE, BLEND_EDGES = 16, 16 + PACKET_WIDTH, 16 + 4 * PACKET_WIDTH
 BLEND_EDGE_HITS = BLEND_EDGES + PACKET_WIDTH
@@ -58,7 +59,11 @@ _COHERENT = 1 << 16
 
 
 def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-    """Emit a call of `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`, the last NULL if not given."""
+    """Emit a call of `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`.
+
+    args : address of f, `valid`, scene, packet and, optionally, the arguments; NULL is passed without them
+    kinds : Numba types of `args`
+    """
     byte_pointer = ir.IntType(8).as_pointer()
     function_type = ir.FunctionType(ir.VoidType(), [byte_pointer] * 4)
     function = builder.inttoptr(args[0], function_type.as_pointer())
@@ -73,9 +78,10 @@ def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 
 def _call_embree(typing_context, address, valid, scene, ray):  # type: ignore[no-untyped-def]
-    """Call the function at an address for a scene and the lanes of a packet.
+    """Call rtcIntersectN or rtcOccludedN for a packet.
 
-    address, scene : int64; valid : (N,) int32; ray : the packet, float32
+    address, scene : int64, addresses of the function and of the RTCScene
+    valid : (N,) int32, -1 for lanes to trace, else 0; ray : the packet, float32
     """
     signature = types.void(types.int64, valid, types.int64, ray)
 
@@ -89,7 +95,7 @@ call_embree: Any = intrinsic(_call_embree)
 
 
 def _call_embree_with(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
-    """Do the same with the arguments in an array, see `arguments_of`."""
+    """Call rtcIntersectN or rtcOccludedN as `call_embree`, with `arguments` (5,) int64 of `arguments_of`."""
     signature = types.void(types.int64, valid, types.int64, ray, arguments)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -102,7 +108,10 @@ call_embree_with: Any = intrinsic(_call_embree_with)
 
 
 def _copy_four(typing_context, target, to, source, start):  # type: ignore[no-untyped-def]
-    """Copy source[start : start + 4] to target[to : to + 4], four bytes an item, without bounds checks."""
+    """Copy source[start : start + 4] to target[to : to + 4], without bounds checks.
+
+    target, source : arrays of four-byte items
+    """
     signature = types.void(target, types.intp, source, types.intp)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -126,17 +135,18 @@ class BlendBuffers(NamedTuple):
     Attributes
     ----------
     scene : int
-        See `Tracer.blend_scene`.
+        `Tracer.blend_scene`.
     coloured : int
-        0 if no triangle of that scene colours light.
+        0 if no triangle of `scene` colours light.
     arguments : (5,) int64
-        RTCOccludedArguments, whose context passes the arrays below to the filter functions.
+        RTCOccludedArguments. The arrays below follow its query context in memory, so that filter functions
+        can access them.
     stop : (16,) uint32
-        Triangle at which each ray ends; it lets nothing through.
+        Triangle at which each ray ends. This triangle does not change the transmittance.
     transmittance : (3 * 16,) float32
-        Rows R, G, B.
+        Transmittance of each ray: a row of 16 numbers for R, then G, then B.
     edges : (16,) uint32
-        Number of hits on edges of triangles so far, see `edge_hits`.
+        Number of each ray's hits on edges of triangles so far.
     """
 
     scene: int
@@ -157,11 +167,11 @@ class PacketBuffers(NamedTuple):
     valid : (16,) int32
         -1 for lanes to trace, 0 for others.
     floats, words : (21 * 16,) float32 and uint32
-        A packet of the native width; both are the same memory.
+        A packet of the native width; both arrays share their memory.
     lane_valid, lane_floats, lane_words : ndarray
-        The same for PACKET_WIDTH rays: rows at offsets of 16 numbers.
+        `valid`, `floats` and `words` of a packet of PACKET_WIDTH rays.
     query : (5,) int64
-        `arguments_of` rays of neighbouring texels in this scene.
+        `arguments_of` packets of this scene, coherent if `Tracer.coherent`.
     blend : BlendBuffers or None
         None without BLEND triangles; Numba then compiles kernels without transmittance.
     """
@@ -183,14 +193,14 @@ class PacketBuffers(NamedTuple):
 def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
     """Return memory for a packet, at multiples of 64 bytes as Embree requires.
 
-    Rows that no kernel changes are set: time and tnear 0, all bits of the mask.
+    All rays have time 0, tnear 0 and all mask bits set. Kernels do not change these rows.
 
     Parameters
     ----------
     tracer : Tracer
         Scene to trace.
     solid : bool
-        Whether the sixteen rays stop at BLEND surfaces wherever alpha is above 0, see `SOLID`.
+        Whether the rays of `lane_floats` stop at BLEND surfaces of any alpha above 0, see `SOLID`.
 
     Returns
     -------
@@ -211,26 +221,26 @@ def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
 
 
 def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
-    """Return memory for transmittance.
+    """Return memory for the transmittance of sixteen rays.
 
     Parameters
     ----------
     scene : int
-        See `Tracer.blend_scene`.
+        `Tracer.blend_scene`.
     coloured : bool
-        See `Tracer.coloured`.
+        `Tracer.coloured`.
 
     Returns
     -------
     BlendBuffers
         Memory for one thread.
     """
-    # RTCRayQueryContext (without instances), followed by the arrays that the filter functions use.
+    # RTCRayQueryContext, with all instance IDs invalid, followed by the arrays that filter functions access.
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:BLEND_STOP] = NO_HIT
-    # Never coherent: with that flag Embree traverses the rays of each octant separately, but calls the filter
-    # for all rays of the packet at each leaf.
+    # Do not set the coherent flag. With it, Embree traverses the rays of each octant separately, but calls
+    # the filter for all rays of the packet at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]
@@ -238,9 +248,9 @@ def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
 
 
 def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:
-    """Return RTCIntersectArguments or RTCOccludedArguments, whose layouts are the same.
+    """Return RTCIntersectArguments or RTCOccludedArguments, whose layouts are equal.
 
-    32 bits of flags, 32 bits of features, no context, no filter or other functions.
+    The structure is 32 bits of flags, 32 bits of features, and NULL for context and functions.
 
     Parameters
     ----------
@@ -257,14 +267,14 @@ def arguments_of(*, coherent: bool = False) -> NDArray[np.int64]:
 
 
 def _packet_memory(width: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return `valid` and a packet of `width` lanes with all bits of the mask set."""
+    """Return `valid` (16,), all 0, and a packet of `width` lanes in (21 * 16,), with all mask bits set."""
     valid, floats = aligned_floats(MAX_WIDTH).view(np.int32), aligned_floats(ROWS * MAX_WIDTH)
     floats.view(np.uint32)[MASK * width : (MASK + 1) * width] = NO_HIT
     return valid, floats
 
 
 def aligned_floats(n: int) -> NDArray[np.float32]:
-    """Return zeros at a multiple of 64 bytes.
+    """Return an array of zeros whose address is a multiple of 64 bytes.
 
     Parameters
     ----------
@@ -285,8 +295,9 @@ def aligned_floats(n: int) -> NDArray[np.float32]:
 def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ignore[no-untyped-def]
     """Write one ray into a lane of a packet.
 
-    floats, words : (21 * width,) float32 and uint32, the packet, one memory
-    x, y, z : origin, metres; dx, dy, dz : direction; tfar : in units of its length
+    floats, words : (21 * width,) float32 and uint32, the packet; both arrays share their memory
+    x, y, z : origin, metres; dx, dy, dz : direction; tfar : end of the ray, in units of the direction's
+    length
     """
     floats[ORG_X * width + lane] = x
     floats[ORG_Y * width + lane] = y
@@ -300,9 +311,10 @@ def set_ray(floats, words, width, lane, x, y, z, dx, dy, dz, tfar):  # type: ign
 
 @inner
 def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
-    """Trace the lanes whose `valid` is -1; hits are written into the packet.
+    """Trace the lanes whose `valid` is -1, and write their hits into the packet.
 
-    function : address; scene : of `Tracer`; valid : (width,) int32; floats : (21 * width,) float32
+    function : address of `intersect` or `occluded`; scene : see `Tracer`
+    valid : (width,) int32; floats : (21 * width,) float32, the packet
     """
     call_embree(function, valid, scene, floats)
 
@@ -311,14 +323,15 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
     """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
 
-    function : address of intersect or occluded; scene, width, query : of `PacketBuffers`
-    lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, the rays; hits are written into them
-    valid, floats : packet memory of the native width, of `PacketBuffers`
+    function : address of `intersect` or `occluded`; scene, width, query : see `PacketBuffers`
+    lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, packet of the sixteen rays and their hits
+    valid, floats : working memory, a packet of the native width, see `PacketBuffers`
     """
     if width == PACKET_WIDTH:
         call_embree_with(function, lane_valid, scene, lane_floats, query)
         return
-    # Copy four lanes at a time: for loops over lanes the compiler generates twenty times as much code.
+    # Copy four lanes at a time with `copy_four`, for which the compiler generates less code than for loops
+    # over lanes.
     for first in range(0, PACKET_WIDTH, width):
         lane = first
         while lane < first + width and lane_valid[lane] == 0:

@@ -1,4 +1,4 @@
-"""Access to memory by address: arrays in compiled callbacks, and prefetches."""
+"""Numba intrinsics for memory addresses: conversion to a pointer, and prefetch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 
 def _pointer(typing_context, address):  # type: ignore[no-untyped-def]
-    """Return an int64 address as a pointer for `numba.carray`."""
+    """Convert an int64 address to a pointer, an argument of `numba.carray`."""
     signature = types.voidptr(types.int64)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
