@@ -1,1 +1,1 @@
-"""Pictures of a scene: path-traced, of its ambient occlusion, or lit by a bake."""
+"""Pictures of a scene: path-traced radiance, ambient occlusion, or the radiance that a bake gives."""

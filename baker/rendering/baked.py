@@ -1,4 +1,4 @@
-"""The light of a bake at points of its surfaces, looked up as an engine does it."""
+"""Radiance of surfaces lit by a bake: lightmaps are looked up bilinearly, as engines do."""
 
 from __future__ import annotations
 
@@ -33,8 +33,9 @@ class BakedLight:
     Attributes
     ----------
     bake : StoredBake
+        The bake, read from its output folder.
     geometry : Geometry
-        With its lightmap uv.
+        World geometry of the baked scene, with the lightmap uv of the bake.
     """
 
     bake: StoredBake
@@ -47,7 +48,7 @@ class BakedLight:
         Raises
         ------
         InputError
-            If the folder holds no bake, or one without irradiance.
+            If the folder contains no bake, or the bake has no irradiance.
         """
         bake = read_bake(folder)
         if "irradiance" not in bake.maps:
@@ -55,7 +56,10 @@ class BakedLight:
         return cls(bake, world_geometry(bake.scene, bake.atlas))
 
     def radiance(self, reference: Reference, hits: FirstHits) -> NDArray[np.float64]:
-        """Return the radiance (n, 3), cd/m2, that leaves hits; 0 for misses and one-sided backs."""
+        """Return the radiance (n, 3), cd/m2, that leaves n hits towards the camera.
+
+        It is 0 for rays without a hit and at the backs of one-sided surfaces.
+        """
         light = np.zeros((len(hits.triangle), 3))
         lit = np.flatnonzero(hits.lit)
         triangle, bary = hits.triangle[lit], hits.bary[lit]
@@ -71,9 +75,11 @@ class BakedLight:
 
 @kernel
 def add_emission(chosen, surface, triangle, bary, shading, light):  # type: ignore[no-untyped-def]
-    """Add the emitted radiance at hits `chosen` (m,) to `light` (n, 3).
+    """Add the emitted radiance of the hits `chosen` to `light`.
 
-    surface : `Surfaces.row`; triangle : (n,) triangle of each hit; bary : (n, 2)
+    chosen : (m,) int64, indices of hits; surface : (T, 32) float32, see `Surfaces.row`
+    triangle : (n,) int32, triangle of each hit; bary : (n, 2) float64, barycentrics of each hit
+    light : (n, 3) float64, in and out, cd/m2
     """
     value, rgba = _new_value(), _new_rgba()
     for i in chosen:
@@ -85,12 +91,12 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
 
 
 def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
-    """Return a warning if a scene file differs from the baked one.
+    """Return a list with a warning if a scene file differs from the file that was baked, else an empty list.
 
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file differs and cannot be read.
     """
     own = bake.folder / SCENE_NAME
     known = bake.manifest.get("input", {}).get("sha256")
@@ -104,9 +110,12 @@ def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
 def bilinear(
     pages: NDArray[np.float32], page: NDArray[np.int32], uv: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Look pages (P, H, W, C) up at uv (n, 2), v = 0 being the first row; return (n, C)."""
+    """Return the values (n, C) of pages (P, H, W, C) at n points, interpolated bilinearly.
+
+    page : (n,) int32, page of each point; uv : (n, 2) float64, page uv of each point, v = 0 at the first row
+    """
     height, width = pages.shape[1:3]
-    # Bounded first: uv far outside of the page fit no integer.
+    # Clip before the conversion to integers, because uv far outside the page would overflow.
     x, y = (np.clip(uv[:, axis] * size - 0.5, -1, size) for axis, size in ((0, width), (1, height)))
     left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     total = np.zeros((len(uv), pages.shape[3]))

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from baker.core.errors import SettingsError
 from baker.core.scene import Camera
 
-# Cameras listed in an error before the rest is only counted.
+# Largest number of cameras that an error message lists.
 _LISTED = 12
 
 
 def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
-    """Return the camera of a name, or of an index in the order of the file, from 0.
+    """Return the camera with a name or an index.
 
     Parameters
     ----------
     cameras : sequence of Camera
-        As `baker inspect` lists them.
+        Cameras of the file, in its order.
     text : str
-        A name or an index; a camera with this name is preferred to one with this index.
+        A name, or an index from 0. A camera with this name is preferred to the camera with this index.
 
     Returns
     -------
@@ -29,7 +29,8 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     Raises
     ------
     SettingsError
-        If no camera has that name or index, or several have the name; it lists the cameras.
+        If no camera has that name or index, or if several cameras have the name. The message lists the
+        cameras.
     """
     found = [camera for camera in cameras if camera.name == text]
     if len(found) == 1:

@@ -1,6 +1,7 @@
-"""The passes whose mean is a picture, and the layers that need first hits only.
+"""The passes of a picture, and the layers that are computed from first hits.
 
-Pixels are computed in blocks, so that temporary memory does not grow with the picture.
+A pass estimates the value of every pixel, and a picture is the mean of its passes. Pixels are computed in
+blocks, so that temporary memory does not grow with the picture.
 """
 
 from __future__ import annotations
@@ -27,28 +28,35 @@ from baker.pathtracer.scene import Reference
 from baker.rendering.baked import BakedLight
 from baker.rendering.settings import RenderSettings
 
-# Samples of a pixel in one pass.
+# Number of samples of a pixel in one pass, for radiance and for ambient occlusion.
 _PASS, _OPENNESS_PASS = 4, 16
-# Samples per second of a slow machine, for the size of passes under a time limit.
+# Samples per second on a slow machine, for radiance and for ambient occlusion. With a time limit, they
+# determine the number of samples in a pass.
 _RATE, _OPENNESS_RATE = 2.0e4, 2.0e5
+# Number of pixels of a block.
 _BLOCK = 1 << 14
+# Number of camera rays through a pixel for the layers of `first_layers`.
 _AOV_SAMPLES = 4
 
 
 @dataclass
 class Run:
-    """One picture being rendered.
+    """A picture while it is rendered.
 
     Attributes
     ----------
     reference : Reference
+        The scene.
     camera : Camera
+        The camera, in world space.
     settings : RenderSettings
+        Settings of the picture.
     start : float
-        When it began, by `time.monotonic`.
+        Time at which rendering started, by `time.monotonic`, seconds.
     progress : Progress
+        Called with stage, fraction and detail.
     passed : float
-        When the last pass ended, 0 before the first.
+        Time at which the last pass ended, by `time.monotonic`, seconds; 0 before the first pass.
     """
 
     reference: Reference
@@ -64,7 +72,11 @@ class Run:
         return self.settings.width * self.settings.height
 
     def samples(self, most: int, rate: float) -> int:
-        """Return the samples of a pass: `most`, or less so that there are two passes, or time is short."""
+        """Return the number of samples of a pixel in a pass: `most`, or fewer, but at least 1.
+
+        It is at most half the requested samples, so that there are two passes. With a time limit, a pass at
+        `rate` samples per second takes at most that time.
+        """
         goal, limit = self.settings.goal, self.settings.time_limit
         if goal is not None:
             most = min(most, goal // 2)
@@ -73,11 +85,11 @@ class Run:
         return max(most, 1)
 
     def enough(self, estimate: PointEstimate) -> bool:
-        """Return whether rendering may end: all samples are made, or another pass would take too long."""
+        """Return whether rendering can end: all samples are done, or one more pass exceeds the time limit."""
         now = time.monotonic()
         last, self.passed = now - self.passed, now
         self.show(estimate, 0.0)
-        # At least two passes: the variance needs two.
+        # The variance needs at least two passes.
         if estimate.rounds < 2:
             return False
         goal, limit = self.settings.goal, self.settings.time_limit
@@ -86,7 +98,7 @@ class Run:
         return limit is not None and now - self.start + last > limit
 
     def show(self, estimate: PointEstimate, part: float) -> None:
-        """Report the progress of the picture; `part` of the next pass is done."""
+        """Report the progress of the picture, of which the fraction `part` of the next pass is done."""
         goal, limit = self.settings.goal, self.settings.time_limit
         done = estimate.rounds * estimate.samples
         by_samples = 0.0 if goal is None else (done + part * estimate.samples) / goal
@@ -94,7 +106,7 @@ class Run:
         report(self.progress, Stage.RENDERING, min(max(by_samples, by_time), 1.0), f"{done} samples a pixel")
 
     def within(self, estimate: PointEstimate) -> Progress:
-        """Return a progress callback for one pass: its fraction is scaled to that of the picture."""
+        """Return a callback that takes the progress of one pass and reports the progress of the picture."""
 
         def scaled(_: str, fraction: float, __: str = "", /) -> None:
             self.show(estimate, fraction)
@@ -102,14 +114,14 @@ class Run:
         return scaled
 
     def hits(self, begin: int, end: int, number: int) -> FirstHits:
-        """Return the first hits of one ray through each pixel from `begin` to `end` in pass `number`."""
+        """Return the first hits, in pass `number`, of one ray through each of pixels `begin` to `end` - 1."""
         settings, camera = self.settings, self.camera
         pixel = np.arange(begin, end)
         direction = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
         return first_hits(self.reference, self.reference.local(camera.position), direction.reshape(-1, 3))
 
     def blocks(self, work: Callable[[int, int], None], progress: Progress) -> None:
-        """Call `work(begin, end)` for all pixels, on all threads."""
+        """Call `work(begin, end)` for each block of pixels, on all threads."""
         run_tiles(
             self.pixels,
             _BLOCK,
@@ -121,7 +133,7 @@ class Run:
 
 
 def traced(run: Run) -> PointEstimate:
-    """Return the radiance (H * W, 3), cd/m2, that path tracing finds."""
+    """Return the path-traced radiance (H * W, 3), cd/m2."""
     settings = run.settings
     estimate = new_estimate(run.pixels, 3, run.samples(_PASS, _RATE))
     bounces = None if settings.max_depth is None else settings.max_depth - 1
@@ -135,7 +147,7 @@ def traced(run: Run) -> PointEstimate:
 
 
 def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
-    """Return ambient occlusion (H * W, 1), 0 to 1; 1 where a camera ray hits nothing."""
+    """Return ambient occlusion (H * W, 1), 0 to 1. A camera ray without a hit contributes 1."""
     estimate = new_estimate(run.pixels, 1, run.samples(_OPENNESS_PASS, _OPENNESS_RATE))
     while not run.enough(estimate):
         cast = run.pixels
@@ -147,7 +159,8 @@ def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
             one = new_estimate(len(met), 1, estimate.samples)
             one.rounds = estimate.rounds
             where = (a[met][:, None] for a in (hits.position, hits.normal, hits.face_normal))
-            # Points are numbered from 0 in each block: with one seed all blocks would draw the same numbers.
+            # Points are numbered from 0 in each block, so each block needs its own seed to get different
+            # random numbers.
             seed = (run.settings.seed + 7919 * (begin // _BLOCK)) & 0x7FFFFFFF
             ambient_occlusion_pass(run.reference, one, *where, distance=distance, seed=seed)
             share = np.ones((end - begin, 1))
@@ -160,7 +173,11 @@ def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
 
 
 def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
-    """Return the radiance an engine shows (H * W, 3), cd/m2: albedo x map / pi + emission, or the sky."""
+    """Return the radiance (H * W, 3), cd/m2, that an engine shows with the bake.
+
+    It is albedo x irradiance / pi + emission at first hits, and `sky` for rays without a hit. Both are
+    multiplied by the transmittance of `BLEND` surfaces.
+    """
     estimate = new_estimate(run.pixels, 3, 1)
 
     def work(begin: int, end: int) -> None:
@@ -177,7 +194,11 @@ def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> Poin
 
 
 def first_layers(run: Run) -> dict[str, NDArray[np.float32]]:
-    """Return albedo and normal of first hits, means over a few samples, and the depth of the first sample."""
+    """Return the layers of first hits: "albedo", "normal" (H, W, 3) and "depth" (H, W, 1), metres.
+
+    Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is that of the first ray, 0 without a
+    hit.
+    """
     n = run.pixels
     total: dict[str, NDArray[Any]] = {
         "albedo": np.zeros((n, 3)), "normal": np.zeros((n, 3)), "depth": np.zeros((n, 1))

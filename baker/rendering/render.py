@@ -33,15 +33,23 @@ class Picture(Result):
     Attributes
     ----------
     colour : (H, W, 3) float32
-        Radiance, cd/m2; or ambient occlusion, three equal components.
+        Radiance, cd/m2, linear Rec.709; or ambient occlusion, 0 to 1, in three equal components.
     variance : (H, W, 3) float32
-        Of `colour`, before denoising.
-    layers : dict of name to (H, W, C) float32
+        Squared standard error of `colour` before denoising.
+    layers : dict of str to (H, W, C) float32
+        The layers that the setting `aov` names, by name.
     unit : str
-    spp, rays : int
+        Unit of `colour`: "cd/m2", or "1" for ambient occlusion.
+    spp : int
+        Number of samples of each pixel.
+    rays : int
+        Number of rays cast.
     seconds : float
+        Duration of the call of `render`.
     camera : Camera
+        The camera, in world space.
     warnings : list of SceneWarning
+        Warnings of the scene and of the bake that lights it.
     """
 
     colour: NDArray[np.float32]
@@ -55,7 +63,7 @@ class Picture(Result):
     warnings: list[SceneWarning] = field(default_factory=list)
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the labels and values that the command line prints."""
         height, width = self.colour.shape[:2]
         return {
             "size": f"{width} x {height}",
@@ -66,11 +74,11 @@ class Picture(Result):
         }
 
     def picture(self) -> NDArray[np.float32]:
-        """Return the colours; ambient occlusion as one component."""
+        """Return `colour` (H, W, 3), or ambient occlusion (H, W, 1)."""
         return self.colour if self.unit != "1" else self.colour[..., :1]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return size, camera, rays and warnings as plain values; no pixels."""
+        """Return all data but the pixels, as values that JSON can represent."""
         height, width = self.colour.shape[:2]
         eye = self.camera
         return {
@@ -98,39 +106,40 @@ def render(
     Parameters
     ----------
     scene : Scene, Path or str
-        Of a path, textures of metallic and roughness are read, too. With `settings.lightmap` the scene of the
-        bake is shown; a path to another scene is a warning.
+        The scene, or the path of its file. From a file, textures of metallic and roughness are read as well.
+        With `settings.lightmap`, the scene of the bake is rendered; a path to a different scene gives a
+        warning.
     settings : RenderSettings, optional
         Camera, size, samples, and which quantity is rendered.
     progress : Progress
-        Called with stage, fraction and a detail in words; a truthy return value cancels.
+        Called with stage, fraction and a text; a truthy return value cancels.
 
     Returns
     -------
     Picture
-        Pixels, layers, camera, warnings.
+        Pixels, layers, camera and warnings.
 
     Raises
     ------
     InputError
-        If the scene or the bake cannot be read, or there is no camera.
+        If the scene or the bake cannot be read, or if neither the settings nor the scene have a camera.
     SettingsError
-        If there is no camera of that name.
+        If the scene has no camera with the name or number in `settings.camera`.
     ResourceError
-        If memory or the denoiser is missing.
+        If memory runs out, or if the denoiser cannot be used.
     Cancelled
         If `progress` returned a truthy value.
     """
     settings = settings or RenderSettings()
     start = time.monotonic()
     report(progress, Stage.LOAD, 0.0)
-    # Parse seven numbers before anything is loaded; a name needs the file.
+    # Parse the seven numbers of a camera before the scene is loaded. The name of a camera needs the scene.
     text = settings.camera
     camera = parse_camera(text) if text is not None and ("," in text or not text) else None
     if settings.denoise:
         from baker.finish.oidn import denoiser_name
 
-        # Fails here, before any work, if the picture cannot be denoised.
+        # Raise an error before any work if the denoiser cannot be used.
         denoiser_name()
     warnings: list[SceneWarning] = []
     baked, sky = None, settings.sky_radiance
@@ -165,7 +174,7 @@ def render(
             progress=progress,
         )  # fmt: skip
     return Picture(
-        # The denoiser may overshoot.
+        # Clip, because the denoiser may return values out of range.
         colour=np.clip(colour, 0.0, 1.0 if settings.ao else None),
         variance=variance,
         layers={name: layers[name] for name in settings.aov},
@@ -179,12 +188,12 @@ def render(
 
 
 def _own_camera(scene: Scene, reference: Reference) -> Camera:
-    """Return the file's first camera.
+    """Return the first camera of a scene.
 
     Raises
     ------
     InputError
-        If there is none; it suggests one from which the whole scene is visible.
+        If the scene has no camera. The message suggests a camera that shows the whole scene.
     """
     if scene.cameras:
         return scene.cameras[0]
@@ -195,7 +204,7 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
         max(float(np.linalg.norm(high - low)), 1e-6),
     )
     eye = middle + size * np.array([0.35, 0.3, 1.15])
-    # Enough digits to distinguish eye and target far from 0.
+    # Print enough digits that position and target stay distinct in scenes far from the origin.
     digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
     numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(

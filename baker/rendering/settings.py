@@ -15,51 +15,66 @@ DEFAULT_SPP = 64
 
 
 class RenderSettings(Settings):
-    """Holds the settings of a picture, checked."""
+    """Settings of a rendered picture, with validation."""
 
     table: ClassVar[str] = "render"
     what: ClassVar[str] = "render setting"
 
     camera: Numbers | None = setting(
         None,
-        "Position, target, vertical field of view in degrees; or one of the file's own; default: its first.",
+        "Position, target and vertical field of view in degrees; or name or number of a camera in the file. "
+        "Default: the file's first camera.",
         metavar="PX,PY,PZ,TX,TY,TZ,FOV|NAME|NUMBER",
     )
     width: int = setting(640, "Width of the picture.", unit="pixels", ge=1, le=16384)
     height: int = setting(480, "Height of the picture.", unit="pixels", ge=1, le=16384)
     spp: int | None = setting(
-        None, "Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.", ge=1
+        None,
+        "Number of paths per pixel; at least two are traced. Default: 64, or no limit with `time_limit`.",
+        ge=1,
     )
     time_limit: float | None = setting(
         None,
-        "Stop after this time, loading included; two passes are always made.",
+        "Stop after this time, which includes loading. At least two paths per pixel are traced.",
         unit="s",
         metavar="SECONDS",
         gt=0,
         allow_inf_nan=False,
     )
     estimator: str = setting(
-        "mis", "One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.", metavar="NAME"
+        "mis",
+        "Estimator: uniform, cosine, stratified, light, bsdf, mis, mis-power or bdpt.",
+        metavar="NAME",
     )
     max_depth: int | None = setting(
-        None, "Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.", ge=1
+        None,
+        "Largest number of vertices of a path after the camera; 1 is direct light only. Default: no limit.",
+        ge=1,
     )
     ao: bool = setting(False, "Render ambient occlusion.")
     ao_distance: Text | None = setting(
-        None, "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
+        None,
+        "Largest distance of occluders for `ao`: metres, `10%` of the scene's diagonal, or `inf`.",
+        unit="m",
     )
     aov: Names = setting((), "Further layers: albedo, normal, depth.")
     denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
-    lightmap: Path | None = setting(None, "Light the scene by this bake instead.", metavar="OUT")
+    lightmap: Path | None = setting(
+        None,
+        "Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.",
+        metavar="OUT",
+    )
     sky: Numbers | None = setting(
-        None, "Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.", unit="cd/m2"
+        None,
+        "Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.",
+        unit="cd/m2",
     )
     sky_strength: float = same_setting(BakeSettings, "sky_strength")
     seed: int = same_setting(BakeSettings, "seed")
     threads: int | None = same_setting(BakeSettings, "threads")
 
     def check(self) -> None:
-        """Raise `SettingsError` for values that do not go together."""
+        """Raise `SettingsError` for values that cannot be combined."""
         if self.ao and self.lightmap is not None:
             raise SettingsError("`ao` and `lightmap` exclude each other", object="ao")
         if self.max_depth is not None and (self.ao or self.lightmap is not None):
@@ -69,7 +84,7 @@ class RenderSettings(Settings):
             if not self.ao:
                 raise SettingsError("`ao_distance` needs `ao`", object="ao_distance")
             ao_metres(self.ao_distance, 1.0)
-        # Checks the sky.
+        # The property raises an error for a wrong sky.
         self.sky_radiance  # noqa: B018
         if self.estimator != "mis":
             from baker.pathtracer.estimators import estimator_named
@@ -81,11 +96,11 @@ class RenderSettings(Settings):
 
     @property
     def sky_radiance(self) -> tuple[float, float, float]:
-        """Return the constant sky's radiance in cd/m2 (black if none is set)."""
+        """Return the radiance of the constant sky, cd/m2; black if `sky` is not set."""
         return BakeSettings(sky=self.sky, sky_strength=self.sky_strength).sky_radiance
 
     def ao_reach(self, diagonal: float) -> float:
-        """Return the AO distance in metres for a scene of this diagonal (may be inf)."""
+        """Return the largest distance of occluders, metres; may be inf. diagonal : of the scene, metres."""
         return (
             BakeSettings().ao_reach(diagonal)
             if self.ao_distance is None
@@ -94,7 +109,7 @@ class RenderSettings(Settings):
 
     @property
     def goal(self) -> int | None:
-        """Return the samples of a pixel after which rendering ends; None if only time ends it."""
+        """Return the samples per pixel at which rendering ends; None if only the time limit ends it."""
         if self.spp is not None:
             return self.spp
         return None if self.time_limit is not None else DEFAULT_SPP

@@ -1,7 +1,8 @@
-"""Writes a rendered picture: EXR with its layers, or PNG.
+"""Writes a rendered picture as EXR with its layers, or as PNG.
 
-PNG: x = L / (L + m) for each colour, m being the median luminance of pixels that are not black, then the sRGB
-curve. Ambient occlusion is stored linearly, 0 to 1 as 0 to 255. A text chunk of the file names the mapping.
+In a PNG, each component L of the radiance is mapped to L / (L + m) and then by the sRGB curve. m is the
+median luminance of the pixels that are not black. Ambient occlusion is stored linearly, 0 to 1 as 0 to 255. A
+text chunk of the file names the mapping.
 """
 
 from __future__ import annotations
@@ -27,21 +28,22 @@ PLAIN = "none, 0 to 1 is 0 to 255"
 
 
 def check_image(path: Path, aov: Collection[str] = ()) -> None:
-    """Check, before the long work, that a picture with layers `aov` can be written to `path`.
+    """Check, before rendering, that a picture with the layers `aov` can be written to `path`.
 
     Parameters
     ----------
     path : Path
-        An EXR or PNG file, which need not exist.
+        Path of an EXR or PNG file, which need not exist.
     aov : collection of str
-        Names of layers; only an EXR holds them.
+        Names of the layers, which only an EXR file can store.
 
     Raises
     ------
     SettingsError
-        If its name has another suffix or one that takes no layers, or it is a folder or lies in a file.
+        If `path` has another suffix, is a folder, or has a parent that is a file, or if layers are to be
+        written to a PNG file.
     ResourceError
-        If nothing can be written there.
+        If the folder is not writable.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise SettingsError(f"a picture ends in {' or '.join(SUFFIXES)}", file=str(path))
@@ -57,19 +59,19 @@ def check_image(path: Path, aov: Collection[str] = ()) -> None:
 
 
 def write_picture(path: Path, picture: Picture) -> None:
-    """Write a picture in one step: the file is complete, or as it was.
+    """Write a picture to a file. After an error, the file has its old content.
 
     Parameters
     ----------
     path : Path
-        An EXR or PNG file.
+        Path of an EXR or PNG file.
     picture : Picture
-        As `render` returns it.
+        The picture that `render` returned.
 
     Raises
     ------
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     with atomic_path(path, "picture") as temporary:
         if path.suffix.lower() == ".png":
@@ -80,19 +82,19 @@ def write_picture(path: Path, picture: Picture) -> None:
 
 
 def tone_of(path: Path, picture: Picture) -> str | None:
-    """Return the tone mapping of a file.
+    """Return the description of the tone mapping with which `write_picture` writes a picture.
 
     Parameters
     ----------
     path : Path
-        An EXR or PNG file.
+        Path of an EXR or PNG file.
     picture : Picture
-        The picture in it.
+        The picture.
 
     Returns
     -------
     str or None
-        In words; None for an EXR, which stores radiance.
+        Description of the mapping; None for an EXR file, which stores the values of the picture unchanged.
     """
     if path.suffix.lower() != ".png":
         return None
@@ -100,7 +102,7 @@ def tone_of(path: Path, picture: Picture) -> str | None:
 
 
 def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
-    """Return (H, W, 3) uint8 by the mapping at the top of this file."""
+    """Return the levels (H, W, 3) uint8 of a picture in a PNG, by the mapping in this module's docstring."""
     colour = picture.colour
     if picture.unit == "1":
         return grey_levels(colour)
@@ -111,17 +113,17 @@ def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
 
 
 def exr_layers(picture: Picture) -> dict[str, NDArray[np.float32]]:
-    """Return the channels of an EXR.
+    """Return the channels of a picture in an EXR file.
 
     Parameters
     ----------
     picture : Picture
-        Colours, variance and layers.
+        The picture.
 
     Returns
     -------
     dict of str to (H, W) float32
-        By the names of the channels: R, variance.R, albedo.R, normal.X, depth.Z ...
+        Channels of colour, variance and layers, by name: R, variance.R, albedo.R, normal.X, depth.Z, ...
     """
     named = {"": picture.colour, "variance.": picture.variance}
     named.update({f"{name}.": layer for name, layer in picture.layers.items()})

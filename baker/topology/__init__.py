@@ -1,1 +1,1 @@
-"""Triangle meshes as such: equal vertices, shared edges, closed parts, solids."""
+"""Topology of triangle meshes: equal vertices, shared edges, closed parts, solids."""

@@ -1,8 +1,8 @@
-"""Finds the triangles that form closed surfaces, and the side of each on which the enclosed space is.
+"""Finds triangles that form closed surfaces, and the side of each triangle that faces the enclosed space.
 
 A part is a set of triangles of one object that are connected by edges. Open parts whose boundary edges
-coincide are joined: a box of six objects is closed, too. Winding may be inconsistent: for the test, triangles
-are turned until the directions of their edges match.
+coincide are joined, so that a box made of six objects is closed as well. Windings may be inconsistent: the
+test reverses triangles until neighbours traverse their shared edge in opposite directions.
 """
 
 from __future__ import annotations
@@ -15,40 +15,46 @@ from numpy.typing import NDArray
 from baker.topology.edges import Edges, find_edges
 from baker.topology.weld import connected, number_by_first, number_rows
 
-# A part is closed if the area of its holes is at most this share of the area of its triangles,
+# Area of a part's holes divided by the area of its triangles, up to which the part is closed.
 SMALL_HOLES = 0.005
-# and watertight if it is at most this share: slits of no width, where an edge meets two shorter ones.
+# Area of a part's holes divided by the area of its triangles, up to which the part is watertight. It allows
+# slits without width, at which one edge meets two shorter edges.
 NO_HOLES = 1e-6
-# A part whose mean thickness is below this share of its diagonal encloses nothing: ray origins are offset
-# from a surface by as much.
+# Volume of a part divided by its area and by its largest distance from the centre, below which the part
+# encloses no space. The offset of ray origins has this relative size, too.
 THINNEST = 1e-5
-# The only boundary loop of a part without a lid is flat: it deviates from its plane by at most this share of
-# its width (square root of its area),
+# Largest distance of a boundary loop from its plane, divided by the square root of its area, up to which the
+# loop is flat. A part without a lid has a single boundary loop, which is flat.
 _FLAT = 0.1
-# and its area is at most this share of the part's; beyond that the part is a sheet.
+# Area of the missing lid divided by the area of the part, above which the part is a sheet, not a part without
+# a lid.
 _WIDEST_LID = 0.9
-# Vertices of different objects coincide if they differ by at most this share of the largest coordinate.
+# Distance of two vertices of different objects along each axis, divided by the largest coordinate, up to
+# which they coincide.
 _TOGETHER = 4e-7
 
 
 class ClosedParts(NamedTuple):
-    """Parts of the world's surface.
+    """The P parts of a scene of T triangles.
 
     Attributes
     ----------
     part : (T,) int32
-        Part of each triangle, -1 for those left out, among them a wall between two boxes of one object.
+        Part of each triangle, -1 for triangles that were left out. A wall between two touching boxes of one
+        object is left out as well.
     outward : (T,) int8
-        1 if the triangle's normal points out of the space that its part encloses, -1 if it points into it,
-        0 if its part encloses none. Parts without a lid count as closed here.
-    closed, watertight : (P,) bool
-        Whether the part encloses a space; whether it has no holes at all.
+        1 if the triangle's normal points out of the space that its part encloses, -1 if it points into that
+        space, 0 if the part encloses no space. Parts without a lid are treated as closed.
+    closed : (P,) bool
+        Whether the part encloses a space, with at most small holes.
+    watertight : (P,) bool
+        Whether the part is closed and has no holes.
     lidless : (P,) bool
         Whether the part is open, but a flat lid on its only hole would close it.
     area : (P,) float64
-        m2.
+        Area of the part's triangles, m2.
     low, high : (P, 3) float64
-        Bounds, metres.
+        Lower and upper corner of the part's bounding box, metres.
     """
 
     part: NDArray[np.int32]
@@ -62,22 +68,22 @@ class ClosedParts(NamedTuple):
 
 
 class _Pieces(NamedTuple):
-    """Pieces that F faces form.
+    """The P pieces that F faces form: sets of faces connected by edges.
 
     Attributes
     ----------
     piece : (F,) int32
         Piece of each face.
     turn : (F,) int8
-        1 or -1, see `_turns`.
+        -1 for faces that are reversed so that windings agree, else 1, see `_turns`.
     bad : (B,) int64
-        Edges at which the directions of the faces do not cancel.
+        Boundary edges: after reversal, the numbers of half edges in both directions differ.
     edges : Edges
         Edges of the faces.
     holes, area : (P,) float64
-        Area of the holes and of the faces, m2.
+        Area of the holes of each piece and of its faces, m2.
     flat : (P,) bool
-        Whether the piece has one hole, and that is flat.
+        Whether the piece has exactly one boundary loop, which is flat.
     """
 
     piece: NDArray[np.int32]
@@ -95,23 +101,23 @@ def find_closed_parts(
     instance: NDArray[np.integer],
     used: NDArray[np.bool_],
 ) -> ClosedParts:
-    """Find the parts of a world and which of them are closed.
+    """Find the parts of a scene, and which of them are closed.
 
     Parameters
     ----------
     position : (V, 3) float32, metres, world
         Vertices.
     triangle : (T, 3) int
-        Their corners.
+        Indices of the triangles' vertices.
     instance : (T,) int
         Object of each triangle.
     used : (T,) bool
-        Which triangles count; the others are left out.
+        False for triangles to leave out.
 
     Returns
     -------
     ClosedParts
-        Parts of all triangles.
+        The parts.
     """
     n = len(triangle)
     part, outward = np.full(n, -1, np.int32), np.zeros(n, np.int8)
@@ -150,10 +156,9 @@ def find_closed_parts(
 
 
 def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the areas of triangles.
+    """Return the areas (F,) float64, m2, of triangles.
 
-    corner : (F, 3, 3) float64, metres
-    Returns (F,) float64, m2.
+    corner : (F, 3, 3) float64, positions of the corners, metres
     """
     (ux, uy, uz), (vx, vy, vz) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -162,7 +167,7 @@ def face_areas(corner: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return (F,) bool: whether the three corners of a face (F, 3) differ."""
+    """Return (F,) bool: whether the three vertices (F, 3) of each face differ."""
     a, b, c = vertex.T
     distinct: NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
     return distinct
@@ -171,7 +176,7 @@ def _distinct(vertex: NDArray[np.int64]) -> NDArray[np.bool_]:
 def _weld(
     position: NDArray[np.float32], triangle: NDArray[np.integer], instance: NDArray[np.integer]
 ) -> NDArray[np.int64]:
-    """Return (F, 3) int64: corners, numbered alike where position and object are equal."""
+    """Return welded vertices (F, 3) int64: corners with equal position and object get the same number."""
     marked = np.zeros(len(position), bool)
     marked[triangle.reshape(-1)] = True
     used = np.flatnonzero(marked)
@@ -184,12 +189,16 @@ def _weld(
 
 
 def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
-    """Return (F,) int64, the first face with the same corners, and (F,) int8, 1 if wound alike, else -1."""
+    """Return for each face the first face with the same corners, and whether their windings agree.
+
+    vertex : (F, 3) int64, welded vertices
+    Returns (F,) int64, index of the first face; (F,) int8, 1 if the windings agree, -1 if they are opposite.
+    """
     a, b, c = vertex.T
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     ordered = np.stack([low, a + b + c - low - high, high], axis=1)
     n = int(ordered.max(initial=0)) + 1
-    # Three corners in one number would overflow: their hash finds the candidates.
+    # Find candidates by a hash of the three corners, because a number made of all three would overflow.
     key = (ordered[:, 0] * n + ordered[:, 1]).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     key ^= ordered[:, 2].astype(np.uint64) * np.uint64(0xBF58476D1CE4E5B9)
     order = np.argsort(key, kind="stable")
@@ -207,10 +216,12 @@ def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
 def _single(
     vertex: NDArray[np.int64], first: NDArray[np.int64], same_winding: NDArray[np.int8]
 ) -> NDArray[np.int64]:
-    """Return the faces that form pieces: one of each set of faces with the same corners.
+    """Return the indices of the faces that form pieces: the first of each set of faces with the same corners.
 
-    Two boxes of one object that touch share a wall, once from each: it lies inside both together and is left
-    out. Where all faces of a piece occur with both windings, one of each stays.
+    If two boxes of one object touch, their common wall occurs with both windings. It lies inside the union of
+    the boxes and is left out. If all faces of a piece occur with both windings, none of them is left out.
+
+    vertex : (F, 3) int64; first : (F,) int64, same_winding : (F,) int8, see `_twins`
     """
     single = np.flatnonzero(first == np.arange(len(first)))
     paired = np.zeros(len(first), bool)
@@ -224,7 +235,10 @@ def _single(
 
 
 def _pieces(vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
-    """Find the pieces of faces (F, 3), turn their faces to one winding, and measure their holes."""
+    """Find the pieces of faces, make the windings of each piece agree, and measure the holes.
+
+    vertex : (F, 3) int64, welded vertices; corner : (F, 3, 3) float64, positions of the corners, metres
+    """
     n = len(vertex)
     edges = find_edges(vertex)
     piece = edges.connected_faces(n)
@@ -255,9 +269,11 @@ def _loops(
     bad: NDArray[np.int64],
     balance: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the boundary loops of bad edges; edges that share vertices are of one loop.
+    """Return the boundary loops that boundary edges form. Edges that share a vertex are in the same loop.
 
-    Returns (B,) int32, loop of each bad edge; (L,) float64, areas in m2; (L,) bool, which loops are flat.
+    vertex, corner : see `_pieces`; bad : (B,) int64, boundary edges
+    balance : (B,) int64, `Edges.balance` of these edges after reversal of faces
+    Returns (B,) int32, loop of each edge; (L,) float64, area of each loop, m2; (L,) bool, whether it is flat.
     """
     name, ends = np.unique(np.stack([edges.low[bad], edges.high[bad]]), return_inverse=True)
     ends = ends.reshape(2, -1)
@@ -278,10 +294,10 @@ def _loops(
 
 
 def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
-    """Return (F,) int8, 1 or -1: factors of normals that make windings agree across edges of two faces.
+    """Return (F,) int8: -1 for faces to reverse so that windings agree across edges of two faces, else 1.
 
-    Each face is two nodes of a graph, one for each winding; edges connect the nodes that match. A surface
-    with one side only (a Moebius strip) cannot be turned and keeps its winding.
+    A graph has two nodes for each face, one for each winding. Its edges connect windings of neighbouring
+    faces that agree. Faces of a one-sided surface (a Moebius strip) keep their windings.
     """
     n = len(piece)
     turn = np.ones(n, np.int8)
@@ -300,7 +316,10 @@ def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.
 
 
 def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np.float64]) -> _Pieces:
-    """Join pieces whose boundary edges coincide, if that closes them."""
+    """Join pieces whose boundary edges coincide, if the joined piece is closed.
+
+    vertex, corner : see `_pieces`
+    """
     edges, bad = pieces.edges, pieces.bad
     is_open = pieces.holes > SMALL_HOLES * pieces.area
     bad = bad[is_open[pieces.piece[edges.face[edges.first[bad]]]]]
@@ -323,7 +342,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     joined = np.zeros(len(pieces.area), bool)
     joined[np.unique(np.concatenate([group[a], group[b]]))] = True
     chosen = np.flatnonzero(joined[group[pieces.piece]])
-    # Corners on the boundary get one number for each position; the others keep theirs.
+    # Renumber vertices on boundaries by position, so that those of different objects become equal.
     shared = vertex.copy()
     base = int(vertex.max()) + 1
     renamed = np.arange(base)
@@ -341,7 +360,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     turn[chosen[chosen_closes]] = again.turn[chosen_closes]
     name, number = np.unique(piece, return_inverse=True)
     holes = np.concatenate([pieces.holes, again.holes])[name]
-    # The rest of a piece that lost faces to a closed one has at least its former holes.
+    # A piece that lost some of its faces to a joined piece keeps its former hole area, a lower limit.
     area = np.concatenate([pieces.area, again.area])[name]
     flat = np.concatenate([pieces.flat, again.flat])[name]
     return pieces._replace(
@@ -350,7 +369,11 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
 
 
 def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
-    """Number points (N, 3) alike if no gap wider than `step` separates them along an axis."""
+    """Return a number (N,) for each point (N, 3), which is equal for points close together.
+
+    Two points get different numbers if, along any axis, the sorted coordinates of all points have a gap wider
+    than `step` between them.
+    """
     label = np.zeros(point.shape, np.int64)
     for axis in range(3):
         order = np.argsort(point[:, axis], kind="stable")
@@ -362,7 +385,10 @@ def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
 
 
 def _enclosing(pieces: _Pieces, corner: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Return (F,) int8: 1 where a face's normal points out of its closed piece, -1 into it, else 0."""
+    """Return (F,) int8: 1 if the normal of a face points out of the space its piece encloses, -1 if into it.
+
+    It is 0 for pieces that enclose no space. corner : (F, 3, 3) float64, positions of the corners, metres
+    """
     n_pieces = len(pieces.area)
     centre = (
         np.stack([np.bincount(pieces.piece, corner[:, 0, k], minlength=n_pieces) for k in range(3)], axis=1)

@@ -1,16 +1,19 @@
 """Classifies closed parts as solids, whose inside is never visible, or rooms.
 
-The rules use shape and contents, and whether a material is double-sided only if these are not sufficient:
+A part is a set of connected triangles, see `closed_parts`. Parts that let light through are ignored.
 
-- An opaque closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock).
-- It is a room if a light, a camera or an object that emits light is inside, if it emits on both sides and has
-  anything inside, if it has small holes and anything inside, or if most of the scene is inside (sky spheres).
-- A part whose normals mostly point inwards is the hollow of the solid around it (a room with thick walls),
-  else a room. If it has nothing inside and does not emit, it is a solid wound inwards.
-- An open part that a flat lid would close, wound outwards and with nothing inside (a crate without a bottom),
-  is a cover: points all of whose rays hit its inside are hidden, since another surface is its lid.
+- A closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock), with four
+  exceptions. It is a room if a light, a camera or an emitting part is inside. It is a room if it emits on
+  both sides and contains a part. It is a room if it has small holes and contains a part. It is a room if most
+  of the scene is inside (a sky sphere).
+- A closed part whose normals mostly point inwards and which lies in a solid is a hollow of that solid (a room
+  with thick walls). Other such parts are rooms if they emit or contain anything, else solids wound inwards.
+- An open part is a cover if a flat lid would close it, its normals point outwards and it contains nothing (a
+  crate without a bottom). A point all of whose rays hit the inside of a cover is hidden, because another
+  surface closes the opening.
 
-A solid contains no light and lets none in, so a room that is classified as a solid by mistake is dark anyway.
+No light is inside a solid and none enters it. So a room that is classified as a solid by mistake would be
+dark anyway.
 """
 
 from __future__ import annotations
@@ -25,34 +28,41 @@ from baker.core.scene import Scene
 from baker.topology.closed_parts import ClosedParts, face_areas, find_closed_parts
 from baker.topology.winding_number import MANY, Enclosure
 
-# Side of a triangle on which the inside of a solid lies: none, its back, its front.
+# Values of `Solids.inside`: the triangle is not on a solid; the solid is at its back; the solid is at its
+# front.
 NOWHERE, BEHIND, BEFORE = 0, 1, 2
-# Triangle centres that are tested: a part is inside another one if most of them are and none is outside.
+# Number of triangle centres of a part that are tested for being inside another part, see `_is_inside`.
 _WITNESSES = 8
-# Winding numbers: a point is inside a closed part above _INSIDE, inside one without a lid above _WITHOUT_LID,
-# and outside below _OUTSIDE.
+# Winding numbers. A point is inside a closed part above _INSIDE, inside a part without a lid above
+# _WITHOUT_LID, and outside of both below _OUTSIDE.
 _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
-# A part that holds more than this share of the other parts' area is a room.
+# Share of the other parts' area: a part that contains more than it is a room.
 _MOST_OF_SCENE = 0.5
-# Parts that are tested for holding most of the scene, and parts that are tested for being held, at most.
+# Number of parts with the largest boxes that are tested for containing most of the scene, and number of parts
+# in their boxes that are tested for being inside.
 _LARGEST, _HELD = 32, 64
-# Faces of a part times parts tested for being inside it, at most: a second of work.
+# Upper limit of faces of a part times number of parts tested for being inside it. It bounds the time; at
+# least _HELD parts are tested.
 _MOST_WORK = 200_000_000
 
 
 class Surfaces(NamedTuple):
-    """The world's triangles.
+    """All triangles of a scene.
 
     Attributes
     ----------
     position : (V, 3) float32
-        Metres.
+        Vertices, metres, world.
     triangle : (T, 3) int
-        Vertices.
+        Indices of the triangles' vertices.
     instance : (T,) int
-        Object, negative for triangles to leave out.
-    opaque, double_sided, emits : (T,) bool
-        Whether no light passes, whether the back reflects, whether the triangle emits light.
+        Object of each triangle; negative for triangles to leave out.
+    opaque : (T,) bool
+        Whether no light passes through the triangle.
+    double_sided : (T,) bool
+        Whether the back of the triangle reflects.
+    emits : (T,) bool
+        Whether the triangle emits light.
     """
 
     position: NDArray[np.float32]
@@ -64,7 +74,7 @@ class Surfaces(NamedTuple):
 
 
 class Solids(NamedTuple):
-    """Classification of the world's triangles.
+    """Classification of all T triangles of a scene.
 
     Attributes
     ----------
@@ -72,13 +82,13 @@ class Solids(NamedTuple):
         `BEHIND` if the inside of a solid is at the triangle's back, `BEFORE` if it is at its front (wound
         inwards), else `NOWHERE`.
     sealed : (T,) bool
-        Whether the triangle belongs to a solid without any hole.
+        Whether the triangle is part of a solid without any hole.
     room : (T,) bool
-        Whether it belongs to a closed part that is a room.
+        Whether the triangle is part of a room.
     cover : (T,) bool
-        Whether it belongs to a cover.
+        Whether the triangle is part of a cover.
     part : (T,) int32
-        Part of each triangle, -1 for those that let light through.
+        Part of each triangle, -1 for triangles that were left out, see `ClosedParts.part`.
     parts : ClosedParts
         All parts.
     """
@@ -92,17 +102,17 @@ class Solids(NamedTuple):
 
 
 def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
-    """Return the positions of lights and cameras, from where insides are visible.
+    """Return the positions of lights and cameras. A closed part around one of them is a room.
 
     Parameters
     ----------
     scene : Scene
-        Lights without a position are left out.
+        The scene. Its lights without a position are left out.
 
     Returns
     -------
     (N, 3) float64, metres
-        Relative to the scene's origin.
+        Positions, relative to the scene's origin.
     """
     cameras = np.array([camera.position for camera in scene.cameras], np.float64).reshape(-1, 3)
     return np.concatenate([light_positions(scene), cameras]) - scene.origin
@@ -116,7 +126,7 @@ def find_solids(surfaces: Surfaces, viewpoints: NDArray[np.float64]) -> Solids:
     surfaces : Surfaces
         All triangles.
     viewpoints : (N, 3) float64, metres
-        Lights and cameras, relative to the same origin as the surfaces: a part with one inside is a room.
+        Positions of lights and cameras, relative to the origin of the surfaces.
 
     Returns
     -------
@@ -139,7 +149,7 @@ def find_solids(surfaces: Surfaces, viewpoints: NDArray[np.float64]) -> Solids:
     solid = np.zeros(n, bool)
     solid[in_part] = (parts.closed & ~room)[parts.part[in_part]]
     outward = np.where(solid, parts.outward, 0)
-    # Normals of a hollow point out of the material, as those of the solid around it do.
+    # The space that a hollow encloses is outside the solid, so reverse its sign.
     outward[np.isin(parts.part, classifier.hollows()) & in_part] *= -1
     inside = np.where(outward > 0, BEHIND, np.where(outward < 0, BEFORE, NOWHERE)).astype(np.uint8)
     sealed = (inside != NOWHERE) & parts.watertight[parts.part]
@@ -147,7 +157,10 @@ def find_solids(surfaces: Surfaces, viewpoints: NDArray[np.float64]) -> Solids:
 
 
 class _Classifier:
-    """Classifies one part after the other."""
+    """Classifies the parts of a scene one after the other.
+
+    `order[start[p] : start[p + 1]]` are the triangles of part p. `around` maps each hollow to its solid.
+    """
 
     def __init__(self, surfaces: Surfaces, parts: ClosedParts, viewpoints: NDArray[np.float64]) -> None:
         self.surfaces, self.parts, self.viewpoints = surfaces, parts, viewpoints
@@ -158,7 +171,7 @@ class _Classifier:
         self.start = np.searchsorted(parts.part[self.order], np.arange(n + 1))
         weight = self._areas(in_part)
         area = np.maximum(parts.area, 1e-300)
-        # Slivers may have been left out of the area.
+        # Compare with half of `ClosedParts.area`, which may lack slivers.
         self.inward = np.bincount(of, weight * (parts.outward[in_part] < 0), minlength=n) > 0.5 * area
         self.two_sided = np.bincount(of, weight * surfaces.double_sided[in_part], minlength=n) > 0.5 * area
         self.emits = np.bincount(of, surfaces.emits[in_part], minlength=n) > 0
@@ -169,16 +182,16 @@ class _Classifier:
         self.around: dict[int, int] = {}
 
     def _areas(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the areas of triangles, m2."""
+        """Return the areas of the triangles with indices `rows` (n,): (n,) float64, m2."""
         corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
         return face_areas(corner)
 
     def hollows(self) -> NDArray[np.int64]:
-        """Return the parts that are hollows of solids; call `rooms` first."""
+        """Return the parts that are hollows of solids, which `rooms` finds first."""
         return np.array(sorted(self.around), np.int64)
 
     def rooms(self) -> NDArray[np.bool_]:
-        """Return (P,) bool: closed parts that are rooms."""
+        """Return (P,) bool: the closed parts that are rooms. Also find hollows."""
         parts = self.parts
         room = np.zeros(len(parts.area), bool)
         outward = np.flatnonzero(parts.closed & ~self.inward)
@@ -202,11 +215,11 @@ class _Classifier:
         return room
 
     def covers(self) -> NDArray[np.bool_]:
-        """Return (P,) bool: parts without a lid that hide the points under them."""
+        """Return (P,) bool: the parts without a lid that are covers."""
         parts = self.parts
         cover = parts.lidless & ~self.inward
         for part in np.flatnonzero(cover):
-            # One-sided parts need no test: their backs are black anyway.
+            # Exclude one-sided parts, whose backs are black in any case.
             is_small = self.start[part + 1] - self.start[part] <= MANY
             cover[part] = (
                 bool(self.two_sided[part] and is_small)
@@ -216,9 +229,9 @@ class _Classifier:
         return cover
 
     def _outward_room(self, part: int, large: bool) -> bool:
-        # With double-sided walls an emitter that is mostly inside counts: it may be set into the ceiling.
-        # Backs of one-sided walls are black.
-        """Return whether a closed part with normals outwards is a room; large: see `_largest`."""
+        """Return whether a closed part with normals outwards is a room; large : whether `_largest` has it."""
+        # If the walls are double-sided, an emitter that is mostly inside makes a room, because the emitter
+        # may be set into the ceiling. With one-sided walls, it must be inside as a whole.
         mostly = bool(self.two_sided[part])
         if self._holds_viewpoint(part) or self._holds(part, self.emits, mostly=mostly):
             return True
@@ -227,33 +240,33 @@ class _Classifier:
         return large and self._holds_most(part)
 
     def _inward_room(self, part: int) -> bool:
-        """Return whether a closed part with normals inwards, and not a hollow, is a room."""
+        """Return whether a closed part with normals inwards, which is not a hollow, is a room."""
         if self.emits[part] or len(self.parts.area) == 1:
             return True
         return self._holds_viewpoint(part) or self._holds(part, None, mostly=True)
 
     def _largest(self) -> set[int]:
-        """Return the closed parts with the largest boxes, which may hold most of the scene."""
+        """Return the `_LARGEST` closed parts with the largest bounding boxes and normals outwards."""
         parts = self.parts
         closed = np.flatnonzero(parts.closed & ~self.inward)
         size = np.prod(parts.high[closed] - parts.low[closed], axis=1)
         return set(closed[np.argsort(-size, kind="stable")][:_LARGEST].tolist())
 
     def _surface(self, part: int) -> Enclosure:
-        """Return a part and its hollows, wound so that the winding number inside a solid is 1."""
+        """Return the faces of a part and of its hollows, wound so that the winding number inside is 1."""
         corners = []
         for one in (part, *(hollow for hollow, shell in self.around.items() if shell == part)):
             rows = self.order[self.start[one] : self.start[one + 1]]
             corner = self.surfaces.position[self.surfaces.triangle[rows]].astype(np.float64)
             outward = self.parts.outward[rows] * (1 if one == part else -1)
-            # Faces without a side, twins of the other winding among them, would cancel others.
+            # Leave out faces that do not bound the enclosed space, such as pairs with opposite windings.
             keep = outward != 0
             turned = np.where((outward < 0)[:, None, None], corner[:, ::-1], corner)
             corners.append(turned[keep])
         return Enclosure(np.concatenate(corners))
 
     def _holds_viewpoint(self, part: int) -> bool:
-        """Return whether a light or camera is inside."""
+        """Return whether a light or camera is inside a part."""
         low, high = self.parts.low[part], self.parts.high[part]
         near = self.viewpoints[((self.viewpoints > low) & (self.viewpoints < high)).all(axis=1)]
         if not len(near):
@@ -262,11 +275,14 @@ class _Classifier:
         return any(surface.winding(viewpoint) > inside for viewpoint in near)
 
     def _inside_from(self, part: int) -> float:
-        """Return the winding number above which points are inside: 1/2 in the plane of a missing lid."""
+        """Return the winding number above which points are inside a part.
+
+        For a part without a lid it is 1/2, the winding number in the plane of the missing lid.
+        """
         return _WITHOUT_LID if self.parts.lidless[part] else _INSIDE
 
     def _boxes_around(self, part: int, shells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return which of some parts have a box that contains the box of a part."""
+        """Return which of the parts `shells` have a bounding box that contains the box of `part`."""
         low, high = self.parts.low, self.parts.high
         slack = self.slack[part]
         inside = (low[shells] <= low[part] + slack) & (high[shells] >= high[part] - slack)
@@ -274,7 +290,10 @@ class _Classifier:
         return found
 
     def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None, share: bool) -> NDArray[np.int64]:
-        """Return parts whose boxes lie within that of a part, or overlap it for `share`."""
+        """Return the parts whose bounding boxes lie in the box of `part` or, with `share`, overlap it.
+
+        wanted : (P,) bool, parts to consider; None: all. Hollows of `part` are left out.
+        """
         low, high = self.parts.low, self.parts.high
         if share:
             inside = ((low < high[part]) & (high > low[part])).all(axis=1)
@@ -287,7 +306,10 @@ class _Classifier:
         return np.flatnonzero(inside if wanted is None else inside & wanted)
 
     def _holds(self, part: int, wanted: NDArray[np.bool_] | None, *, mostly: bool = False) -> bool:
-        """Return whether another part (one of the wanted ones) is inside, or for `mostly`, mostly inside."""
+        """Return whether any other part is inside `part` or, with `mostly`, mostly inside.
+
+        wanted : (P,) bool, parts to consider; None: all
+        """
         held = self._held_boxes(part, wanted, mostly)
         if not len(held):
             return False
@@ -298,13 +320,13 @@ class _Classifier:
         return any(self._is_inside(int(other), part, surface, mostly=mostly) for other in held)
 
     def _holds_most(self, part: int) -> bool:
-        """Return whether most of the other parts' area is inside."""
+        """Return whether more than `_MOST_OF_SCENE` of the other parts' area is inside `part`."""
         area = self.parts.area
         others = float(area.sum() - area[part])
         held = self._held_boxes(part, None, False)
         if area[held].sum() <= _MOST_OF_SCENE * others:
             return False
-        # Only the largest are tested.
+        # Test only the parts with the largest area.
         held = held[np.argsort(-area[held], kind="stable")][:_HELD]
         found, remaining = 0.0, float(area[held].sum())
         enough = _MOST_OF_SCENE * remaining
@@ -317,7 +339,14 @@ class _Classifier:
         return found > enough
 
     def _is_inside(self, part: int, shell: int, surface: Enclosure, *, mostly: bool = False) -> bool:
-        """Return whether a part, or for `mostly` most of it, is inside another one; it may touch it."""
+        """Return whether `part` is inside `shell`, which it may touch.
+
+        `_WITNESSES` of its triangle centres are tested. At least half of them must be inside, and none
+        outside. With `mostly`, more than half must be inside, and the others may be outside. If the part
+        emits, `mostly` tests only its emitting triangles.
+
+        surface : faces of `shell`
+        """
         rows = self.order[self.start[part] : self.start[part + 1]]
         if mostly and self.emits[part]:
             rows = rows[self.surfaces.emits[rows]]

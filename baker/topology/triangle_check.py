@@ -1,4 +1,4 @@
-"""Finds triangles that must not be baked: unusable vertices, no area, duplicates of another face."""
+"""Finds triangles that must not be baked: with unusable vertices, without area, or duplicates of others."""
 
 from __future__ import annotations
 
@@ -7,69 +7,70 @@ from numpy.typing import NDArray
 
 from baker.topology.unique_rows import mix, unique_rows
 
-# Largest coordinate that is kept; Embree's own limit for single precision is 1.8e18.
+# Largest absolute coordinate of a usable vertex. The limit of Embree is 1.8e18.
 LARGEST_COORDINATE = 1e18
-# Height over longest edge. Below the step of float32 the plane of the triangle is undefined.
+# Height of a triangle divided by its longest edge, up to which it has no area. It is about the spacing of
+# float32: the plane of such a triangle is undefined.
 _FLATTEST = 1e-7
 
 
 def in_range(
     triangle: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Return which triangles name only vertices of their range.
+    """Return which triangles have all vertex indices in their range.
 
     Parameters
     ----------
     triangle : (T, 3) int64
-        Vertices.
+        Vertex indices of each triangle.
     low, high : (T,) int64
-        The range is `low` to `high` - 1.
+        Range of each triangle's indices: `low` to `high` - 1.
 
     Returns
     -------
     (T,) bool
-        Whether all three vertices are in the range.
+        Whether all three indices are in the range.
     """
     within: NDArray[np.bool_] = np.asarray((triangle.min(axis=1) >= low) & (triangle.max(axis=1) < high))
     return within
 
 
 def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return which positions are finite and within the safe range of float32.
+    """Return which positions are finite and not too large for Embree.
 
     Parameters
     ----------
     position : (V, 3) float32, metres
-        Vertices.
+        Positions of the vertices.
 
     Returns
     -------
     (V,) bool
         Whether no coordinate is NaN, infinite or beyond `LARGEST_COORDINATE`.
     """
-    # A comparison with NaN is false, so this one test covers NaN, inf and huge values.
+    # Comparisons with NaN are false, so this test also rejects NaN.
     usable: NDArray[np.bool_] = np.asarray((np.abs(position) <= LARGEST_COORDINATE).all(axis=1))
     return usable
 
 
 def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which triangles are points or lines.
+    """Return which triangles have no area: their corners are in one point or on one line.
 
     Parameters
     ----------
     position : (V, 3) float32, metres
-        Finite where used.
+        Vertices; those that a triangle uses must be finite.
     triangle : (T, 3) int64
-        Vertices.
+        Vertex indices of each triangle.
 
     Returns
     -------
     (T,) bool
-        Whether the height is at most 1e-7 of the longest edge.
+        Whether the height is at most 1e-7 times the longest edge.
     """
     a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
     ab, ac, bc = b - a, c - a, c - b
-    # Scale by the longest side: squares of tiny or huge sides would leave the range of exponents.
+    # Divide by the largest component, so that squares of tiny or huge edges do not underflow or overflow.
     longest = np.maximum(np.maximum(np.abs(ab).max(axis=1), np.abs(ac).max(axis=1)), np.abs(bc).max(axis=1))
     scale = 1.0 / np.where(longest > 0, longest, 1.0)[:, None]
     ab, ac, bc = ab * scale, ac * scale, bc * scale
@@ -81,26 +82,26 @@ def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
 
 
 def face_normal(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the normals of triangles, as long as twice their area.
+    """Return the normals of triangles; the length of a normal is twice the triangle's area.
 
     Parameters
     ----------
     position : (V, 3) float32, metres
         Vertices.
     triangle : (T, 3) int64
-        Corners, counter-clockwise.
+        Vertex indices of each triangle, counter-clockwise.
 
     Returns
     -------
     (T, 3) float64, m2
-        Cross products of the edges.
+        Cross products of the two edges at corner 0.
     """
     a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
     return _cross(b - a, c - a)
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the cross products of (n, 3) vectors; `np.cross` takes three times as long."""
+    """Return the cross products (n, 3) of vectors a and b (n, 3), faster than `np.cross`."""
     out = np.zeros_like(a)
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -114,22 +115,22 @@ def duplicates(
     material: NDArray[np.int32],
     double_sided: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return which triangles repeat an earlier one, by position.
+    """Return which triangles are duplicates of an earlier triangle, by position.
 
-    A triangle with the same three corner positions and the same winding, whichever corner it starts at, is a
-    duplicate. One with the opposite winding is the back of the first and stays, unless both have the same
-    double-sided material, which shows both sides already.
+    A triangle is a duplicate if an earlier one has the same three corner positions and the same winding, no
+    matter at which corner it starts. A triangle with the opposite winding is the back of the earlier one. It
+    is a duplicate only if both have the same material and that is double-sided.
 
     Parameters
     ----------
     position : (V, 3) float32, metres
-        Finite where used.
+        Vertices; those that a triangle uses must be finite.
     triangle : (T, 3) int64
-        Vertices.
+        Vertex indices of each triangle.
     material : (T,) int32
         Material of each triangle.
     double_sided : (M,) bool
-        Whether each material is.
+        Whether each material is double-sided.
 
     Returns
     -------
@@ -149,7 +150,8 @@ def duplicates(
     winding = b > c
     low, high = np.minimum(b, c), np.maximum(b, c)
 
-    # Sort by face, winding, then file order: the first of each run stays.
+    # Sort by corners, winding, then index. All but the first triangle of each run of equal corners and
+    # winding are duplicates.
     order = np.lexsort((candidate, winding, high, low, a))
     face = np.stack([a, low, high], axis=1)[order]
     wound = winding[order]
@@ -159,7 +161,8 @@ def duplicates(
     same[1:] &= wound[1:] == wound[:-1]
     repeated[candidate[order[same]]] = True
 
-    # Of each face one triangle is left, or one of each winding: the later one may be a duplicate.
+    # Of the triangles with the same corners, at most one of each winding is left. With a double-sided
+    # material, the later one is a duplicate.
     left, left_face = order[~same], face[~same]
     pair = np.flatnonzero((left_face[1:] == left_face[:-1]).all(axis=1))
     one, two = candidate[left[pair]], candidate[left[pair + 1]]
@@ -169,7 +172,7 @@ def duplicates(
 
 
 def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return, ascending, the triangles whose corners hash like those of another one."""
+    """Return the indices, ascending, of triangles whose corner positions hash like those of another one."""
     with np.errstate(invalid="ignore"):
         bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)

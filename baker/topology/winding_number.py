@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Faces of a surface above which solid angles take too long.
+# Number of faces of a surface above which `Enclosure` does not sum solid angles, which would take too long.
 MANY = 4096
-# Nearly a rotation, with no modelled direction as its last axis: lines along that miss edges and vertices.
+# An approximate rotation. `Enclosure` casts lines along its last axis, which is parallel to no direction that
+# is usual in models, so that lines miss edges and vertices.
 _TURN = np.array(
     [
         [0.6363961031, 0.7071067812, 0.3082207001],
@@ -24,7 +25,9 @@ _TURN = np.array(
 
 
 def winding_number(corner: NDArray[np.float64], point: NDArray[np.float64]) -> float:
-    """Return the winding number of a surface about a point: 1 inside, 0 outside, -1 inside one wound inwards.
+    """Return the winding number of a surface about a point.
+
+    It is 0 outside a closed surface, 1 inside, and -1 inside if the faces are wound inwards.
 
     Parameters
     ----------
@@ -49,10 +52,11 @@ def winding_number(corner: NDArray[np.float64], point: NDArray[np.float64]) -> f
 
 
 class Enclosure:
-    """A closed surface, for winding numbers about many points.
+    """A closed surface, prepared for winding numbers about many points.
 
-    With more than `MANY` faces the winding number is counted along a line, from the faces that it crosses:
-    less work than their solid angles, but not reliable on the surface itself or near large holes.
+    If it has more than `MANY` faces, the winding number is computed from the faces that a line from the point
+    crosses. This takes less time than solid angles, but is not reliable on the surface itself or near large
+    holes.
 
     Parameters
     ----------
@@ -71,7 +75,7 @@ class Enclosure:
             )
 
     def winding(self, point: NDArray[np.float64]) -> float:
-        """Return the winding number of a point (3,)."""
+        """Return the winding number of the surface about a point (3,) float64, metres."""
         if not self.many:
             return winding_number(self.corner, point)
         x, y, z = _TURN @ point
@@ -87,13 +91,13 @@ class Enclosure:
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the z component of the cross products of (n, 2 or more) vectors."""
+    """Return the z component (n,) of the cross products of vectors a and b (n, 2 or more)."""
     found: NDArray[np.float64] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return found
 
 
 def first_inside(corner: NDArray[np.float64], points: NDArray[np.float64]) -> int | None:
-    """Return the first of some points that is inside a closed surface.
+    """Return the index of the first point that is inside a closed surface.
 
     Parameters
     ----------
@@ -105,7 +109,7 @@ def first_inside(corner: NDArray[np.float64], points: NDArray[np.float64]) -> in
     Returns
     -------
     int or None
-        Its number, None if none is inside.
+        Index of the point; None if no point is inside.
     """
     if not len(corner):
         return None
