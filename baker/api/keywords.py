@@ -192,8 +192,8 @@ class DiffKeywords(TypedDict, total=False):
 class RenderKeywords(TypedDict, total=False):
     """Keywords of `RenderSettings`."""
 
-    # Position, target, vertical field of view in degrees; or one of the file's own; default: its
-    # first.
+    # Position, target and vertical field of view in degrees; or name or number of a camera in the
+    # file. Default: the file's first camera.
     camera: str | float | Sequence[float] | None
 
     # Width of the picture.
@@ -202,22 +202,24 @@ class RenderKeywords(TypedDict, total=False):
     # Height of the picture.
     height: int
 
-    # Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.
+    # Number of paths per pixel; at least two are traced. Default: 64, or no limit with
+    # `time_limit`.
     spp: int | None
 
-    # Stop after this time, loading included; two passes are always made.
+    # Stop after this time, which includes loading. At least two paths per pixel are traced.
     time_limit: float | None
 
-    # One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.
+    # Estimator: uniform, cosine, stratified, light, bsdf, mis, mis-power or bdpt.
     estimator: str
 
-    # Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.
+    # Largest number of vertices of a path after the camera; 1 is direct light only. Default: no
+    # limit.
     max_depth: int | None
 
     # Render ambient occlusion.
     ao: bool
 
-    # Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+    # Largest distance of occluders for `ao`: metres, `10%` of the scene's diagonal, or `inf`.
     ao_distance: str | float | None
 
     # Further layers: albedo, normal, depth.
@@ -226,10 +228,10 @@ class RenderKeywords(TypedDict, total=False):
     # Run Open Image Denoise over the picture.
     denoise: bool
 
-    # Light the scene by this bake instead.
+    # Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.
     lightmap: str | Path | None
 
-    # Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
+    # Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
     sky: str | float | Sequence[float] | None
 
     # Factor of the sky radiance.

@@ -180,32 +180,33 @@ def render(
         Settings by name, which replace those in `settings`:
 
         camera : str | float | Sequence[float] | None, default None
-            Position, target, vertical field of view in degrees; or one of the file's own; default: its
-            first.
+            Position, target and vertical field of view in degrees; or name or number of a camera in the
+            file. Default: the file's first camera.
         width : int, pixels, 1 to 16384, default 640
             Width of the picture.
         height : int, pixels, 1 to 16384, default 480
             Height of the picture.
         spp : int | None, from 1, default None
-            Paths for each pixel, at least two passes of them; default: 64, or by `time_limit`.
+            Number of paths per pixel; at least two are traced. Default: 64, or no limit with `time_limit`.
         time_limit : float | None, s, above 0, default None
-            Stop after this time, loading included; two passes are always made.
+            Stop after this time, which includes loading. At least two paths per pixel are traced.
         estimator : str, default 'mis'
-            One of uniform, cosine, stratified, light, bsdf, mis, mis-power, bdpt.
+            Estimator: uniform, cosine, stratified, light, bsdf, mis, mis-power or bdpt.
         max_depth : int | None, from 1, default None
-            Longest path, in vertices after the camera; 1 is direct light only, default: unlimited.
+            Largest number of vertices of a path after the camera; 1 is direct light only. Default: no
+            limit.
         ao : bool, default False
             Render ambient occlusion.
         ao_distance : str | float | None, m, default None
-            Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
+            Largest distance of occluders for `ao`: metres, `10%` of the scene's diagonal, or `inf`.
         aov : str | Sequence[str], default ()
             Further layers: albedo, normal, depth.
         denoise : bool, default False
             Run Open Image Denoise over the picture.
         lightmap : str | Path | None, default None
-            Light the scene by this bake instead.
+            Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.
         sky : str | float | Sequence[float] | None, cd/m2, default None
-            Sky radiance R,G,B in cd/m2; default: black, with `lightmap` the bake's own.
+            Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
         sky_strength : float, from 0, default 1.0
             Factor of the sky radiance.
         seed : int, 0 to 2147483647, default 0
