@@ -129,22 +129,22 @@ class AoKeywords(TypedDict, total=False):
 class BatchKeywords(TypedDict, total=False):
     """Keywords of `BatchSettings`."""
 
-    # Bakes at a time, each in a process of its own.
+    # Number of bakes that run at the same time, each in its own process.
     jobs: int
 
-    # Memory of all bakes together, like 8G; jobs wait for it.
+    # Memory limit of all running bakes together, like 8G.
     memory: str | float | None
 
     # Only report the jobs that would be baked, with reasons.
     dry_run: bool
 
-    # Start nothing more after a failure.
+    # Start no further jobs after a failure.
     fail_fast: bool
 
-    # Bake all, and replace outputs even if baker did not write them.
+    # Bake all jobs, also into folders that baker did not write.
     force: bool
 
-    # Seed of all bakes; default: that of each job.
+    # Seed of all bakes; by default, each job has its own setting.
     seed: int | None
 
     # Number of threads; default: all cores.

@@ -332,17 +332,17 @@ def batch(
         Settings by name, which replace those in `settings`:
 
         jobs : int, 1 to 1024, default 1
-            Bakes at a time, each in a process of its own.
+            Number of bakes that run at the same time, each in its own process.
         memory : str | float | None, bytes, default None
-            Memory of all bakes together, like 8G; jobs wait for it.
+            Memory limit of all running bakes together, like 8G.
         dry_run : bool, default False
             Only report the jobs that would be baked, with reasons.
         fail_fast : bool, default False
-            Start nothing more after a failure.
+            Start no further jobs after a failure.
         force : bool, default False
-            Bake all, and replace outputs even if baker did not write them.
+            Bake all jobs, also into folders that baker did not write.
         seed : int | None, 0 to 2147483647, default None
-            Seed of all bakes; default: that of each job.
+            Seed of all bakes; by default, each job has its own setting.
         threads : int | None, 1 to 1024, default None
             Number of threads; default: all cores.
 
