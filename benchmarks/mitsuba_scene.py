@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from baker.core.scene import Camera, Scene
+from baker.kernels.textures import STORAGE, decoded, level_rows
 from baker.pathtracer.scene import FACE, SHADING, Reference
 
 
@@ -95,8 +96,9 @@ def _colour(shading: Any, m: int) -> dict[str, Any]:
     if number < 0:
         return {"type": "rgb", "value": base.tolist()}
     pack = shading.pack
-    start, width, height = pack.level[number, 0]
-    pixel = pack.pixels[start : start + width * height, :3].reshape(height, width, 3) * base
+    _, width, height = pack.level[number, 0]
+    texel = decoded(level_rows(pack, number, 0), int(pack.wrap[number, STORAGE]))
+    pixel = texel[:, :3].reshape(height, width, 3) * base
     wrap = {0: "repeat", 1: "mirror", 2: "clamp"}[int(pack.wrap[number, 0])]
     return {
         "type": "bitmap", "bitmap": mi.Bitmap(np.ascontiguousarray(pixel, np.float32)), "raw": True,

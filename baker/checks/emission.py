@@ -48,13 +48,13 @@ def find_emission(world: WorldTriangles) -> Emission:
     radiance = factor[world.material[untextured]]
     if len(image):
         # Import these modules only for files with emissive textures, because they compile kernels.
-        from baker.kernels.textures import pack_textures
+        from baker.kernels.textures import PackImage, pack_textures
         from baker.lights.emissive_texture import EmissiveTextures, cut
 
         used = [int(k) for k in np.unique(world.material[image])]
         textures = [t for k in used if (t := materials[k].emission_texture) is not None]
         number = np.searchsorted(used, world.material[image])
-        pack = pack_textures([(t.image, t.wrap) for t in textures], [t.nearest for t in textures])
+        pack = pack_textures([PackImage(t.image, t.wrap, t.nearest) for t in textures])
         uv = np.zeros((len(image), 3, 2))
         for k, texture in enumerate(textures):
             uv[number == k] = _image_uv(world, image[number == k], texture)

@@ -33,8 +33,10 @@ MIB = 1 << 20
 # All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
 # Python, libraries and compiled kernels together, and each triangle.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
-# Bytes for each byte of decoded image pixels: 1 as stored in the file and 4 as float32.
-BYTES_PER_IMAGE_BYTE = 5
+# Texels a side above which the readers of image files average blocks of 2 x 2 texels.
+LARGEST_IMAGE_SIDE = 8192
+# Bytes for each byte of decoded image pixels: 2 as stored in the file and 1.5 for the coarser mip levels.
+BYTES_PER_IMAGE_BYTE = 3.5
 # Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
 # of these points (position and normal, float32). Bakes with more texels cache no points.
 MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
@@ -114,8 +116,8 @@ def surface_area(scene: Scene) -> float:
     return area
 
 
-def image_bytes(scene: Scene) -> int:
-    """Return the total size of all images that a bake reads.
+def image_bytes(scene: Scene) -> tuple[int, int]:
+    """Estimate the memory of the images that a bake reads.
 
     Parameters
     ----------
@@ -124,11 +126,22 @@ def image_bytes(scene: Scene) -> int:
 
     Returns
     -------
-    int
-        Bytes of the decoded pixels.
+    decoded : int
+        Bytes of pixels of all images as decoded.
+    loading : int
+        Largest sum, bytes, while an image is read: all decoded images, and the largest one once more at the
+        resolution of its file. An image with more than half of `LARGEST_IMAGE_SIDE` texels a side may have
+        been reduced from twice its size.
     """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
-    return sum({id(t.image): t.image.nbytes for t in textures if t is not None}.values())
+    images = {id(t.image): t.image for t in textures if t is not None}.values()
+    decoded = sum(image.nbytes for image in images)
+    in_file = [
+        image.nbytes * (4 if 2 * max(image.shape[:2]) > LARGEST_IMAGE_SIDE else 1)
+        for image in images
+        if image.dtype == np.uint8
+    ]
+    return decoded, decoded + max(in_file, default=0)
 
 
 @dataclass(frozen=True)
@@ -141,8 +154,8 @@ class Workload:
         Number of texels on surfaces.
     pages, triangles : int
         Number of pages of the atlas, and number of triangles of all instances.
-    image_bytes : int
-        Size of the decoded pixels of the images that the bake reads, bytes.
+    image_bytes : tuple of int
+        `decoded` and `loading` of the function `image_bytes`, bytes.
     light, ambient_occlusion : bool
         Whether a channel of the bake needs light, and whether a channel needs ambient occlusion.
     """
@@ -150,7 +163,7 @@ class Workload:
     texels: int
     pages: int
     triangles: int
-    image_bytes: int
+    image_bytes: tuple[int, int]
     light: bool
     ambient_occlusion: bool
 
@@ -195,8 +208,9 @@ class Workload:
     def peak_bytes(self, settings: BakeSettings) -> int:
         """Estimate the largest resident memory of a bake.
 
-        Triangles and images stay in memory throughout. The peak is reached either in the ray stages, which
-        store all form factors, or while pages are finished, when the denoiser allocates its memory.
+        Triangles and images stay in memory throughout. The peak is reached while the largest image is read,
+        in the ray stages, which store all form factors, or while pages are finished, when the denoiser
+        allocates its memory.
 
         Parameters
         ----------
@@ -207,7 +221,9 @@ class Workload:
         int
             Bytes, within 30 % of the peaks in `tests/unit/core/test_budget.py`.
         """
-        lasting = BASE_BYTES + BYTES_PER_TRIANGLE * self.triangles + BYTES_PER_IMAGE_BYTE * self.image_bytes
+        decoded, loading = self.image_bytes
+        scene = BASE_BYTES + BYTES_PER_TRIANGLE * self.triangles
+        lasting = scene + math.ceil(BYTES_PER_IMAGE_BYTE * decoded)
         rays = BYTES_PER_PATCH_RAY * patch_rays(settings) * self.patches(settings)
         rays += self.texels * (LIGHT_RAY_BYTES_PER_TEXEL if self.light else AO_RAY_BYTES_PER_TEXEL)
         if self.texels <= MAX_CACHED_TEXELS:
@@ -215,4 +231,4 @@ class Workload:
         finish = self.texels * (LIGHT_FINISH_BYTES_PER_TEXEL if self.light else AO_FINISH_BYTES_PER_TEXEL)
         if settings.denoise:
             finish += min(DENOISE_BYTES_PER_PIXEL * settings.resolution**2, MAX_DENOISE_BYTES)
-        return lasting + max(rays, finish)
+        return max(scene + loading, lasting + max(rays, finish))

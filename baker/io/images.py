@@ -4,19 +4,31 @@ from __future__ import annotations
 
 import io
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.budget import LARGEST_IMAGE_SIDE
+from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
+from baker.io.png import srgb_levels
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 # Largest width and height of an image that is read, texels.
 _LARGEST = 16384
+# Rows that are converted at a time; even.
+_STRIP = 32
 
 
 def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     """Return an image's pixels as they are stored: sRGB-encoded colour, linear alpha, row 0 at the top.
+
+    Blocks of 2 x 2 texels of an image with more than 8192 texels a side are averaged in linear light; an odd
+    last row or column is left out.
 
     Parameters
     ----------
@@ -35,13 +47,13 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     InputError
         If the data is not an image that can be decoded, or if its width or height exceeds 16384 texels.
     """
-    from PIL import Image
+    import PIL.Image
 
     try:
         with warnings.catch_warnings():
             # Suppress Pillow's warning about large images; the size is checked below.
             warnings.simplefilter("ignore")
-            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+            with PIL.Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 width, height = image.size
                 if max(width, height) > _LARGEST:
                     message = f"the image has {width} x {height} texels; at most {_LARGEST} a side are read"
@@ -58,12 +70,30 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
         ) from None
 
 
-def _to_rgba(image: object) -> NDArray[np.uint8]:
-    from PIL import Image
+def _to_rgba(image: Image) -> NDArray[np.uint8]:
+    """Convert an image in strips of rows, so that it is in memory twice at most."""
+    width, height = image.size
+    step = 2 if max(width, height) > LARGEST_IMAGE_SIDE and min(width, height) > 1 else 1
+    pixels = np.empty((height // step, width // step, 4), np.uint8)
+    for top in range(0, height // step * step, _STRIP):
+        rows = _rows(image, top, min(top + _STRIP, height // step * step))
+        pixels[top // step : (top + len(rows)) // step] = rows if step == 1 else _halved(rows)
+    return pixels
 
-    assert isinstance(image, Image.Image)
+
+def _rows(image: Image, top: int, end: int) -> NDArray[np.uint8]:
+    """Return the rows from `top` to `end` of an image as RGBA."""
+    strip = image.crop((0, top, image.width, end))
     if image.mode.startswith("I;16") or image.mode == "I":
         # Scale 16-bit grey to 8 bits: (v + 128) // 257 rounds 65535 to 255. Pillow would clip it at 255.
-        level = np.clip((np.asarray(image).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
+        level = np.clip((np.asarray(strip).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
         return np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
-    return np.array(image.convert("RGBA"), np.uint8)
+    return np.array(strip.convert("RGBA"), np.uint8)
+
+
+def _halved(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Average blocks of 2 x 2 texels: RGB in linear light, alpha as stored."""
+    linear = np.concatenate([linear_from_srgb(np.arange(256) / 255.0)[rows[..., :3]], rows[..., 3:]], axis=-1)
+    wide = linear[:, : linear.shape[1] // 2 * 2]
+    mean = (wide[::2, ::2] + wide[1::2, ::2] + wide[::2, 1::2] + wide[1::2, 1::2]) * np.float32(0.25)
+    return np.concatenate([srgb_levels(mean[..., :3]), np.rint(mean[..., 3:]).astype(np.uint8)], axis=-1)

@@ -54,17 +54,17 @@ def no_alpha() -> AlphaTable:
 
 
 @inner
-def opacity(row, k, pixels, level, wrap, b1, b2):  # type: ignore[no-untyped-def]
+def opacity(row, k, pack, b1, b2):  # type: ignore[no-untyped-def]
     """Return the opacity of row k at barycentrics (b1, b2), 0 to 1.
 
     row : (K, 16) float32, see `AlphaTable`
-    pixels (n, 4) float32, level (K, 16, 3) int64, wrap (K, 3) int64 : of a `TexturePack`
+    pack : TexturePack
     """
     alpha = np.float64(row[k, ALPHA]) + b1 * row[k, ALPHA_EDGE_1] + b2 * row[k, ALPHA_EDGE_2]
     if row[k, TEXTURE] >= np.float32(0.0):
         u = np.float64(row[k, UV]) + b1 * row[k, UV_EDGE_1] + b2 * row[k, UV_EDGE_2]
         v = np.float64(row[k, UV + 1]) + b1 * row[k, UV_EDGE_1 + 1] + b2 * row[k, UV_EDGE_2 + 1]
-        alpha *= sample_alpha(pixels, level, wrap, np.int64(row[k, TEXTURE]), u, v)
+        alpha *= sample_alpha(pack, np.int64(row[k, TEXTURE]), u, v)
     if row[k, CUTOFF] >= np.float32(0.0):
         # Compare as float32: the weights of a lookup may sum to slightly less than 1.
         return 1.0 if np.float32(alpha) >= row[k, CUTOFF] else 0.0
@@ -79,8 +79,5 @@ def opacity_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
     """
     if len(shading.alpha.slot) == 0 or shading.alpha.slot[t] < 0:
         return 1.0
-    pack = shading.pack
-    return opacity(
-        shading.alpha.row, np.int64(shading.alpha.slot[t]), pack.pixels, pack.level, pack.wrap,
-        np.float64(b1), np.float64(b2),
-    )  # fmt: skip
+    k = np.int64(shading.alpha.slot[t])
+    return opacity(shading.alpha.row, k, shading.pack, np.float64(b1), np.float64(b2))

@@ -17,48 +17,193 @@ from baker.core.colour import linear_from_srgb
 from baker.trace.jit import inner, larger, smaller
 
 MAX_LEVELS = 16
-# Columns of `TexturePack.level`, of `.wrap`, and the alpha channel of `.pixels`.
+# Columns of `TexturePack.level`, of `.wrap`, and the alpha channel of pixels.
 OFFSET, WIDTH, HEIGHT = 0, 1, 2
-WRAP_U, WRAP_V, NEAREST = 0, 1, 2
+WRAP_U, WRAP_V, NEAREST, STORAGE = 0, 1, 2, 3
 ALPHA = 3
 # Values of WRAP_U and WRAP_V.
 _REPEAT, _MIRROR, _CLAMP = 0, 1, 2
 _WRAP = {"repeat": _REPEAT, "mirror": _MIRROR, "clamp": _CLAMP}
+# Values of STORAGE.
+FLOATS, SRGB_BYTES, LINEAR_BYTES = 0, 1, 2
+# Rows of the finest level that are decoded at a time while the pyramid is built; even.
+_STRIP = 256
 
 
 class TexturePack(NamedTuple):
-    """Linear RGBA of K textures with their mip levels.
+    """RGBA of K textures with their mip levels.
+
+    The finest level of an 8-bit image stays in 8 bits and is decoded by each lookup. All other levels are
+    linear float32. An image of n texels takes 9.3 n bytes, or 21.3 n bytes if it is float32.
 
     Attributes
     ----------
     pixels : (n, 4) float32
-        Rows of all levels of all textures.
+        Linear rows of all levels that are stored as floats.
+    coded : (m, 4) uint8
+        Rows of the finest levels of 8-bit images, as in the image.
     level : (K, 16, 3) int64
-        OFFSET in `pixels`, WIDTH and HEIGHT of each level, finest first.
+        OFFSET, WIDTH and HEIGHT of each level, finest first. OFFSET is a row of `coded` if the level is the
+        finest and STORAGE is not `FLOATS`, else a row of `pixels`.
     n_levels : (K,) int64
         Levels of each texture.
-    wrap : (K, 3) int64
-        WRAP_U and WRAP_V: 0 repeat, 1 mirror, 2 clamp; NEAREST: 1 if lookups take the nearest texel.
+    wrap : (K, 4) int64
+        WRAP_U and WRAP_V: 0 repeat, 1 mirror, 2 clamp. NEAREST: 1 if lookups take the nearest texel. STORAGE
+        of the finest level: 0 float32, 1 bytes with sRGB-encoded colour and linear alpha, 2 linear bytes.
     """
 
     pixels: NDArray[np.float32]
+    coded: NDArray[np.uint8]
     level: NDArray[np.int64]
     n_levels: NDArray[np.int64]
     wrap: NDArray[np.int64]
 
 
-_LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255.0)
+_LINEAR_BYTE = (np.arange(256) / np.float32(255.0)).astype(np.float32)
+# Linear value of each byte: the row is STORAGE, which has no bytes in row 0.
+_VALUE_OF_BYTE = np.stack([_LINEAR_BYTE, linear_from_srgb(np.arange(256) / 255.0), _LINEAR_BYTE])
 
 
-def _linear_image(image: NDArray[Any]) -> NDArray[np.float32]:
-    if image.dtype != np.uint8:
-        return image.astype(np.float32)
-    linear: NDArray[np.float32] = _LINEAR_FROM_BYTE[image]
-    linear[..., 3] = image[..., 3] / np.float32(255.0)
+class PackImage(NamedTuple):
+    """An image to be packed.
+
+    Attributes
+    ----------
+    image : (H, W, 4) uint8 or float32
+        RGBA. float32 is linear.
+    wrap : (str, str)
+        Wrap modes along u and v: "repeat", "mirror" or "clamp".
+    nearest : bool
+        Whether `sample_texture` takes the nearest texel instead of interpolating.
+    linear : bool
+        Whether the bytes of a uint8 image are linear; otherwise RGB is sRGB-encoded.
+    """
+
+    image: NDArray[Any]
+    wrap: tuple[str, str]
+    nearest: bool = False
+    linear: bool = False
+
+
+def pack_textures(images: Sequence[PackImage]) -> TexturePack:
+    """Build the mip pyramids of textures.
+
+    Parameters
+    ----------
+    images : sequence of PackImage
+        The textures.
+
+    Returns
+    -------
+    TexturePack
+        In the order of `images`; one row of each array, without texels, if there are none.
+    """
+    pack = _empty_pack(images)
+    for k, image in enumerate(images):
+        _fill(pack, k, image.image)
+    return pack
+
+
+def _empty_pack(images: Sequence[PackImage]) -> TexturePack:
+    """Return the pack of images with all levels laid out and all texels 0."""
+    count = max(len(images), 1)
+    level = np.zeros((count, MAX_LEVELS, 3), np.int64)
+    n_levels, wrap = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
+    floats = bytes_ = 0
+    for k, image in enumerate(images):
+        wrap[k, [WRAP_U, WRAP_V]] = [_WRAP[mode] for mode in image.wrap]
+        wrap[k, NEAREST] = image.nearest
+        if image.image.dtype == np.uint8:
+            wrap[k, STORAGE] = LINEAR_BYTES if image.linear else SRGB_BYTES
+        height, width = image.image.shape[:2]
+        for n in range(MAX_LEVELS):
+            in_bytes = n == 0 and wrap[k, STORAGE] != FLOATS
+            level[k, n] = bytes_ if in_bytes else floats, width, height
+            n_levels[k] = n + 1
+            bytes_ += width * height if in_bytes else 0
+            floats += 0 if in_bytes else width * height
+            if width == 1 and height == 1:
+                break
+            width, height = max(width // 2, 1), max(height // 2, 1)
+    pixels, coded = np.zeros((max(floats, 1), 4), np.float32), np.zeros((max(bytes_, 1), 4), np.uint8)
+    return TexturePack(pixels, coded, level, n_levels, wrap)
+
+
+def _fill(pack: TexturePack, k: int, image: NDArray[Any]) -> None:
+    """Write all levels of texture k."""
+    level_rows(pack, k, 0)[:] = image.reshape(-1, 4)
+    for n in range(1, int(pack.n_levels[k])):
+        before, after = (
+            level_rows(pack, k, m).reshape(*pack.level[k, m, [HEIGHT, WIDTH]], 4) for m in (n - 1, n)
+        )
+        for first in range(0, len(after), _STRIP // 2):
+            strip = decoded(before[2 * first : 2 * first + _STRIP], int(pack.wrap[k, STORAGE]))
+            after[first : first + _STRIP // 2] = _halved(strip)
+
+
+def level_rows(pack: TexturePack, k: int, n: int) -> NDArray[Any]:
+    """Return the stored texels of a level.
+
+    Parameters
+    ----------
+    pack : TexturePack
+        The textures.
+    k, n : int
+        Texture and level; level 0 is the finest.
+
+    Returns
+    -------
+    (H * W, 4) float32 or uint8
+        A view. Bytes are decoded by `decoded`.
+    """
+    offset, width, height = (int(x) for x in pack.level[k, n])
+    rows = pack.coded if n == 0 and pack.wrap[k, STORAGE] != FLOATS else pack.pixels
+    return rows[offset : offset + width * height]
+
+
+def decoded(stored: NDArray[Any], storage: int) -> NDArray[np.float32]:
+    """Decode stored texels.
+
+    Parameters
+    ----------
+    stored : (..., 4) uint8 or float32
+        RGBA as in `level_rows`.
+    storage : int
+        STORAGE of the texture; read if `stored` is uint8.
+
+    Returns
+    -------
+    (..., 4) float32
+        Linear RGBA; `stored` itself if it is float32.
+    """
+    if stored.dtype != np.uint8:
+        return np.asarray(stored, np.float32)
+    linear: NDArray[np.float32] = _VALUE_OF_BYTE[storage][stored]
+    linear[..., ALPHA] = _LINEAR_BYTE[stored[..., ALPHA]]
     return linear
 
 
+def value_limits(pack: TexturePack, k: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the smallest and the largest linear value of each channel of a texture.
+
+    Parameters
+    ----------
+    pack : TexturePack
+        The textures.
+    k : int
+        Number of the texture.
+
+    Returns
+    -------
+    lowest, highest : (4,) float32
+        Linear RGBA, over the finest level.
+    """
+    finest, storage = level_rows(pack, k, 0), int(pack.wrap[k, STORAGE])
+    return decoded(finest.min(axis=0), storage), decoded(finest.max(axis=0), storage)
+
+
 def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Average blocks of 2 x 2 texels; an odd last row or column is left out, a single one is kept."""
     rows = (
         image
         if image.shape[0] == 1
@@ -68,44 +213,6 @@ def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
         return rows
     halved: NDArray[np.float32] = (rows[:, : rows.shape[1] // 2 * 2 : 2] + rows[:, 1::2]) * np.float32(0.5)
     return halved
-
-
-def pack_textures(
-    images: Sequence[tuple[NDArray[Any], tuple[str, str]]], nearest: Sequence[bool] = ()
-) -> TexturePack:
-    """Build the mip pyramids of textures.
-
-    Parameters
-    ----------
-    images : sequence of (image, (wrap_u, wrap_v))
-        RGBA (H, W, 4), uint8 in sRGB or float32 linear, and the wrap modes: repeat, mirror or clamp.
-    nearest : sequence of bool, optional
-        Which of them `sample_texture` looks up without interpolation.
-
-    Returns
-    -------
-    TexturePack
-        In the order of `images`; one row without texels if there are none.
-    """
-    level = np.zeros((max(len(images), 1), MAX_LEVELS, 3), np.int64)
-    n_levels = np.zeros(max(len(images), 1), np.int64)
-    wrap = np.zeros((max(len(images), 1), 3), np.int64)
-    wrap[: len(nearest), NEAREST] = nearest
-    parts: list[NDArray[np.float32]] = []
-    offset = 0
-    for k, (image, modes) in enumerate(images):
-        wrap[k, :2] = [_WRAP[m] for m in modes]
-        current = _linear_image(image)
-        for n in range(MAX_LEVELS):
-            level[k, n] = offset, current.shape[1], current.shape[0]
-            n_levels[k] = n + 1
-            parts.append(current.reshape(-1, 4))
-            offset += current.shape[0] * current.shape[1]
-            if current.shape[0] == 1 and current.shape[1] == 1:
-                break
-            current = _halved(current)
-    pixels = np.concatenate(parts) if parts else np.zeros((1, 4), np.float32)
-    return TexturePack(pixels, level, n_levels, wrap)
 
 
 @inner
@@ -120,14 +227,23 @@ def wrapped(i, n, mode):  # type: ignore[no-untyped-def]
 
 
 @inner
-def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
+def _texel(pack, storage, at, c):  # type: ignore[no-untyped-def]
+    """Return channel c of row `at` of `pack.pixels`, or, if `storage` is not FLOATS, of `pack.coded`."""
+    if storage == FLOATS:
+        return pack.pixels[at, c]
+    return _VALUE_OF_BYTE[storage if c != ALPHA else LINEAR_BYTES, pack.coded[at, c]]
+
+
+@inner
+def sample_alpha(pack, k, u, v):  # type: ignore[no-untyped-def]
     """Return the bilinear alpha of texture k at (u, v) in its finest level.
 
-    pixels (n, 4) float32, level (K, 16, 3) int64, wrap (K, 3) int64 : see `TexturePack`
+    pack : TexturePack
     """
-    offset, w, h = level[k, 0, OFFSET], level[k, 0, WIDTH], level[k, 0, HEIGHT]
+    offset, w, h = pack.level[k, 0, OFFSET], pack.level[k, 0, WIDTH], pack.level[k, 0, HEIGHT]
+    storage = pack.wrap[k, STORAGE]
     # Keep only the fraction of two periods of a repeated uv.
-    wrap_u, wrap_v = wrap[k, WRAP_U], wrap[k, WRAP_V]
+    wrap_u, wrap_v = pack.wrap[k, WRAP_U], pack.wrap[k, WRAP_V]
     x = (u - math.floor(u / 2.0) * 2.0 if wrap_u != _CLAMP else smaller(larger(u, -1.0), 2.0)) * w - 0.5
     y = (v - math.floor(v / 2.0) * 2.0 if wrap_v != _CLAMP else smaller(larger(v, -1.0), 2.0)) * h - 0.5
     x0 = np.int64(math.floor(x))
@@ -137,8 +253,12 @@ def sample_alpha(pixels, level, wrap, k, u, v):  # type: ignore[no-untyped-def]
     left, right = wrapped(x0, w, wrap_u), wrapped(x0 + 1, w, wrap_u)
     upper = offset + wrapped(y0, h, wrap_v) * w
     lower = offset + wrapped(y0 + 1, h, wrap_v) * w
-    above = (1.0 - fx) * pixels[upper + left, ALPHA] + fx * pixels[upper + right, ALPHA]
-    below = (1.0 - fx) * pixels[lower + left, ALPHA] + fx * pixels[lower + right, ALPHA]
+    above = (1.0 - fx) * _texel(pack, storage, upper + left, ALPHA) + fx * _texel(
+        pack, storage, upper + right, ALPHA
+    )
+    below = (1.0 - fx) * _texel(pack, storage, lower + left, ALPHA) + fx * _texel(
+        pack, storage, lower + right, ALPHA
+    )
     return (1.0 - fy) * above + fy * below
 
 
@@ -157,6 +277,7 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
         # Take the minimum of floats: an infinite footprint has no integer level.
         n = int(smaller(math.log2(footprint * width) + 0.5, float(pack.n_levels[k] - 1)))
     offset, w, h = pack.level[k, n, OFFSET], pack.level[k, n, WIDTH], pack.level[k, n, HEIGHT]
+    storage = pack.wrap[k, STORAGE] if n == 0 else FLOATS
     # Keep only the fraction of two periods of a repeated uv.
     wrap_u, wrap_v = pack.wrap[k, WRAP_U], pack.wrap[k, WRAP_V]
     x = (u - math.floor(u / 2.0) * 2.0 if wrap_u != _CLAMP else smaller(larger(u, -1.0), 2.0)) * w - 0.5
@@ -175,4 +296,4 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
             weight = (fx if i else 1.0 - fx) * (fy if j else 1.0 - fy)
             at = offset + wrapped(y0 + j, h, wrap_v) * w + wrapped(x0 + i, w, wrap_u)
             for c in range(4):
-                out[c] += weight * pack.pixels[at, c]
+                out[c] += weight * _texel(pack, storage, at, c)

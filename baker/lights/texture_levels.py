@@ -13,10 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.kernels.textures import TexturePack
+from baker.kernels.textures import HEIGHT, STORAGE, WIDTH, TexturePack, decoded, level_rows
 from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
+# Texels a side of an emissive image above which a coarser level is used, if no texel is lost by halving.
+LARGEST_SIDE = 2048
 # Rows that are averaged together; this bounds the working memory.
 _STRIP = 256
 
@@ -35,14 +37,13 @@ class TextureLevels:
 
     def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
         """Prepare a texture; weight (3,): factor of each channel in the sum of squares."""
-        offset, w, h = (int(x) for x in pack.level[texture, 0])
+        finest = finest_level(pack, texture, weight)
         self.wrap = pack.wrap[texture]
-        self.size = np.array([w, h])
+        self.size = np.array([finest.w, finest.h])
         self._texture, self._weight = texture, weight
-        finest = Level(pack.pixels[offset : offset + w * h], w, h, row_sums(pack, texture, weight))
         self._made = {(0, 0): finest}
         # Widths and heights of the levels down to one texel.
-        self._sizes = [_halvings(w), _halvings(h)]
+        self._sizes = [_halvings(finest.w), _halvings(finest.h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
         """Return the texture after `along_u` and `along_v` halvings; beyond one texel nothing changes."""
@@ -110,10 +111,33 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
     return float(equal[short[0]]) if len(short) else np.inf
 
 
-def row_sums(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> RowSums:
-    """Return the running sums of a texture of the pack."""
-    offset, w, h = (int(x) for x in pack.level[texture, 0])
-    return _sums(pack.pixels[offset : offset + w * h], h, weight, 0.0, texture)
+def finest_level(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> Level:
+    """Return the level of a texture whose means guide the sampling of its emission.
+
+    It is the finest level of the pack. An image with more than `LARGEST_SIDE` texels a side and an even width
+    and height is represented by a coarser level of the pack, whose texels are means of 2 x 2 texels.
+
+    Parameters
+    ----------
+    pack : TexturePack
+        The textures.
+    texture : int
+        Number of the texture.
+    weight : (3,) float64
+        Factor of each channel in the sum of squares.
+
+    Returns
+    -------
+    Level
+        Linear texels and the running sums of their rows.
+    """
+    n = 0
+    size = pack.level[texture, :, [WIDTH, HEIGHT]].T
+    while size[n].max() > LARGEST_SIDE and not (size[n] % 2).any():
+        n += 1
+    w, h = (int(x) for x in size[n])
+    pixels = decoded(level_rows(pack, texture, n), int(pack.wrap[texture, STORAGE]))
+    return Level(pixels, w, h, _sums(pixels, h, weight, 0.0, texture))
 
 
 def _sums(

@@ -22,7 +22,7 @@ from baker.kernels.alpha import (
     no_alpha,
 )
 from baker.kernels.shading import Shading
-from baker.kernels.textures import TexturePack
+from baker.kernels.textures import TexturePack, value_limits
 from baker.kernels.transmittance import TransmittanceTable
 from baker.topology.unique_rows import first_equal, unique_rows
 from baker.trace.embree import HitFilter
@@ -155,5 +155,6 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
 
 def _lowest_alpha(pack: TexturePack, k: int) -> float:
     """Return the smallest alpha of a texture."""
-    offset, width, height = (int(x) for x in pack.level[k, 0])
-    return float(pack.pixels[offset : offset + width * height, 3].min(initial=1.0))
+    lowest, _ = value_limits(pack, k)
+    _, _, _, alpha = lowest
+    return float(alpha)

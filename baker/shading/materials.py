@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from baker.core.geometry import Geometry
 from baker.core.scene import LARGEST_UV, Scene, Texture
 from baker.kernels.shading import Shading
-from baker.kernels.textures import pack_textures
+from baker.kernels.textures import PackImage, pack_textures
 from baker.shading.alpha import build_alpha
 
 
@@ -29,8 +29,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     Shading
         Materials for kernels.
     """
-    images: list[tuple[NDArray[np.generic], tuple[str, str]]] = []
-    nearest: list[bool] = []
+    images: list[PackImage] = []
     numbers: dict[tuple[int, tuple[str, str], bool, bool], int] = {}
 
     def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
@@ -41,16 +40,14 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
         key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:
             numbers[key] = len(images)
-            linear_bytes = texture.image.dtype == np.uint8 and linear
-            images.append((texture.image / np.float32(255) if linear_bytes else texture.image, texture.wrap))
-            nearest.append(sharp)
+            images.append(PackImage(texture.image, texture.wrap, sharp, linear))
         return numbers[key]
 
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
     emission_texture = np.array([number(m.emission_texture, sharp=True) for m in scene.materials], np.int32)
     glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]
     reflection_texture = np.array([number(texture, linear=True) for texture in glossy], np.int32)
-    pack = pack_textures(images, nearest)
+    pack = pack_textures(images)
     base_uv = corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
         pack=pack,

@@ -8,7 +8,7 @@ import numpy as np
 
 from baker.kernels.alpha import ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2, CUTOFF
 from baker.kernels.shading import Shading
-from baker.kernels.textures import TexturePack
+from baker.kernels.textures import TexturePack, value_limits
 from baker.kernels.transmittance import COLOUR, COLOUR_EDGE_1, COLOUR_EDGE_2, ROW_LENGTH, TransmittanceTable
 from baker.trace.embree import HitFilter
 
@@ -84,6 +84,5 @@ def _limits(pack: TexturePack, k: int) -> tuple[np.ndarray[Any, Any], float]:
     """Return the smallest RGB (3,) in texture k, and its largest alpha; ones for no texture."""
     if k < 0:
         return np.ones(3, np.float32), 1.0
-    offset, width, height = (int(x) for x in pack.level[k, 0])
-    pixels = pack.pixels[offset : offset + width * height]
-    return pixels[:, :3].min(axis=0, initial=1.0), float(pixels[:, 3].max(initial=0.0))
+    (red, green, blue, _), (_, _, _, alpha) = value_limits(pack, k)
+    return np.array([red, green, blue]), float(alpha)

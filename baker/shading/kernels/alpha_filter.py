@@ -52,7 +52,7 @@ from baker.trace.pointers import pointer
 
 _INV_2_32 = 1.0 / 4294967296.0
 # The user data: address and length of each array.
-_ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 16, 2)
+_ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 18, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
 # Shadow rays whose transmittance is below this are blocked.
 _DARK = np.float32(1.0e-9)
@@ -63,7 +63,7 @@ def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: Texture
     """Return the filter of triangles that let light through; `blend` are the BLEND ones, None without any."""
     blend = no_transmittance() if blend is None else blend
     arrays = (
-        *(alpha.slot, alpha.row, pack.pixels, pack.level, pack.n_levels, pack.wrap),
+        *(alpha.slot, alpha.row, *pack),
         *(blend.slot, blend.row),
     )
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
@@ -103,7 +103,7 @@ def _let_through(arguments):
     given = carray(arguments, (6,), np.int64)
     n = given[FILTER_WIDTH] & 0xFFFFFFFF
     valid = carray(pointer(given[FILTER_VALID]), (n,), np.int32)
-    data = carray(pointer(given[FILTER_DATA]), (16,), np.int64)
+    data = carray(pointer(given[FILTER_DATA]), (18,), np.int64)
     context = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.float32)
     context_words = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.uint32)
     ray = carray(pointer(given[FILTER_RAY]), (12 * n,), np.float32)
@@ -114,9 +114,10 @@ def _let_through(arguments):
     row = carray(pointer(data[_ALPHA_ROW]), (data[_ALPHA_ROW + 1], ALPHA_ROW_LENGTH), np.float32)
     pack = TexturePack(
         carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
+        carray(pointer(data[_CODED]), (data[_CODED + 1], 4), np.uint8),
         carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
         carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
-        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 3), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 4), np.int64),
     )
     blend_slot = carray(pointer(data[_BLEND_SLOT]), (data[_BLEND_SLOT + 1],), np.int32)
     blend_row = carray(pointer(data[_BLEND_ROW]), (data[_BLEND_ROW + 1], ROW_LENGTH), np.float32)
@@ -128,7 +129,7 @@ def _let_through(arguments):
         prim = hit_words[_PRIM * n + lane]
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
-        share = opacity(row, k, pack.pixels, pack.level, pack.wrap, b1, b2)
+        share = opacity(row, k, pack, b1, b2)
         if share >= 1.0:
             continue
         if share <= 0.0:

@@ -41,13 +41,13 @@ from baker.trace.pointers import pointer
 
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
 # The user data: address and length of each array.
-_SLOT, _ROW, _PIXELS, _LEVEL, _N_LEVELS, _WRAP = range(0, 12, 2)
+_SLOT, _ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP = range(0, 14, 2)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
 def filter_of(table: TransmittanceTable, pack: TexturePack) -> HitFilter:
     """Return the filter of the tree of BLEND triangles."""
-    arrays = (table.slot, table.row, pack.pixels, pack.level, pack.n_levels, pack.wrap)
+    arrays = (table.slot, table.row, *pack)
     data = np.array([x for a in arrays for x in (a.ctypes.data, len(a))], np.int64)
     address = _multiply_colour.address or 0
     return HitFilter(table.slot >= 0, address, data.ctypes.data, (arrays, data), table.coloured)
@@ -63,7 +63,7 @@ def _multiply_colour(arguments):
     given = carray(arguments, (6,), np.int64)
     n = given[FILTER_WIDTH] & 0xFFFFFFFF
     valid = carray(pointer(given[FILTER_VALID]), (n,), np.int32)
-    data = carray(pointer(given[FILTER_DATA]), (12,), np.int64)
+    data = carray(pointer(given[FILTER_DATA]), (14,), np.int64)
     context = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.float32)
     context_words = carray(pointer(given[FILTER_CONTEXT]), (CONTEXT_WORDS,), np.uint32)
     ray = carray(pointer(given[FILTER_RAY]), (12 * n,), np.float32)
@@ -74,9 +74,10 @@ def _multiply_colour(arguments):
     row = carray(pointer(data[_ROW]), (data[_ROW + 1], ROW_LENGTH), np.float32)
     pack = TexturePack(
         carray(pointer(data[_PIXELS]), (data[_PIXELS + 1], 4), np.float32),
+        carray(pointer(data[_CODED]), (data[_CODED + 1], 4), np.uint8),
         carray(pointer(data[_LEVEL]), (data[_LEVEL + 1], MAX_LEVELS, 3), np.int64),
         carray(pointer(data[_N_LEVELS]), (data[_N_LEVELS + 1],), np.int64),
-        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 3), np.int64),
+        carray(pointer(data[_WRAP]), (data[_WRAP + 1], 4), np.int64),
     )
     rgba, rgb = _rgba(), _rgb()
     for lane in range(n):

@@ -5,13 +5,24 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from baker.checks.context import CheckContext
 from baker.checks.rules.cost import estimate_cost
-from baker.core.budget import MAX_PATCHES, Workload, patch_rays, texels_and_pages
+from baker.core.budget import (
+    BASE_BYTES,
+    LARGEST_IMAGE_SIDE,
+    MAX_PATCHES,
+    Workload,
+    image_bytes,
+    patch_rays,
+    texels_and_pages,
+)
+from baker.core.scene import Material, Scene, Texture
 from baker.core.settings import make_settings
 from baker.io.load import load_for_bake
 from baker.jobs.memory import estimate_peak
@@ -77,7 +88,7 @@ def test_pages_follow_density():
 def test_patches_and_rays_keep_to_their_limits():
     def work(texels, **more):
         fields = {"light": True, "ambient_occlusion": False} | more
-        return Workload(texels=texels, pages=1, triangles=0, image_bytes=0, **fields)
+        return Workload(texels=texels, pages=1, triangles=0, image_bytes=(0, 0), **fields)
 
     settings = make_settings({"samples": 4})
     assert [patch_rays(make_settings({"samples": n})) for n in (4, 200, 5000)] == [128, 200, 512]
@@ -97,3 +108,33 @@ def test_patches_and_rays_keep_to_their_limits():
         "inside geometry": 400,
         "ambient occlusion": 400,
     }
+
+
+def test_the_estimate_covers_the_decoding_of_a_large_image():
+    def scene(*sides):
+        images = [np.broadcast_to(np.uint8(0), (side, side, 4)) for side in sides]
+        return Scene(
+            name="s",
+            path=Path("s.glb"),
+            meshes=[],
+            instances=[],
+            materials=[Material(name="m", base_colour_texture=Texture(image)) for image in images],
+            lights=[],
+        )
+
+    half = LARGEST_IMAGE_SIDE // 2
+    assert image_bytes(scene()) == (0, 0)
+    assert image_bytes(scene(64, half)) == (4 * (64**2 + half**2), 4 * (64**2 + 2 * half**2))
+    # It may have been reduced from twice its size.
+    assert image_bytes(scene(half + 1)) == (4 * (half + 1) ** 2, 5 * 4 * (half + 1) ** 2)
+    twice = replace(scene(64), materials=scene(64).materials * 2)
+    assert image_bytes(twice)[0] == 4 * 64**2
+
+    def peak(images):
+        work = Workload(
+            texels=1, pages=1, triangles=0, image_bytes=images, light=False, ambient_occlusion=True
+        )
+        return work.peak_bytes(make_settings({"resolution": 16, "denoise": False}))
+
+    assert peak((10**9, 5 * 10**9)) == BASE_BYTES + 5 * 10**9
+    assert peak((10**9, 2 * 10**9)) == pytest.approx(BASE_BYTES + 3.5e9, rel=1e-3)

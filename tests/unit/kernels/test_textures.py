@@ -12,7 +12,7 @@ from baker.core.colour import linear_from_srgb
 from baker.core.scene import Material, Texture
 from baker.kernels.surface import N_POINTS, place_points
 from baker.kernels.texel_info import texel_footprint, uv_at
-from baker.kernels.textures import pack_textures, sample_texture
+from baker.kernels.textures import PackImage, pack_textures, sample_texture, value_limits
 
 sample_texture, texel_footprint, uv_at = compiled(sample_texture, texel_footprint, uv_at)
 
@@ -36,7 +36,7 @@ def test_lookups_are_bilinear_for_every_wrap(shape):
     rng = np.random.default_rng(sum(shape))
     image = rng.random((*shape, 4)).astype(np.float32)
     pairs = [(a, b) for a in MODES for b in MODES]
-    pack = pack_textures([(image, pair) for pair in pairs])
+    pack = pack_textures([PackImage(image, pair) for pair in pairs])
     for k, wrap in enumerate(pairs):
         for u, v in [*rng.uniform(-3, 4, (40, 2)), (0, 0), (1, 1), (0.5, -1), (1e4 + 0.25, 0.5)]:
             np.testing.assert_allclose(lookup(pack, k, u, v), naive.bilinear(image, u, v, wrap), atol=2e-5)
@@ -46,7 +46,7 @@ def test_lookups_are_bilinear_for_every_wrap(shape):
 def test_footprints_read_the_halved_image(shape):
     rng = np.random.default_rng(sum(shape))
     image = rng.random((*shape, 4)).astype(np.float32)
-    pack = pack_textures([(image, ("repeat", "clamp"))])
+    pack = pack_textures([PackImage(image, ("repeat", "clamp"))])
     levels = naive.pyramid(image)
     assert pack.n_levels[0] == len(levels)
     for n, level in enumerate(levels):
@@ -60,12 +60,48 @@ def test_footprints_read_the_halved_image(shape):
 def test_bytes_are_decoded_before_they_are_averaged():
     image = np.zeros((2, 2, 4), np.uint8)
     image[0] = [255, 0, 128, 64]
-    pack = pack_textures([(image, ("repeat", "repeat"))])
+    pack = pack_textures([PackImage(image, ("repeat", "repeat"))])
     grey = float(linear_from_srgb(128 / 255))
     np.testing.assert_allclose(lookup(pack, 0, 0.25, 0.25), [1, 0, grey, 64 / 255], atol=1e-6)
     # The mean of black and white light is 0.5, which sRGB would have made 0.21.
     np.testing.assert_allclose(lookup(pack, 0, 0.5, 0.5, 1.0), [0.5, 0, grey / 2, 32 / 255], atol=1e-6)
     assert pack_textures([]).pixels.shape == (1, 4)
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (600, 3), (5, 301), (1, 9)])
+@pytest.mark.parametrize("linear", [False, True])
+def test_lookups_in_bytes_equal_those_in_floats(shape, linear):
+    rng = np.random.default_rng(sum(shape))
+    image = rng.integers(0, 256, (*shape, 4)).astype(np.uint8)
+    value = image / np.float32(255)
+    if not linear:
+        value[..., :3] = linear_from_srgb(image[..., :3] / 255.0)
+    in_bytes = pack_textures([PackImage(image, ("repeat", "mirror"), linear=linear)])
+    in_floats = pack_textures([PackImage(value, ("repeat", "mirror"))])
+    assert in_bytes.coded.nbytes == image.nbytes
+    assert in_bytes.pixels.nbytes == in_floats.pixels.nbytes - value.nbytes
+    for n in range(4):
+        for u, v in rng.uniform(-2, 2, (20, 2)):
+            footprint = 2.0**n / max(shape)
+            assert (lookup(in_bytes, 0, u, v, footprint) == lookup(in_floats, 0, u, v, footprint)).all()
+    for found, truth in zip(value_limits(in_bytes, 0), value_limits(in_floats, 0), strict=True):
+        assert np.array_equal(found, truth)
+    assert np.array_equal(value_limits(in_floats, 0)[0], value.reshape(-1, 4).min(axis=0))
+
+
+def test_each_texture_of_a_pack_has_its_own_texels():
+    rng = np.random.default_rng(5)
+    shapes = [(3, 4), (6, 2), (1, 1), (2, 5), (1, 1)]
+    images = [
+        rng.integers(0, 256, (*shape, 4)).astype(np.uint8) if k % 2 else rng.random((*shape, 4), np.float32)
+        for k, shape in enumerate(shapes)
+    ]
+    together = pack_textures([PackImage(image, ("clamp", "repeat")) for image in images])
+    for k, image in enumerate(images):
+        alone = pack_textures([PackImage(image, ("clamp", "repeat"))])
+        for n, (u, v) in enumerate(rng.uniform(-1, 2, (12, 2))):
+            footprint = 0.5 * (n % 3)
+            assert (lookup(together, k, u, v, footprint) == lookup(alone, 0, u, v, footprint)).all()
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +204,7 @@ def test_footprint_of_a_uv_without_area(painted):
 @pytest.mark.parametrize("footprint", [1e20, 3e38, np.inf, np.nan])
 def test_a_footprint_without_bounds_reads_the_coarsest_image(footprint):
     image = np.random.default_rng(3).random((8, 8, 4)).astype(np.float32)
-    pack = pack_textures([(image, ("repeat", "repeat"))])
+    pack = pack_textures([PackImage(image, ("repeat", "repeat"))])
     out = np.zeros(4, np.float32)
     sample_texture(pack, 0, 0.3, 0.6, footprint, out)
     if np.isnan(footprint):

@@ -8,7 +8,7 @@ from tiny_scenes import Quad, quad_world
 
 from baker.core.scene import Material, Texture
 from baker.kernels.emitters import CLUSTER, SHARE
-from baker.kernels.textures import pack_textures
+from baker.kernels.textures import PackImage, pack_textures
 from baker.lights import emissive_texture
 from baker.lights.emissive import MOST_PARTS, build_emitters
 from baker.lights.emissive_texture import FEW_CROSSED, MOST_CROSSED, EmissiveTextures, cut
@@ -73,7 +73,7 @@ def test_many_quads_with_many_repeats(calls):
     ],
 )
 def test_one_quad_with_very_many_repeats(calls, repeats, size, wrap, nearest):
-    pack = pack_textures([(sparks(*size), wrap)], [nearest])
+    pack = pack_textures([PackImage(sparks(*size), wrap, nearest)])
 
     def power(scale, most):
         textures = EmissiveTextures(pack, np.zeros(2, int), np.ones((2, 3)), SQUARE * scale)

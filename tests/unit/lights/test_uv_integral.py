@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from inner import compiled
 
-from baker.kernels.textures import pack_textures, sample_texture
-from baker.lights.texture_levels import TextureLevels, row_sums
+from baker.kernels.textures import PackImage, pack_textures, sample_texture
+from baker.lights.texture_levels import TextureLevels, finest_level
 from baker.lights.uv_integral import uv_means
 
 (sample_texture,) = compiled(sample_texture)
@@ -25,13 +25,10 @@ def picture(size, seed=0, lit=0.5):
 
 def means(image, wrap, nearest, uv, weight=(1.0, 1.0, 1.0)):
     """Return what the kernel makes of triangles (n, 3, 2): means (n, 3), spread (n,)."""
-    pack = pack_textures([(image, wrap)], [nearest])
-    sums = row_sums(pack, 0, np.array(weight))
-    h, w = image.shape[:2]
+    pack = pack_textures([PackImage(image, wrap, nearest)])
+    pixels, w, h, sums = finest_level(pack, 0, np.array(weight))
     mean, spread = np.zeros((len(uv), 3)), np.zeros(len(uv))
-    uv_means(
-        np.asarray(uv, float), pack.pixels[: w * h], w, h, pack.wrap[0], sums.weight, sums.block, mean, spread
-    )
+    uv_means(np.asarray(uv, float), pixels, w, h, pack.wrap[0], sums.weight, sums.block, mean, spread)
     return mean, spread
 
 
@@ -123,7 +120,7 @@ def test_both_triangles_of_a_rectangle_share_its_texels(nearest):
 def test_uv_without_area():
     """All corners at one place give that texel, corners on a line the mean along it."""
     image = picture((5, 8), lit=1.0)
-    pack, out = pack_textures([(image, ("repeat", "clamp"))]), np.zeros(4)
+    pack, out = pack_textures([PackImage(image, ("repeat", "clamp"))]), np.zeros(4)
     place = np.array([0.37, 0.61])
     mean, spread = means(image, ("repeat", "clamp"), False, np.tile(place, (1, 3, 1)))
     sample_texture(pack, 0, *place, 0.0, out)
@@ -164,7 +161,7 @@ def test_a_hundred_repeats_cost_and_give_what_they_should():
 def test_a_smaller_texture_keeps_mean_and_mean_square(size):
     image = picture(size, lit=1.0)
     weight = np.array([1.0, 0.3, 0.7])
-    levels = TextureLevels(pack_textures([(image, ("repeat", "repeat"))], [True]), 0, weight)
+    levels = TextureLevels(pack_textures([PackImage(image, ("repeat", "repeat"), True)]), 0, weight)
     square = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
     truth = image[..., :3].astype(float).mean(axis=(0, 1))
     squares = (image[..., :3].astype(float) ** 2 @ weight).mean()
@@ -186,3 +183,14 @@ def test_a_smaller_texture_keeps_mean_and_mean_square(size):
         # E[f^2] of each half from its spread and its mean.
         found = ((1 + spread) * (mean**2 @ weight)).mean()
         assert found == pytest.approx(squares, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("size", "used"), [((2, 4096), (1, 2048)), ((3, 4096), (3, 4096)), ((2, 2048), (2, 2048))]
+)
+def test_large_emissive_images_are_averaged_where_no_texel_is_lost(size, used):
+    image = picture(size)
+    pack = pack_textures([PackImage(image, ("repeat", "repeat"))])
+    level = finest_level(pack, 0, np.ones(3))
+    assert (level.h, level.w) == used
+    assert level.pixels[:, :3].mean(axis=0) == pytest.approx(image[..., :3].mean(axis=(0, 1)), rel=1e-5)

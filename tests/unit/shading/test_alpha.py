@@ -14,7 +14,7 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.geometry import world_geometry
 from baker.core.scene import Texture
 from baker.kernels.alpha import CUTOFF, opacity_at
-from baker.kernels.textures import pack_textures, sample_alpha, sample_texture
+from baker.kernels.textures import PackImage, pack_textures, sample_alpha, sample_texture
 from baker.shading.alpha import hit_filter
 from baker.shading.materials import resolve_materials
 from baker.trace.embree import RayScene
@@ -65,12 +65,13 @@ def test_alpha_lookup_is_that_of_the_whole_texture():
         (np.float32(rng.random((5, 7, 4))), ("repeat", "mirror")),
         (np.float32(rng.random((1, 3, 4))), ("clamp", "repeat")),
         (np.float32(rng.random((4, 1, 4))), ("mirror", "clamp")),
+        (rng.integers(0, 256, (3, 8, 4)).astype(np.uint8), ("repeat", "repeat")),
     ]
-    pack, rgba = pack_textures(images), np.zeros(4)
-    for k in range(3):
+    pack, rgba = pack_textures([PackImage(*image) for image in images]), np.zeros(4)
+    for k in range(4):
         for u, v in rng.uniform(-3, 3, (200, 2)):
             sample_texture(pack, k, u, v, 0.0, rgba)
-            found = sample_alpha(pack.pixels, pack.level, pack.wrap, k, u, v)
+            found = sample_alpha(pack, k, u, v)
             assert found == pytest.approx(rgba[3], abs=1e-9)
 
 
