@@ -8,7 +8,7 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from baker.cli.command import Run, command
-from baker.core.settings_model import RunSettings
+from baker.core.settings import InspectSettings
 
 # Longest list shown item by item; the rest is counted (all of it with -v and with --json).
 SHOWN = 20
@@ -17,7 +17,7 @@ LONGEST = 24
 
 
 # No ray is traced here; the settings are taken so that scripts can pass the same flags to every command.
-@command("inspect", RunSettings)
+@command("inspect", InspectSettings)
 def inspect(
     ctx: typer.Context,
     path: Annotated[
@@ -29,7 +29,7 @@ def inspect(
     from baker.io.inspect import inspect_path
 
     run: Run = ctx.obj
-    found = inspect_path(path)
+    found = inspect_path(path, allow_outside=run.of(InspectSettings).allow_outside)
     if run.as_json:
         run.session.write_json(found)
     elif not run.quiet:

@@ -79,6 +79,9 @@ class BakeKeywords(TypedDict, total=False):
     # Metres per unit of files in formats that do not specify it.
     scale: float
 
+    # Also read files that the scene names outside its folder.
+    allow_outside: bool
+
     # Seed of all random numbers.
     seed: int
 
@@ -119,6 +122,7 @@ class AoKeywords(TypedDict, total=False):
     exclude: str | Sequence[str]
     up: Literal["y", "z"]
     scale: float
+    allow_outside: bool
     seed: int
     threads: int | None
     dtype: Literal["half", "float"]
@@ -237,6 +241,9 @@ class RenderKeywords(TypedDict, total=False):
     # Factor of the sky radiance.
     sky_strength: float
 
+    # Also read files that the scene names outside its folder.
+    allow_outside: bool
+
     # Seed of all random numbers.
     seed: int
 
@@ -259,6 +266,9 @@ class RepairKeywords(TypedDict, total=False):
 
     # Metres per unit of files in formats that do not specify it.
     scale: float
+
+    # Also read files that the scene names outside its folder.
+    allow_outside: bool
 
     # Number of threads; default: all cores.
     threads: int | None

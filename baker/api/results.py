@@ -209,6 +209,8 @@ def render(
             Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
         sky_strength : float, from 0, default 1.0
             Factor of the sky radiance.
+        allow_outside : bool, default False
+            Also read files that the scene names outside its folder.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None

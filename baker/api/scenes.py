@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @of_the_api
-def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
+def load(path: str | Path, *, up: str = "y", scale: float = 1.0, allow_outside: bool = False) -> Scene:
     """Read a scene file.
 
     Parameters
@@ -32,6 +32,9 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
         Up axis of formats other than glTF: "y" or "z".
     scale : float
         Metres per unit of formats other than glTF.
+    allow_outside : bool
+        Also read files that the scene names outside its folder, such as "../textures/wood.png". Without it,
+        such a name is an error.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0) -> Scene:
     """
     from baker.io.load import load_scene
 
-    return load_scene(path_of(path, "path", "a scene file"), up=up, scale=scale)
+    return load_scene(path_of(path, "path", "a scene file"), up=up, scale=scale, allow_outside=allow_outside)
 
 
 @of_the_api
@@ -160,6 +163,8 @@ def repair(
             Up axis of files in formats that do not specify it.
         scale : float, m, above 0, default 1.0
             Metres per unit of files in formats that do not specify it.
+        allow_outside : bool, default False
+            Also read files that the scene names outside its folder.
         threads : int | None, 1 to 1024, default None
             Number of threads; default: all cores.
 

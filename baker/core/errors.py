@@ -5,6 +5,8 @@ A message is one sentence that says what was found, in which file and object, an
 
 from __future__ import annotations
 
+from baker.core.printable import printable
+
 
 class BakerError(Exception):
     """Base class of all errors that baker raises on purpose.
@@ -23,10 +25,12 @@ class BakerError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
+        # Names of a file are in all three: one line, without control characters.
+        message = printable(message)
         super().__init__(message)
         self.message = message
-        self.file = file
-        self.object = object
+        self.file = None if file is None else printable(file)
+        self.object = None if object is None else printable(object)
 
     def __str__(self) -> str:
         """Return file, object and message in one line."""

@@ -228,6 +228,8 @@ class SourceDocument:
         Content of each buffer, read from the BIN chunk, a file or a data URI.
     folder : Path or None
         Folder that relative image URIs refer to.
+    allow_outside : bool
+        Image URIs may lead out of that folder.
     missing, missing_images : frozenset of int
         Indices of buffers and images that cannot be read and that the bake does not need.
     chunks : tuple of (int, bytes)
@@ -237,6 +239,7 @@ class SourceDocument:
     json: dict[str, Any]
     buffers: tuple[bytes, ...]
     folder: Path | None
+    allow_outside: bool = False
     missing: frozenset[int] = frozenset()
     missing_images: frozenset[int] = frozenset()
     chunks: tuple[tuple[int, bytes], ...] = ()

@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
-from baker.core.settings_model import Names, Numbers, Settings, Text, seed_setting, setting, threads_setting
+from baker.core.settings_model import (
+    Names,
+    Numbers,
+    RunSettings,
+    Settings,
+    Text,
+    same_setting,
+    seed_setting,
+    setting,
+    threads_setting,
+)
 
 # Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
@@ -71,6 +81,7 @@ class CommonSettings(Settings):
         gt=0,
         allow_inf_nan=False,
     )
+    allow_outside: bool = setting(False, "Also read files that the scene names outside its folder.")
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 
@@ -110,6 +121,12 @@ else:
 
     class BakeSettings(*reversed(encoding_options().values()), CommonSettings):
         """All settings of a bake: the common settings and the options of each encoding."""
+
+
+class InspectSettings(RunSettings):
+    """Holds the settings of `baker inspect`."""
+
+    allow_outside: bool = same_setting(BakeSettings, "allow_outside")
 
 
 def ao_metres(distance: str, diagonal: float) -> float:

@@ -18,13 +18,15 @@ from baker.io.bake.read_manifest import read_manifest
 from baker.io.png import decode_palette_png
 
 
-def inspect_path(path: Path | str) -> dict[str, Any]:
+def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, Any]:
     """Describe a scene file, an output folder (or its bake.json), or an image that baker can read.
 
     Parameters
     ----------
     path : Path or str
         A file or a folder.
+    allow_outside : bool
+        As of `load_scene`.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def inspect_path(path: Path | str) -> dict[str, Any]:
         return _image(path, encoding.decode(path))
     from baker.io.load import load_scene
 
-    return _scene(path, load_scene(path))
+    return _scene(path, load_scene(path, allow_outside=allow_outside))
 
 
 def _bake(folder: Path) -> dict[str, Any]:

@@ -18,6 +18,8 @@ from baker.core.registry import Registry
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.io.choose import choose_objects
+from baker.io.regular_file import read_regular
+from baker.io.scene_folder import SceneFolder
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,10 @@ class SceneFile:
     lenient : bool
         Do not raise for the defects that `load_scene` lists, and store all triangles of the file in
         `Scene.source_scene`.
+    allow_outside : bool
+        Files that the scene names may be outside its folder.
+    self_contained : bool
+        No file that the scene names is read.
     """
 
     path: Path
@@ -49,6 +55,13 @@ class SceneFile:
     scene_index: int | None = None
     reflections: bool = False
     lenient: bool = False
+    allow_outside: bool = False
+    self_contained: bool = False
+
+    @property
+    def folder(self) -> SceneFolder:
+        """Return the folder that names in the scene refer to."""
+        return SceneFolder(self.path.parent, self.allow_outside, self.self_contained)
 
 
 Importer = Callable[[SceneFile], Scene]
@@ -63,6 +76,8 @@ def load_scene(
     scene_index: int | None = None,
     reflections: bool = False,
     lenient: bool = False,
+    allow_outside: bool = False,
+    self_contained: bool = False,
 ) -> Scene:
     """Read a scene file, and convert it to metres, +Y up and linear Rec.709.
 
@@ -82,6 +97,10 @@ def load_scene(
         Used for checks of the file. Three defects raise no error: indices out of range, negative or far too
         strong lights, and a scene without a valid triangle. `Scene.source_scene` then contains the triangles
         of the file, including invalid ones.
+    allow_outside : bool
+        Also read files that the scene names outside its folder. Without it, such a name is an error.
+    self_contained : bool
+        Read no other file. Used for the `scene.glb` of a bake, which contains all the data that is needed.
 
     Returns
     -------
@@ -91,8 +110,8 @@ def load_scene(
     Raises
     ------
     InputError
-        If the file or a file that it refers to is missing, unreadable or malformed, if it requires an unknown
-        extension, or if it contains nothing to bake.
+        If the file or a file that it refers to is missing, unreadable, malformed or outside of its folder, if
+        it requires an unknown extension, or if it contains nothing to bake.
     SettingsError
         If `up` is neither "y" nor "z", or `scale` is not a positive number.
     ResourceError
@@ -110,7 +129,9 @@ def load_scene(
     if not data:
         raise InputError("the file is empty; export it again", file=str(path))
     with memory_errors(file=str(path)):
-        scene = importer(SceneFile(path, data, up, scale, scene_index, reflections, lenient))
+        scene = importer(
+            SceneFile(path, data, up, scale, scene_index, reflections, lenient, allow_outside, self_contained)
+        )
     if not lenient:
         check_brightness(scene)
     return scene
@@ -136,7 +157,7 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
     path : Path or str
         The scene file.
     settings : BakeSettings
-        `up`, `scale`, `include` and `exclude` are used.
+        `up`, `scale`, `allow_outside`, `include` and `exclude` are used.
     lenient : bool
         As in `load_scene`.
 
@@ -154,7 +175,13 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
     ResourceError
         As in `load_scene`.
     """
-    scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=lenient)
+    scene = load_scene(
+        path,
+        up=settings.up,
+        scale=settings.scale,
+        lenient=lenient,
+        allow_outside=settings.allow_outside,
+    )
     return choose_objects(scene, settings.include, settings.exclude)
 
 
@@ -174,10 +201,10 @@ def read_scene_file(path: Path) -> bytes:
     Raises
     ------
     InputError
-        If there is no such file or it cannot be read.
+        If there is no such file, it cannot be read, or it is not a regular file.
     """
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except FileNotFoundError:
         message = "the file does not exist; check its name and folder"
     except IsADirectoryError:

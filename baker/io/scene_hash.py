@@ -11,15 +11,18 @@ import hashlib
 from pathlib import Path
 
 from baker.io.load import load_scene, read_scene_file
+from baker.io.scene_folder import SceneFolder
 
 
-def scene_sha256(path: Path) -> str:
+def scene_sha256(path: Path, *, allow_outside: bool = False) -> str:
     """Return the hash of a scene file followed by the files that it refers to.
 
     Parameters
     ----------
     path : Path
         A file of any format that `load_scene` reads.
+    allow_outside : bool
+        As of `load_scene`.
 
     Returns
     -------
@@ -29,18 +32,19 @@ def scene_sha256(path: Path) -> str:
     Raises
     ------
     InputError
-        If the file or a file that it refers to is missing, unreadable or malformed.
+        If the file or a file that it refers to is missing, unreadable, malformed or outside of its folder.
     """
+    folder = SceneFolder(path.parent, allow_outside)
     suffix = path.suffix.lower()
     if suffix in (".glb", ".gltf"):
         from baker.io.gltf.document import open_document
 
-        return open_document(path, read_scene_file(path)).sha256
+        return open_document(path, read_scene_file(path), folder).sha256
     if suffix == ".obj":
         from baker.io.importers.obj import obj_sha256
 
-        return obj_sha256(path, read_scene_file(path))
+        return obj_sha256(path, read_scene_file(path), folder)
     if suffix in (".ply", ".stl", ".off"):
         return hashlib.sha256(read_scene_file(path)).hexdigest()
     # Load scenes of other formats completely, because only their importers can list the files that they use.
-    return load_scene(path).sha256
+    return load_scene(path, allow_outside=allow_outside).sha256

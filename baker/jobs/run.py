@@ -177,7 +177,7 @@ class _Run:
         if job.out is None:
             return Outcome(job, "failed", job.problem, code=3)
         try:
-            sha256 = scene_sha256(job.scene)
+            sha256 = scene_sha256(job.scene, allow_outside=job.settings.allow_outside)
             seen = check_output(job.out, sha256, job.settings)
             if self.options.force:
                 seen = replace(seen, fresh=False, why=f"forced ({seen.why})")

@@ -90,8 +90,10 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
             light[i, c] += value[c]
 
 
-def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
+def other_scene(bake: StoredBake, scene: Path, *, allow_outside: bool) -> list[SceneWarning]:
     """Return a list with a warning if a scene file differs from the file that was baked, else an empty list.
+
+    `allow_outside` is passed to `load_scene`.
 
     Raises
     ------
@@ -100,9 +102,11 @@ def other_scene(bake: StoredBake, scene: Path) -> list[SceneWarning]:
     """
     own = bake.folder / SCENE_NAME
     known = bake.manifest.get("input", {}).get("sha256")
-    if scene_sha256(scene) == known or (scene.exists() and scene.samefile(own)):
+    if scene.exists() and scene.samefile(own):
         return []
-    load_scene(scene)
+    if scene_sha256(scene, allow_outside=allow_outside) == known:
+        return []
+    load_scene(scene, allow_outside=allow_outside)
     message = f"'{scene}' is not what '{bake.folder}' was baked from; the picture shows the baked scene"
     return [SceneWarning("other-scene", message)]
 

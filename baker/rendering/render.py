@@ -147,10 +147,10 @@ def render(
         baked = BakedLight.read(settings.lightmap)
         warnings = [*baked.bake.warnings]
         if not isinstance(scene, Scene):
-            warnings += other_scene(baked.bake, Path(scene))
+            warnings += other_scene(baked.bake, Path(scene), allow_outside=settings.allow_outside)
         scene, sky = baked.bake.scene, baked.bake.sky if settings.sky is None else sky
     elif not isinstance(scene, Scene):
-        scene = load_scene(scene, reflections=True)
+        scene = load_scene(scene, reflections=True, allow_outside=settings.allow_outside)
     warnings += [*scene.warnings, *cache_warnings()]
     if text is not None and camera is None:
         camera = named_camera(scene.cameras, text)

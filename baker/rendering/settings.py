@@ -70,6 +70,7 @@ class RenderSettings(Settings):
         unit="cd/m2",
     )
     sky_strength: float = same_setting(BakeSettings, "sky_strength")
+    allow_outside: bool = same_setting(BakeSettings, "allow_outside")
     seed: int = same_setting(BakeSettings, "seed")
     threads: int | None = same_setting(BakeSettings, "threads")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -131,22 +132,24 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     settings = settings or RepairSettings()
     if settings.repair:
         require_meshlab()
-    scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True)
+    allowed = settings.allow_outside
+    read = partial(_read_glb, path, allow_outside=allowed)
+    scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True, allow_outside=allowed)
     data: bytes | None = None
     if scene.source is None:
         # Convert other formats to GLB, defective triangles included, and fix that.
         assert scene.source_scene is not None
         data = source_glb(scene, scene.source_scene)
-        scene = _read_glb(path, data)
+        scene = read(data)
     elif not _names_files(scene.source):
         written = path.read_bytes()
         data = written if written[:4] == b"glTF" else None
     result = _fix(scene, data, settings, progress, make_normals=not settings.repair)
     if settings.repair:
-        result = _repair(_read_glb(path, result.data), result, progress)
+        result = _repair(read(result.data), result, progress)
         # Repaired meshes may have duplicate vertices, and need normals or other lightmap uv.
-        result = _joined(result, _fix(_read_glb(path, result.data), result.data, settings, progress))
-    fixed = _read_glb(path, result.data)
+        result = _joined(result, _fix(read(result.data), result.data, settings, progress))
+    fixed = read(result.data)
     wrong = faces_to_flip(fixed)
     if wrong:
         result = _joined(result, _fix(fixed, result.data, settings, progress, inside_out=wrong))
@@ -235,8 +238,10 @@ def _names_files(source: SourceDocument) -> bool:
     return any("uri" in thing and not thing["uri"].startswith("data:") for thing in things)
 
 
-def _read_glb(path: Path, data: bytes) -> Scene:
-    return IMPORTERS.require(".glb", "importer")(SceneFile(path, data, lenient=True))
+def _read_glb(path: Path, data: bytes, *, allow_outside: bool) -> Scene:
+    return IMPORTERS.require(".glb", "importer")(
+        SceneFile(path, data, lenient=True, allow_outside=allow_outside)
+    )
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:

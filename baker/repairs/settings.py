@@ -24,4 +24,5 @@ class RepairSettings(Settings):
     )
     up: Literal["y", "z"] = same_setting(BakeSettings, "up")
     scale: float = same_setting(BakeSettings, "scale")
+    allow_outside: bool = same_setting(BakeSettings, "allow_outside")
     threads: int | None = same_setting(BakeSettings, "threads")

@@ -69,6 +69,7 @@ def bake_words(tmp_path, *more):
 
 # A value other than the default for every setting; a setting missing here fails the test below.
 OTHER = {
+    "allow_outside": (None, True),
     "channels": ("ao", ("ao",)),
     "resolution": ("256", 256),
     "density": ("32.5", 32.5),
@@ -102,9 +103,10 @@ OTHER = {
 def test_every_setting_has_a_flag_that_arrives(pipeline, command, tmp_path):
     assert set(OTHER) == set(BakeSettings.model_fields)
     words = []
-    for name, (text, _) in OTHER.items():
+    for name, (text, value) in OTHER.items():
         dashed = name.replace("_", "-")
-        words += [f"--no-{dashed}"] if text is None else [f"--{dashed}", text]
+        switch = f"--{dashed}" if value else f"--no-{dashed}"
+        words += [switch] if text is None else [f"--{dashed}", text]
     code, _ = command(*bake_words(tmp_path, *words, "-q"))
     assert code == 0
     settings = pipeline.calls[0].settings
@@ -268,7 +270,9 @@ def test_inspect_prints_text_and_json(monkeypatch, command):
         "lights": [],
         "warnings": [{"code": "odd", "message": "a sentence that is longer than any hash in a table"}],
     }
-    monkeypatch.setitem(sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path: found))
+    monkeypatch.setitem(
+        sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path, **_: found)
+    )
     code, out = command("inspect", "a.glb", "--threads", "1", "--seed", "2")
     assert code == 0
     assert "triangles: 32\n" in out
@@ -341,7 +345,7 @@ def test_help_is_quick_and_imports_nothing_heavy():
 def test_json_stdout_is_kept_clean_of_what_libraries_print():
     code = (
         "import os, sys, types\n"
-        "def look(path):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
+        "def look(path, **_):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
         "sys.modules['baker.io.inspect'] = types.SimpleNamespace(inspect_path=look)\n"
         "from baker.cli.app import main\nmain()\n"
     )

@@ -87,7 +87,7 @@ def read_bake(folder: Path | str) -> StoredBake:
         folder = folder.parent
     manifest = read_manifest(folder)
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
-    scene = load_scene(_present(folder, SCENE_NAME))
+    scene = load_scene(_present(folder, SCENE_NAME), self_contained=True)
     settings = manifest["settings"]
     scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}

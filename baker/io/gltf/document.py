@@ -18,6 +18,7 @@ from baker.core.scene import SceneWarning
 from baker.io.gltf.chunks import MAGIC, Chunks, split_glb
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.uri import UriError, is_data, read_uri
+from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
 
 UNDERSTOOD = frozenset(
     {
@@ -69,7 +70,7 @@ class GltfDocument:
         By index, the errors of buffers and image files that cannot be read.
     chunks : tuple of (int, bytes)
         Type and content of GLB chunks other than JSON and BIN.
-    folder : Path
+    folder : SceneFolder
         Folder that relative URIs refer to.
     sha256 : str
         SHA-256 of the bytes of the scene file, followed by its external buffers and its external images.
@@ -82,7 +83,7 @@ class GltfDocument:
     buffer_faults: dict[int, InputError]
     image_faults: dict[int, InputError]
     chunks: tuple[tuple[int, bytes], ...]
-    folder: Path
+    folder: SceneFolder
     sha256: str
     warnings: tuple[SceneWarning, ...]
 
@@ -113,15 +114,17 @@ class GltfDocument:
         return data, offset, length, view.integer("byteStride", 0)
 
 
-def open_document(path: Path, data: bytes) -> GltfDocument:
+def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) -> GltfDocument:
     """Parse a .glb or .gltf file and read every file that it refers to.
 
     Parameters
     ----------
     path : Path
-        The file; relative URIs refer to its folder.
+        The file.
     data : bytes
         The file's content.
+    folder : SceneFolder, optional
+        Folder that relative URIs refer to; default: that of the file, which URIs must not leave.
 
     Returns
     -------
@@ -131,9 +134,10 @@ def open_document(path: Path, data: bytes) -> GltfDocument:
     Raises
     ------
     InputError
-        For a broken container, malformed JSON, a version other than 2.x, or an unknown required extension.
+        For a broken container, malformed JSON, a version other than 2.x, an unknown required extension, or a
+        file outside of `folder`.
     """
-    file, folder = str(path), path.parent
+    file, folder = str(path), folder or SceneFolder(path.parent)
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
     root = JsonObject(_parse_json(chunks.json, file), "", file)
     _check_version(root)
@@ -155,6 +159,8 @@ def open_document(path: Path, data: bytes) -> GltfDocument:
         try:
             if "uri" in image:
                 images[i] = _read_file(image, folder, digest)
+        except OutsideError:
+            raise
         except InputError as error:
             image_faults[i] = error
     return GltfDocument(
@@ -213,7 +219,7 @@ def _check_extensions(root: JsonObject) -> list[SceneWarning]:
 
 
 def _read_buffer(
-    buffer: JsonObject, chunk: bytes | None, folder: Path, digest: hashlib._Hash
+    buffer: JsonObject, chunk: bytes | None, folder: SceneFolder, digest: hashlib._Hash
 ) -> tuple[bytes, InputError | None]:
     """Return the available bytes of a buffer, and the error if the buffer cannot be read completely."""
     data = b""
@@ -232,18 +238,22 @@ def _read_buffer(
             buffer.fail("the buffer has neither a uri nor a BIN chunk; export the file again")
         if len(data) < length:
             buffer.fail(f"the buffer is too short: byteLength is {length}, its data has {len(data)} bytes")
+    except OutsideError:
+        raise
     except InputError as error:
         return data, error
     return (data if len(data) == length else data[:length]), None
 
 
-def _read_file(holder: JsonObject, folder: Path, digest: hashlib._Hash) -> bytes:
+def _read_file(holder: JsonObject, folder: SceneFolder, digest: hashlib._Hash) -> bytes:
     """Return the bytes that `holder`'s "uri" refers to; if they come from a file, add them to `digest`."""
     uri = holder.string("uri")
     try:
         data = read_uri(uri, folder)
     except UriError as error:
         holder.fail(str(error), "uri")
+    except OutsideName as error:
+        raise OutsideError(str(error), file=holder.file, object=holder.path_of("uri")) from None
     if not is_data(uri):
         digest.update(data)
     return data

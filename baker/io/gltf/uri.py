@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import base64
 import binascii
-from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
+
+from baker.io.scene_folder import OutsideName, SceneFolder
 
 # Number of characters of a URI that a message shows.
 _LONGEST = 80
@@ -24,7 +25,7 @@ def is_data(uri: str) -> bool:
     return uri[:5].lower() == "data:"
 
 
-def read_uri(uri: str, folder: Path) -> bytes:
+def read_uri(uri: str, folder: SceneFolder) -> bytes:
     """Return the data of a URI.
 
     Parameters
@@ -32,7 +33,7 @@ def read_uri(uri: str, folder: Path) -> bytes:
     uri : str
         A data URI of any media type, or the relative name of a file. Names with bare percent signs or
         backslashes are accepted although they are no valid URIs.
-    folder : Path
+    folder : SceneFolder
         Folder that relative names refer to.
 
     Returns
@@ -44,20 +45,27 @@ def read_uri(uri: str, folder: Path) -> bytes:
     ------
     UriError
         If there is no such file, it cannot be read, or the data URI is malformed.
+    OutsideName
+        If the only file that the URI can refer to is outside of the scene's folder.
     """
     if is_data(uri):
         return _decode_data(uri)
     scheme, colon, _ = uri.partition("://")
     if colon and scheme.isalnum():
         raise UriError(f"'{uri[:_LONGEST]}' is not a file beside the scene; store it there")
+    outside: OutsideName | None = None
     for name in file_names(uri):
         try:
-            return (folder / name).read_bytes()
+            return folder.read(name)
         except FileNotFoundError:
             continue
+        except OutsideName as error:
+            outside = OutsideName(f"the file '{uri[:_LONGEST]}' {error}")
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise UriError(f"the file '{uri[:_LONGEST]}' cannot be read: {why}") from None
+    if outside is not None:
+        raise outside
     raise UriError(f"the file '{uri[:_LONGEST]}' is missing; put it beside the scene")
 
 

@@ -23,6 +23,7 @@ from baker.io.gltf.ao_materials import BakedUse, add_ao_textures, assign_materia
 from baker.io.gltf.build_document import new_document
 from baker.io.gltf.packer import Json, Packer, is_index, objects, primitive_accessors
 from baker.io.gltf.uri import UriError, is_data, read_uri
+from baker.io.scene_folder import OutsideName, SceneFolder
 
 _COMPRESSED_PRIMITIVE = "KHR_draco_mesh_compression"
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -272,13 +273,14 @@ def embed_images(packer: Packer, source: SourceDocument) -> None:
     InputError
         If an image file no longer exists.
     """
+    folder = SceneFolder(source.folder or Path(), source.allow_outside)
     for number, image in objects(packer.document, "images"):
         uri = image.get("uri")
         if number in source.missing_images or not isinstance(uri, str):
             continue
         try:
-            data = read_uri(uri, source.folder or Path())
-        except UriError as error:
+            data = read_uri(uri, folder)
+        except (UriError, OutsideName) as error:
             raise InputError(str(error), object=f"image {number}") from None
         if not is_data(uri):
             image.setdefault("name", Path(unquote(uri).replace("\\", "/")).stem)

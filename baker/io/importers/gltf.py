@@ -8,7 +8,6 @@ Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctua
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +71,7 @@ def import_gltf(source: SceneFile) -> Scene:
     InputError
         If the file is malformed, requires an unknown extension, or holds nothing to bake.
     """
-    document = open_document(source.path, source.data)
+    document = open_document(source.path, source.data, source.folder)
     warnings = list(document.warnings)
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
@@ -103,7 +102,8 @@ def import_gltf(source: SceneFile) -> Scene:
         source=SourceDocument(
             document.root.value,
             document.buffers,
-            Path(document.folder),
+            document.folder.path,
+            document.folder.allow_outside,
             missing=frozenset(document.buffer_faults),
             missing_images=frozenset(document.image_faults),
             chunks=document.chunks,

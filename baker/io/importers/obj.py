@@ -24,6 +24,7 @@ from baker.io.images import decode_image
 from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.mtl import read_mtl
 from baker.io.mesh.scene import scene_of_meshes, to_world
+from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
 
 # Albedo 0.8, not glTF's default of 1, because a white surface absorbs no light.
 GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
@@ -49,7 +50,7 @@ def import_obj(source: SceneFile) -> Scene:
     digest = hashlib.sha256(source.data)
     warnings: list[SceneWarning] = []
     text = _decode(source.data)
-    materials = _read_libraries(text, source.path, digest, warnings)
+    materials = _read_libraries(text, source.path, source.folder, digest, warnings)
     reader = _parse(text, materials, file)
     attributes = reader.GetAttrib()
     position = np.array(attributes.vertices, np.float64).reshape(-1, 3)
@@ -72,7 +73,7 @@ def import_obj(source: SceneFile) -> Scene:
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
 
 
-def obj_sha256(path: Path, data: bytes) -> str:
+def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
     """Compute the hash that `import_obj` stores in the scene, without parsing geometry or decoding images.
 
     Parameters
@@ -81,6 +82,8 @@ def obj_sha256(path: Path, data: bytes) -> str:
         The OBJ file.
     data : bytes
         Its content.
+    folder : SceneFolder
+        Folder that names in the file refer to.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def obj_sha256(path: Path, data: bytes) -> str:
     """
     digest = hashlib.sha256(data)
     nothing = np.zeros((1, 1, 4), np.uint8)
-    _read_libraries(_decode(data), path, digest, [], lambda content, **where: nothing)
+    _read_libraries(_decode(data), path, folder, digest, [], lambda content, **where: nothing)
     return digest.hexdigest()
 
 
@@ -108,14 +111,15 @@ def _decode(data: bytes) -> str:
 def _read_libraries(
     text: str,
     path: Path,
+    folder: SceneFolder,
     digest: hashlib._Hash,
     warnings: list[SceneWarning],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
     """Return the materials of all MTL files; add the bytes of the MTL files and images to `digest`."""
 
-    def read_file(file: Path) -> bytes:
-        data = file.read_bytes()
+    def read_file(name: str, base: Path) -> bytes:
+        data = folder.read(name, base=base)
         digest.update(data)
         return data
 
@@ -130,7 +134,10 @@ def _read_libraries(
         for name in names:
             file = path.parent / name.replace("\\", "/")
             try:
-                content = _decode(read_file(file))
+                content = _decode(read_file(name.replace("\\", "/"), path.parent))
+            except OutsideName as error:
+                message = f"the material library '{name}' {error}"
+                raise OutsideError(message, file=str(path), object="mtllib") from None
             except (OSError, ValueError):
                 message = f"the material library '{name}' is missing or unreadable; its surfaces are grey"
                 warnings.append(SceneWarning("missing-mtl", message, path.name))

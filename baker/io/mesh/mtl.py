@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.scene import Material, Texture
 from baker.io.images import decode_image
+from baker.io.scene_folder import OutsideError, OutsideName
 
 # Option of a map statement -> number of words after it that belong to the option.
 _OPTION_VALUES = {
@@ -40,7 +41,7 @@ def read_mtl(
     *,
     file: str,
     folder: Path,
-    read_file: Callable[[Path], bytes],
+    read_file: Callable[[str, Path], bytes],
     used: Container[str],
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
@@ -55,7 +56,8 @@ def read_mtl(
     folder : Path
         Folder that image names are relative to.
     read_file : callable
-        Returns the content of a file; raises OSError or ValueError if the file cannot be read.
+        Returns the content of a file, named relative to a folder; raises OSError, ValueError or OutsideName
+        if the file cannot be read.
     used : container of str
         Names of the materials that faces use. Errors in other materials are ignored.
     decode : callable
@@ -69,7 +71,8 @@ def read_mtl(
     Raises
     ------
     InputError
-        For a value that is not a number, or an image that is missing or cannot be decoded.
+        For a value that is not a number, or an image that is missing, cannot be decoded, or is outside of the
+        scene's folder.
     """
     images = _Images(file, folder, read_file, decode)
 
@@ -85,8 +88,8 @@ def read_mtl(
         name = " ".join(statements["name"])
         try:
             out.append(_material(statements, file, texture))
-        except InputError:
-            if name in used:
+        except InputError as error:
+            if name in used or isinstance(error, OutsideError):
                 raise
             out.append(Material(name=name))
     return out
@@ -113,7 +116,7 @@ class _Images:
         self,
         file: str,
         folder: Path,
-        read_file: Callable[[Path], bytes],
+        read_file: Callable[[str, Path], bytes],
         decode: Callable[..., NDArray[np.uint8]],
     ) -> None:
         self._file = file
@@ -124,12 +127,16 @@ class _Images:
 
     def find(self, material: str, words: list[str], names: list[str]) -> NDArray[np.uint8]:
         """Return the pixels of the first existing file of `names`; `words` is the map statement."""
+        outside: OutsideName | None = None
         for name in names:
             if name in self._pixels:
                 return self._pixels[name]
             try:
-                data = self._read_file(self._folder / name.replace("\\", "/"))
+                data = self._read_file(name.replace("\\", "/"), self._folder)
             except FileNotFoundError:
+                continue
+            except OutsideName as error:
+                outside = outside or error
                 continue
             except (OSError, ValueError) as error:
                 why = getattr(error, "strerror", None) or error
@@ -138,6 +145,9 @@ class _Images:
                 ) from None
             self._pixels[name] = self._decode(data, file=self._file, object=name)
             return self._pixels[name]
+        if outside is not None:
+            message = f"the image '{' '.join(words)}' {outside}"
+            raise OutsideError(message, file=self._file, object=material)
         message = f"the image '{' '.join(words)}' is missing; put it beside the scene"
         raise InputError(message, file=self._file, object=material)
 

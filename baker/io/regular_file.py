@@ -1,0 +1,68 @@
+"""Reads whole files, but no devices, pipes, sockets or Git LFS pointers."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+# The largest scene, buffer or image, bytes: the length in a GLB header has 32 bits.
+LARGEST = 1 << 32
+# The largest text of settings or jobs, bytes.
+LARGEST_TEXT = 1 << 24
+_LFS = b"version https://git-lfs.github.com/spec/"
+_KINDS = (
+    (stat.S_ISDIR, errno.EISDIR, "it is a folder"),
+    (stat.S_ISFIFO, errno.EINVAL, "it is a pipe (FIFO), not a regular file"),
+    (stat.S_ISSOCK, errno.EINVAL, "it is a socket, not a regular file"),
+    (stat.S_ISCHR, errno.EINVAL, "it is a device, not a regular file"),
+    (stat.S_ISBLK, errno.EINVAL, "it is a device, not a regular file"),
+)
+
+
+def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
+    """Return the content of a regular file.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file. A link to a regular file is read, too.
+    most : int
+        A longer file is refused before it is read, bytes.
+
+    Returns
+    -------
+    bytes
+        The content.
+
+    Raises
+    ------
+    OSError
+        If the file is missing, unreadable, not a regular file, longer than `most`, or a Git LFS pointer. Its
+        `strerror` is the reason in words.
+    ValueError
+        If no file can have this name, such as one with a NUL character.
+    """
+    # Look before opening: opening a pipe waits for a writer, and opening a device may have effects.
+    path = Path(path)
+    _check(path, path.stat().st_mode)
+    file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(file, "rb") as stream:
+        found = os.fstat(stream.fileno())
+        _check(path, found.st_mode)
+        if found.st_size > most:
+            why = f"it has {found.st_size} bytes; at most {most} are read"
+            raise OSError(errno.EFBIG, why, str(path))
+        # A file of /proc may hold more than its size says.
+        data = stream.read(most + 1) if found.st_size == 0 else stream.read(found.st_size)
+    if data.startswith(_LFS):
+        raise OSError(errno.EINVAL, "it is a Git LFS pointer; run `git lfs pull`", str(path))
+    return data
+
+
+def _check(path: Path, mode: int) -> None:
+    """Raise `OSError` for anything but a regular file."""
+    for is_kind, number, why in _KINDS:
+        if is_kind(mode):
+            raise OSError(number, why, str(path))
