@@ -1,4 +1,4 @@
-"""Connects to a dask.distributed cluster; no other file imports `distributed`.
+"""Connects to a dask.distributed cluster; no other file imports dask.distributed.
 
 The scheduler sends the data that tasks share to each worker once. If a worker is lost, its tasks are rerun on
 other workers.
@@ -93,7 +93,7 @@ class Cluster:
         return found
 
     def send(self, value: Any) -> Any:
-        """Send a value to all workers and return the handle that `submit` takes."""
+        """Send a value to all workers; return the handle to pass to `submit` in place of the value."""
         return self._client.scatter([value], broadcast=True, hash=False)[0]
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:

@@ -1,7 +1,7 @@
 """Writes and reads OpenEXR scanline images: half or float, ZIP or PIZ, channels R G B, Y, or named layers.
 
-Every engine and viewer reads ZIP and PIZ; PXR24, B44 and DWA are less widely read. Files carry no time stamp,
-so the same pixels give the same bytes.
+ZIP and PIZ are offered because engines and viewers read them more widely than PXR24, B44 and DWA. Files have
+no time stamp, so the same pixels give the same bytes.
 
 Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Standard Optional Attributes").
 """
@@ -146,7 +146,7 @@ def decode_exr(path: Path) -> DecodedImage:
 
 
 class ExrOptions(EncodingOptions):
-    """Number format and compression."""
+    """Options of EXR files: number format and compression."""
 
     dtype: Literal["half", "float"] = setting("half", "Number format of the EXR files.")
     exr_compression: Literal["zip", "piz"] = setting("zip", "Compression of the EXR files.")

@@ -1,8 +1,7 @@
-"""Writes and reads Radiance HDR: three 8-bit mantissas with a shared exponent, run-length coded, row 0 at the
-top.
+"""Radiance HDR files: 8-bit RGB mantissas with a shared exponent, run-length coded, row 0 at the top.
 
-`value = mantissa * 2^(exponent - 136)`, as current readers decode it; Ward's original code decodes `mantissa
-+ 0.5`. Mantissas are rounded to nearest, so decoding without the 0.5 has no bias.
+`value = mantissa * 2^(exponent - 136)`, as current readers decode it. Ward's original code adds 0.5 to the
+mantissa. Here mantissas are rounded to nearest, so decoding without the 0.5 has no bias.
 
 Based on: G. Ward, Real Pixels, Graphics Gems II, 1991; the Radiance picture file format.
 """
@@ -67,8 +66,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
         check_pixels(pixels, self.components, path.name)
         height, width = pixels.shape[:2]
         lines = [f"# {key}: {text}" for key, text in sorted(header.items())]
-        # PRIMARIES has CIE xy of the Rec.709 primaries and of D65 white. EXPOSURE 1 leaves the values
-        # unscaled.
+        # PRIMARIES: CIE xy of the Rec.709 primaries and of D65 white. EXPOSURE: factor of the values.
         about = ["#?RADIANCE", *lines, "FORMAT=32-bit_rle_rgbe", "EXPOSURE=1.0"]
         about += ["PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.3290"]
         head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"

@@ -2,7 +2,7 @@
 
 `value = top * (rgb * a)^GAMMA`, where rgb and a are the stored bytes / 255, without sRGB decoding. The alpha
 channel `a` is the largest of the three `(value / top)^(1 / GAMMA)`, rounded up, so that rgb never exceeds 1.
-`top` and GAMMA are in the file's text chunks.
+`top`, the value of `rgbm_range` in lx, and GAMMA are in the file's text chunks.
 
 Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, which also use a gamma of 2.2.
 """

@@ -69,7 +69,7 @@ def link_file(source: Path, target: Path) -> None:
 
 
 def place_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Put scene, irradiance pages and `lightmap.json` into `target`; return the content of the latter."""
+    """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
     description = describe(read_manifest(bake))
     link_file(bake / SCENE_NAME, target / SCENE_NAME)
     for page in description["pages"]:

@@ -162,7 +162,7 @@ def _kind(material: Material) -> Material:
 
 
 def _texel_colour(bake: StoredBake, scene: Scene) -> tuple[TexelBuffer, NDArray[np.float32]]:
-    """Return the texels of the front sides and their mean base colour, (n_front, 3) float32."""
+    """Return the texel buffer, and the mean base colour of front-side texels, (n_front, 3) float32."""
     geometry = world_geometry(scene, bake.atlas)
     shading = resolve_materials(scene, geometry)
     texels, _ = build_texels(
@@ -172,7 +172,7 @@ def _texel_colour(bake: StoredBake, scene: Scene) -> tuple[TexelBuffer, NDArray[
 
 
 def _with_materials(scene: Scene, materials: tuple[Material, ...]) -> Scene:
-    """Return the scene with other materials and without vertex colours, which belong to the base colour."""
+    """Return the scene with other materials and without vertex colours, which multiply base colours."""
     meshes = tuple(replace(mesh, colour=None) for mesh in scene.meshes)
     return replace(scene, materials=materials, meshes=meshes)
 

@@ -35,7 +35,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     data : bytes
         The content of an image file.
     file, object : str
-        The file and the image, for messages.
+        Names of the file and of the image in it, for messages.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def _rows(image: Image, top: int, end: int) -> NDArray[np.uint8]:
     """Return the rows from `top` to `end` of an image as RGBA."""
     strip = image.crop((0, top, image.width, end))
     if image.mode.startswith("I;16") or image.mode == "I":
-        # Scale 16-bit grey to 8 bits: (v + 128) // 257 rounds 65535 to 255. Pillow would clip it at 255.
+        # Scale 16-bit grey to 8 bits: (v + 128) // 257 is v / 257, rounded. Pillow would clip at 255 instead.
         level = np.clip((np.asarray(strip).astype(np.int64) + 128) // 257, 0, 255).astype(np.uint8)
         return np.stack([level, level, level, np.full_like(level, 255)], axis=-1)
     return np.array(strip.convert("RGBA"), np.uint8)

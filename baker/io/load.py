@@ -36,7 +36,7 @@ class SceneFile:
     scale : float
         Metres per unit of the file, for formats that do not define a unit.
     scene_index : int or None
-        Number of the glTF scene; None for the default scene of the file.
+        Index of the scene in a glTF file; None uses the default scene of the file.
     reflections : bool
         Also read metallic-roughness textures.
     lenient : bool
@@ -90,7 +90,7 @@ def load_scene(
     scale : float
         Metres per unit of files whose format does not define a unit. glTF is always in metres.
     scene_index : int or None
-        Number of the glTF scene; None for the default scene of the file.
+        Index of the scene in a glTF file; None uses the default scene of the file.
     reflections : bool
         Also read metallic-roughness textures, which bakes do not use.
     lenient : bool

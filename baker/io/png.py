@@ -22,7 +22,7 @@ def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str]
     Parameters
     ----------
     pixels : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) uint16
-        Grey, RGB or RGBA, row 0 on top.
+        Grey, RGB or RGBA, row 0 at the top.
     text : mapping of str to str, optional
         Text chunks.
 
@@ -49,7 +49,7 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
     Returns
     -------
     pixels : (H, W) or (H, W, C) uint8, or (H, W) uint16
-        Row 0 on top.
+        The stored values, row 0 at the top.
     text : dict of str to str
         Text chunks.
 
@@ -90,7 +90,7 @@ def encode_palette_png(
     """
     from PIL import Image
 
-    # Write all 256 palette entries: otherwise Pillow stores fewer than eight bits for each pixel.
+    # Write all 256 palette entries: otherwise Pillow may store fewer than eight bits for each pixel.
     palette = np.zeros((256, 3), np.uint8)
     for number, colour in colours.items():
         palette[number] = colour
@@ -129,7 +129,7 @@ def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     Returns
     -------
     array of uint8, same shape
-        0 to 255.
+        sRGB-encoded values, 0 to 255, rounded.
     """
     clipped = np.clip(linear.astype(np.float64), 0.0, 1.0)
     encoded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)

@@ -1,5 +1,4 @@
-"""Computes the hash of a scene file and of all files that it refers to, for most formats without decoding
-them.
+"""Computes the hash of a scene file and the files that it refers to, if possible without loading the scene.
 
 The hash equals `Scene.sha256`. A batch compares it with the manifest to find out whether a bake is up to
 date.

@@ -271,7 +271,7 @@ class _Run:
         _release(ticket)
 
     def report_all(self, *, blocked: bool) -> None:
-        """Report the progress of all jobs as one stage; `blocked`: all jobs wait for locks of other runs."""
+        """Report the progress of all jobs as one stage; `blocked` if all of them wait for other runs."""
         n = len(self.jobs)
         names = [f"{t.job.scene.stem}: {t.stage} {t.fraction:.0%}" for t in self.running.values()]
         if blocked:

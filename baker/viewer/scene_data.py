@@ -1,5 +1,4 @@
-"""Builds the data of the viewer page: one JSON object, and arrays that the browser uploads to the GPU
-unchanged.
+"""Builds the data of the viewer page: a JSON object, and arrays that the browser uploads to the GPU.
 
 World-space triangles are sorted by page and material, so that the browser needs one draw call for each pair
 of page and material.

@@ -1,4 +1,4 @@
-"""Atomic replacement of an output folder: it holds either the old bake or the new one.
+"""Replaces an output folder as a whole: after an error it contains the complete old bake.
 
 All files are first written to a temporary folder beside the output folder. At the end, the temporary folder
 is renamed to the name of the output folder. Renames are recorded in a journal and undone after an error. If

@@ -1,6 +1,6 @@
 """Reads a finished output folder: scene, lightmap uv, maps, status, manifest.
 
-Verification, comparison and the viewer use it, so they work on the files and not on arrays in memory.
+Verification, comparison and the viewer use `read_bake`, so they work on files and not on arrays in memory.
 """
 
 from __future__ import annotations

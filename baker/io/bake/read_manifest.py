@@ -1,7 +1,7 @@
 """Reads `bake.json` of an output folder and validates it.
 
-The numbers in a manifest are used as array sizes and indices, and its names as paths. Therefore it is first
-validated against the schema and checked for contradictions.
+The numbers in a manifest are used as array sizes and indices, and its names as paths. Therefore a manifest is
+first validated against the schema and checked for contradictions.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""glTF 2.0: documents, accessors, materials and meshes read; GLB files written."""
+"""Reads glTF 2.0 documents, accessors, materials and meshes; writes GLB files."""

@@ -67,7 +67,7 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
     Returns
     -------
     bool
-        Includes the materials of variants.
+        True if so, also for a material of KHR_materials_variants.
     """
     for holder in material_holders(primitive):
         if _names_material(document, holder.get("material")):
@@ -90,7 +90,7 @@ def reads_texture(document: Json, primitive: Json) -> bool:
     Returns
     -------
     bool
-        Includes the materials of variants.
+        True if so, also for a material of KHR_materials_variants.
     """
     return any(
         next(_texture_infos(document["materials"][holder["material"]], occlusion=True), None) is not None

@@ -40,7 +40,7 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     Returns
     -------
     packer : Packer
-        The document.
+        The document with its data.
     uses : list of BakedUse
         The document's primitives, which all have lightmap uv.
     instance_mesh : list of int
@@ -91,7 +91,7 @@ def _mirrors(instance: Instance) -> bool:
 
 
 def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
-    """Return the node of an instance and its mesh; a sheared mesh is in world space."""
+    """Return an instance's node and mesh; if the node would need shear, the mesh is moved to world space."""
     matrix = np.asarray(instance.world_from_object, np.float64)
     if np.array_equal(matrix, np.eye(4)):
         return {"name": instance.name}, mesh

@@ -30,7 +30,7 @@ def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[Sc
     Returns
     -------
     list of Camera
-        In world space.
+        The cameras in world space.
     """
     cameras = []
     for node in placed:

@@ -21,7 +21,7 @@ class Chunks(NamedTuple):
     ----------
     json : bytes
     binary : bytes or None
-        The first BIN chunk.
+        The first BIN chunk; None if there is none.
     others : tuple of (int, bytes)
         Type and content of the chunks that glTF 2.0 does not define.
     """

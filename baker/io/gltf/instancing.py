@@ -63,7 +63,7 @@ def refuse_broken(document: GltfDocument, node: JsonObject) -> None:
     document : GltfDocument
         The document after `spread_instances`.
     node : JsonObject
-        A node.
+        A node of the document.
     """
     if "mesh" in node and node.extension(INSTANCING) is not None:
         _members(document, node)
@@ -98,7 +98,7 @@ def _count(document: GltfDocument, attributes: JsonObject) -> int:
 
 
 def _spread(document: GltfDocument, node: JsonObject, index: int) -> None:
-    """Append a node for each instance of a node."""
+    """Replace the extension of one node by child nodes, one for each instance."""
     members = _members(document, node)
     value, nodes = node.value, document.root.value["nodes"]
     name = node.string("name", f"node_{index}")

@@ -92,7 +92,7 @@ class JsonObject:
         return tuple(self._number(v, f"{key}[{i}]") for i, v in enumerate(value))
 
     def indices(self, key: str, count: int, what: str) -> list[int]:
-        """Return a list of indices below `count` (empty if absent); `what` is the plural noun."""
+        """Return a list of indices below `count`, empty if absent; for `what` see `index`."""
         value = self.value.get(key, [])
         if not isinstance(value, list):
             self.fail(f"expected a list of integers, found {_show(value)}", key)

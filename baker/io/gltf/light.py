@@ -33,9 +33,9 @@ def read_light(
     Parameters
     ----------
     light : JsonObject
-        The light of the extension.
+        An entry of the extension's list of lights.
     node : Placed
-        The node that refers to it.
+        The node that refers to the light.
     warnings : list of SceneWarning
         A warning is added for a light that is left out.
     lenient : bool

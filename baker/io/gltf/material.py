@@ -1,7 +1,7 @@
 """Reads glTF materials: base colour, emission, metallic and roughness, sidedness, alpha, and textures.
 
-A texture is read at `T R S uv` (KHR_texture_transform). The emitted radiance is `emissiveFactor x texture x
-emissiveStrength`, cd/m2.
+A texture is read at `T R S uv` (KHR_texture_transform).
+The emitted radiance is `emissiveFactor x texture x emissiveStrength`, cd/m2.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9; KHR_texture_transform; KHR_materials_unlit.
 """
@@ -61,7 +61,7 @@ class MaterialReader:
         self.reported: set[int] = set()
 
     def need(self, number: int) -> Material:
-        """Return a material; the number of materials in the file stands for glTF's default material.
+        """Return a material by its index; the index after the last one returns glTF's default material.
 
         Raises
         ------
@@ -181,8 +181,8 @@ def texture_transform(
 
     Notes
     -----
-    The text of the extension, its example of a rotated quadrant and its test model agree on u' = u cos + v
-    sin, v' = -u sin + v cos. The GLSL code in its text, read as column-major, rotates the other way.
+    The text of the extension, its example of a rotated quadrant and its test model agree on
+    u' = u cos + v sin, v' = -u sin + v cos. Its GLSL code, read as column-major, rotates the other way.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     return np.array(

@@ -34,7 +34,7 @@ def read_primitives(
     mesh : JsonObject
         The mesh.
     name : str
-        Its name, for warnings.
+        Name of the mesh, for warnings.
     materials : MaterialReader
         Reads the materials of the primitives.
     lenient : bool
@@ -43,7 +43,7 @@ def read_primitives(
     Returns
     -------
     primitives : list of SourcePrimitive
-        In the file's order.
+        The triangle primitives, in the file's order.
     warnings : list of SceneWarning
         Warnings about the mesh.
 

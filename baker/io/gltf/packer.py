@@ -1,7 +1,7 @@
 """Packs a glTF document and all its data into one GLB file.
 
-Accessors and buffer views keep their indices, because unknown extensions may refer to them. New accessors and
-views first reuse the list entries of replaced data, then they are appended.
+Accessors and buffer views keep their indices, because unknown extensions may refer to them. A new accessor or
+view takes the list entry of replaced data if one is free; otherwise it is appended.
 
 Based on: Khronos Group, glTF 2.0 specification, 3.6 Binary Data Storage and 4 GLB File Format.
 """
@@ -312,8 +312,7 @@ def _numbers(node: Any, collect: bool) -> Iterator[int]:
 def _merge(
     views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
 ) -> tuple[list[bytes], int]:
-    """Concatenate all buffers without the bytes that only free views cover; return the chunks and their
-    length.
+    """Concatenate all buffers without the bytes that only free views cover; return chunks and length.
 
     The views are changed in place: `buffer` becomes 0 and `byteOffset` is updated. Missing buffers get the
     indices 1, 2, ..., which are written to their views.

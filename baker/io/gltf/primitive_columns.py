@@ -34,8 +34,8 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     Returns
     -------
     dict of str to (V, B) uint8
-        Attribute name to the bytes of its V elements. In float attributes of glTF itself (no leading `_`), -0
-        is replaced by 0. An attribute with fewer elements than POSITION is left out.
+        Attribute name to the bytes of its V elements. In float attributes, except application-specific ones
+        (`_NAME`), -0 is replaced by 0. An attribute with fewer elements than POSITION is left out.
 
     Raises
     ------

@@ -67,7 +67,7 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
     material : JsonObject
         The material.
     name : str
-        Its name, for the warning.
+        Name of the material, for the warning.
     warnings : list of SceneWarning
         A warning is added if the reflection model is unknown.
 

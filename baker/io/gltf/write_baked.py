@@ -83,7 +83,7 @@ def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None)
     scene : Scene
         If it has a `source`, that document is extended; otherwise a new document is built.
     atlas : Atlas
-        One layout for each instance, in order.
+        Lightmap uv: one layout for each instance, in the order of `scene.instances`.
     ao_png : dict of int to bytes, or None
         AO pages as PNG files by page number; they become occlusion textures on TEXCOORD_1.
 

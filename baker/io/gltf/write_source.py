@@ -16,7 +16,7 @@ from baker.io.gltf.packer import Json, Packer
 
 
 def source_glb(scene: Scene, source: SourceScene) -> bytes:
-    """Return a GLB of every mesh with triangles, without lightmap uv.
+    """Return a GLB with all meshes that have triangles, without lightmap uv.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def source_glb(scene: Scene, source: SourceScene) -> bytes:
     Raises
     ------
     InputError
-        If there is no triangle.
+        If no mesh has a triangle.
     """
     document: Json = {"asset": {"version": "2.0", "generator": "baker"}}
     packer = Packer(document)

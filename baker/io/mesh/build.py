@@ -27,7 +27,7 @@ def build_mesh(
     primitives : sequence of SourcePrimitive
         The primitives of the file.
     materials : sequence of Material
-        Materials of the scene. Whether they are double-sided and which TEXCOORD sets they read is used.
+        Materials of the scene; `double_sided` and the TEXCOORD sets of their textures are used.
 
     Returns
     -------

@@ -66,7 +66,7 @@ def read_mtl(
     Returns
     -------
     list of Material
-        In the library's order.
+        The materials, in the library's order.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def _parse(text: str) -> list[dict[str, list[str]]]:
 
 
 class _Images:
-    """The images of a library, each read once."""
+    """Reads the images of a library, each image once."""
 
     def __init__(
         self,

@@ -25,7 +25,7 @@ def load(folder, exposure=1.0):
     copies, lit = {}, []
     for item in sorted(set(bpy.data.objects) - before, key=lambda item: item.name):
         if item.type == "LIGHT":
-            # The pages contain its light.
+            # The pages contain the contribution of this light.
             item.hide_render = item.hide_viewport = True
         entry = by_node.get(item.get("baker_node")) or by_name.get(item.name)
         if item.type != "MESH" or entry is None:
