@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 # Largest width and height of an image that is read, texels.
 _LARGEST = 16384
-# Rows that are converted at a time; even.
+# Number of image rows that are converted at a time; even, so that a 2 x 2 block lies in one strip.
 _STRIP = 32
 
 
 def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     """Return an image's pixels as they are stored: sRGB-encoded colour, linear alpha, row 0 at the top.
 
-    Blocks of 2 x 2 texels of an image with more than 8192 texels a side are averaged in linear light; an odd
-    last row or column is left out.
+    If the width or height exceeds 8192 texels, the image is halved: each block of 2 x 2 texels is averaged in
+    linear light. An odd last row or column is dropped.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
 
 
 def _to_rgba(image: Image) -> NDArray[np.uint8]:
-    """Convert an image in strips of rows, so that it is in memory twice at most."""
+    """Convert an image to RGBA in strips of rows, so that memory holds at most two copies of it."""
     width, height = image.size
     step = 2 if max(width, height) > LARGEST_IMAGE_SIDE and min(width, height) > 1 else 1
     pixels = np.empty((height // step, width // step, 4), np.uint8)
@@ -92,7 +92,7 @@ def _rows(image: Image, top: int, end: int) -> NDArray[np.uint8]:
 
 
 def _halved(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Average blocks of 2 x 2 texels: RGB in linear light, alpha as stored."""
+    """Average blocks of 2 x 2 texels: RGB in linear light, alpha without conversion."""
     linear = np.concatenate([linear_from_srgb(np.arange(256) / 255.0)[rows[..., :3]], rows[..., 3:]], axis=-1)
     wide = linear[:, : linear.shape[1] // 2 * 2]
     mean = (wide[::2, ::2] + wide[1::2, ::2] + wide[::2, 1::2] + wide[1::2, 1::2]) * np.float32(0.25)
