@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from baker.io.bake.lock import OutputLock
-from baker.io.bake.output_folder import remove_leftovers
-from baker.io.temporary import temporaries
+from baker.io.bake.recovery import recover
 
 
 def survey(out: str) -> bytes:
@@ -21,15 +19,11 @@ def survey(out: str) -> bytes:
     Returns
     -------
     bytes
-        One line: the output, temporary folders of other runs, parents that do not exist yet.
+        One line: the output, and its parents that do not exist yet.
     """
     target = Path(out).resolve()
     missing = [str(parent) for parent in target.parents if not parent.exists()]
-    note = {
-        "out": str(target),
-        "theirs": [str(found.path) for found in temporaries(target)],
-        "missing": missing,
-    }
+    note = {"out": str(target), "missing": missing}
     return json.dumps(note).encode() + b"\n"
 
 
@@ -43,10 +37,7 @@ def restore(note: bytes) -> None:
     """
     before = json.loads(note)
     target = Path(before["out"])
-    remove_leftovers(target, [left for left in temporaries(target) if str(left.path) not in before["theirs"]])
-    lock = OutputLock(target)
-    if lock.path.exists() and lock.acquire():
-        lock.release()
+    recover(target)
     for parent in map(Path, before["missing"]):
         try:
             parent.rmdir()

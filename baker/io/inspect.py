@@ -15,6 +15,7 @@ from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
 from baker.io.bake.output_folder import MANIFEST_NAME, file_state
 from baker.io.bake.read_manifest import read_manifest
+from baker.io.bake.recovery import recover
 from baker.io.png import decode_palette_png
 
 
@@ -40,10 +41,11 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
         If `path` does not exist, or is neither a scene nor a bake nor an image.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError("there is no such file or folder", file=str(path))
     if path.name == MANIFEST_NAME:
         path = path.parent
+    recover(path)
+    if not path.exists():
+        raise InputError("there is no such file or folder", file=str(path))
     if path.is_dir():
         return _bake(path)
     if path.suffix.lower() == ".png" and (found := _status(path)) is not None:

@@ -1,8 +1,9 @@
 """Creates and finds the temporary folders that output is written to before it is moved to its final path.
 
-The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or, if `out` is
-a folder that cannot be moved, `.baker-{process}-{random hex digits}` inside it. The old files that the output
-replaces are kept in a folder of the same name with the suffix `-old` until the new files are in place.
+The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or
+`.baker-{process}-{random hex digits}` in it where `out` is a folder that cannot be moved. Its process holds a
+lock on it. A folder without that lock was left by a process that was killed, even if another process has got
+the same number since. On file systems without locks the number of the process decides.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baker.core.errors import ResourceError
+from baker.io.file_lock import is_alive, is_at, try_lock
 
-_NAME = re.compile(r"\.baker-(\d+)-[0-9a-f]+(-old)?")
+_NAME = re.compile(r"\.baker-(\d+)-[0-9a-f]+")
 
 
 @dataclass(frozen=True)
@@ -30,24 +32,71 @@ class Temporary:
     path : Path
     process : int
         Id of the process that created it.
-    old : bool
-        Whether it contains the old files that the output replaces.
     """
 
     path: Path
     process: int
-    old: bool
+
+
+class TemporaryFolder:
+    """A temporary folder of this process, locked from its creation to its removal.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder or file; an absolute path.
+    inside : bool
+        Create it in `out` instead of beside it.
+
+    Attributes
+    ----------
+    path : Path
+    """
+
+    def __init__(self, out: Path, *, inside: bool = False) -> None:
+        self._out, self._inside = out, inside
+        self._lock: int | None = None
+        self.path = temporary_path(out, inside=inside)
+
+    def create(self) -> None:
+        """Create the folder.
+
+        Raises
+        ------
+        OSError
+            If it cannot be created.
+        """
+        while True:
+            self.path.mkdir()
+            try:
+                self._lock = os.open(self.path, os.O_RDONLY)
+                if try_lock(self._lock) and is_at(self._lock, self.path):
+                    return
+            except FileNotFoundError:
+                # Another process has removed it, since it was not locked yet.
+                pass
+            except OSError:
+                # No locks for folders: others look at the number of the process.
+                return
+            self.leave()
+            self.path = temporary_path(self._out, inside=self._inside)
+
+    def remove(self) -> None:
+        """Remove the folder and all that is in it; may be called more than once."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        self.leave()
+
+    def leave(self) -> None:
+        """Release the lock and leave the folder to `recover` of any later command."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
 
 def temporary_path(out: Path, *, inside: bool = False) -> Path:
     """Return an unused path for a temporary folder beside `out` (absolute) or, if `inside`, in `out`."""
     suffix = f".baker-{os.getpid()}-{secrets.token_hex(4)}"
     return out / suffix if inside else out.with_name(f".{out.name}{suffix}")
-
-
-def old_path(temporary: Path) -> Path:
-    """Return the folder for the old files that the files in `temporary` replace."""
-    return temporary.with_name(temporary.name + "-old")
 
 
 def temporaries(out: Path) -> list[Temporary]:
@@ -66,14 +115,42 @@ def temporaries(out: Path) -> list[Temporary]:
     target = out.resolve()
     found = []
     for home, prefix in ((target.parent, f".{target.name}"), (target, "")):
-        with contextlib.suppress(OSError):
-            for path in sorted(home.iterdir()):
-                match = (
-                    _NAME.fullmatch(path.name.removeprefix(prefix)) if path.name.startswith(prefix) else None
-                )
-                if match:
-                    found.append(Temporary(path, int(match.group(1)), match.group(2) is not None))
+        with contextlib.suppress(OSError), os.scandir(home) as entries:
+            for entry in sorted(entries, key=lambda e: e.name):
+                name = entry.name
+                match = _NAME.fullmatch(name.removeprefix(prefix)) if name.startswith(prefix) else None
+                if match and entry.is_dir(follow_symlinks=False):
+                    found.append(Temporary(home / name, int(match.group(1))))
     return found
+
+
+@contextlib.contextmanager
+def claim(found: Temporary) -> Iterator[bool]:
+    """Lock a temporary folder that its process has left.
+
+    Parameters
+    ----------
+    found : Temporary
+        Any temporary folder.
+
+    Yields
+    ------
+    bool
+        True if the process has ended; the folder is locked within the `with` block.
+    """
+    try:
+        file = os.open(found.path, os.O_RDONLY)
+    except OSError:
+        yield found.path.exists() and not is_alive(found.process)
+        return
+    try:
+        try:
+            free = try_lock(file)
+        except OSError:
+            free = not is_alive(found.process)
+        yield free and is_at(file, found.path)
+    finally:
+        os.close(file)
 
 
 @contextlib.contextmanager
@@ -104,19 +181,28 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
             # Write directly to a device or a pipe instead of replacing it by a file.
             yield target
             return
-        folder = temporary_path(target)
+        _remove_abandoned(target)
+        folder = TemporaryFolder(target)
         target.parent.mkdir(parents=True, exist_ok=True)
-        folder.mkdir()
         try:
-            yield folder / path.name
-            (folder / path.name).replace(target)
+            folder.create()
+            yield folder.path / path.name
+            (folder.path / path.name).replace(target)
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            folder.remove()
     except OSError as error:
         raise ResourceError(f"the {what} cannot be written ({error.strerror})", file=str(path)) from None
     except ResourceError as error:
         # Name the final path in the message, because the temporary file that the error names is removed.
         raise ResourceError(error.message, file=str(path)) from error
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove what killed processes left of a file."""
+    for found in temporaries(target):
+        with claim(found) as free:
+            if free:
+                shutil.rmtree(found.path, ignore_errors=True)
 
 
 def write_atomically(path: Path, data: bytes, what: str) -> None:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from baker.core.child_process import start_module
-from baker.io.bake.output_folder import remove_leftovers
-from baker.io.temporary import temporaries
+from baker.io.bake.recovery import recover
 from baker.jobs.jobs_file import Job
 
 
@@ -142,8 +141,7 @@ class _Worker:
                 with contextlib.suppress(OSError):
                     pipe.close()
         if job is not None and job.out is not None:
-            left = [found for found in temporaries(job.out) if found.process == self.process.pid]
-            remove_leftovers(job.out, left)
+            recover(job.out)
 
 
 def _death(status: int) -> dict[str, Any]:

@@ -14,7 +14,8 @@ from baker.core.errors import BakerError, ResourceError
 from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
-from baker.io.bake.lock import OutputLock, dead_writers, sweep
+from baker.io.bake.lock import OutputLock
+from baker.io.bake.recovery import abandoned, recover
 from baker.io.scene_hash import scene_sha256
 from baker.jobs.executor import Event, JobExecutor
 from baker.jobs.jobs_file import Job
@@ -181,7 +182,7 @@ class _Run:
             seen = check_output(job.out, sha256, job.settings)
             if self.options.force:
                 seen = replace(seen, fresh=False, why=f"forced ({seen.why})")
-            elif seen.fresh and not dead_writers(job.out):
+            elif seen.fresh and not abandoned(job.out):
                 return Outcome(job, "unchanged", seen.why, time.perf_counter() - start)
             return _Ticket(number, job, sha256, seen, self.peak(job))
         except (BakerError, OSError, MemoryError) as error:
@@ -223,7 +224,7 @@ class _Run:
                 return
             ticket.lock = lock
             self.waiting.remove(ticket)
-            sweep(job.out)
+            recover(job.out)
             if not self.options.force:
                 seen = check_output(job.out, ticket.sha256, job.settings)
                 # Another run may have baked the job in the meantime.

@@ -18,8 +18,13 @@ def bake(scene, *, out, settings, progress, force):
     temporary = out.with_name(f".{out.name}.baker-{os.getpid()}-0123abcd")
     temporary.mkdir(parents=True)
     (temporary / "half.exr").write_bytes(b"half")
-    if HOW == "swapped" and out.exists():
-        out.rename(temporary.with_name(temporary.name + "-old"))
+    if HOW == "exchanging":
+        # As an exchange of files leaves it between the old manifest and the new one.
+        for part in ("new", "old"):
+            (temporary / part).mkdir()
+        (temporary / "new" / "bake.json").write_text("new")
+        (temporary / "journal.json").write_text('{"old": ["bake.json"], "new": ["bake.json"], "folders": []}')
+        (out / "bake.json").rename(temporary / "old" / "bake.json")
     try:
         HOWS[HOW](progress, out)
     finally:
@@ -71,7 +76,7 @@ def killed(progress, out):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-HOWS = {f.__name__: f for f in (polite, deaf, threads, helper, crash, killed)} | {"swapped": deaf}
+HOWS = {f.__name__: f for f in (polite, deaf, threads, helper, crash, killed)} | {"exchanging": deaf}
 
 if __name__ == "__main__":
     HOW = sys.argv.pop(1)

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from baker.io.temporary import TemporaryFolder
+
 FAKE = Path(__file__).with_name("fake_baker.py")
 ASSETS = Path(__file__).parents[2] / "assets"
 # What is promised; the grace period and the end of the process lie well inside.
@@ -70,24 +72,25 @@ def test_stop_is_quick_and_clean(how, number, tmp_path):
 
 
 def test_hard_end_leaves_folders_of_others_and_removes_parents_it_made(tmp_path):
-    other = tmp_path / ".out.baker-1-ffff0000"
-    other.mkdir()
+    other = TemporaryFolder(tmp_path / "out")
+    other.create()
     process = subprocess.Popen(
         [sys.executable, str(FAKE), "deaf", "bake", "s.glb", "-o", "out"], cwd=tmp_path
     )
     _wait_for(tmp_path / "ready", process)
     process.send_signal(signal.SIGINT)
     assert process.wait(10) == 130
-    assert sorted(path.name for path in tmp_path.iterdir()) == [other.name, "ready"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [other.path.name, "ready"]
+    other.remove()
 
 
-def test_hard_end_between_the_two_renames_brings_the_old_bake_back(tmp_path):
+def test_hard_end_between_two_renames_brings_the_old_bake_back(tmp_path):
     old = tmp_path / "deep" / "out"
     old.mkdir(parents=True)
     (old / "bake.json").write_text("old")
-    process = _start("swapped", tmp_path)
+    process = _start("exchanging", tmp_path)
     _wait_for(tmp_path / "deep" / "ready", process)
-    assert not old.exists()
+    assert not (old / "bake.json").exists()
     process.send_signal(signal.SIGINT)
     assert process.wait(10) == 130
     assert (old / "bake.json").read_text() == "old"

@@ -1,8 +1,7 @@
 """A lock that prevents two runs from baking into one output folder at the same time.
 
 The lock is an operating-system lock on the file `.<folder>.baker.lock` beside the output folder. The
-operating system releases it when the process that holds it ends, even after a crash. `sweep` removes the
-incomplete output of killed runs.
+operating system releases it when the process that holds it ends, even after a crash.
 """
 
 from __future__ import annotations
@@ -13,8 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from baker.core.errors import ResourceError
-from baker.io.bake.output_folder import remove_leftovers
-from baker.io.temporary import temporaries
+from baker.io.file_lock import is_at, try_lock
 
 
 class OutputLock:
@@ -48,11 +46,15 @@ class OutputLock:
         try:
             file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
         except FileNotFoundError:
-            return False  # another run has just removed an empty parent folder
-        if _lock(file) and _is_at(file, self.path):
-            self._file = file
-            return True
-        # Another run holds the lock, or it deleted the lock file between `os.open` and `_lock`.
+            return False  # the other run has just removed an empty parent
+        try:
+            if try_lock(file) and is_at(file, self.path):
+                self._file = file
+                return True
+        except OSError:
+            os.close(file)
+            raise
+        # Another run holds it, or removed the file after it was opened and before it was locked here.
         os.close(file)
         return False
 
@@ -107,70 +109,3 @@ def held(out: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def sweep(out: Path) -> None:
-    """Restore the old files after killed runs and remove their temporary folders; the caller holds the lock.
-
-    Parameters
-    ----------
-    out : Path
-        The output folder.
-    """
-    dead = dead_writers(out)
-    remove_leftovers(out, [found for found in temporaries(out) if found.process in dead])
-
-
-def dead_writers(out: Path) -> set[int]:
-    """Return the ids of ended processes whose temporary folders for `out` still exist.
-
-    Parameters
-    ----------
-    out : Path
-        The output folder.
-
-    Returns
-    -------
-    set of int
-        Process ids.
-    """
-    return {found.process for found in temporaries(out) if not _alive(found.process)}
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _is_at(file: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(file), path.stat())
-    except OSError:
-        return False
-
-
-def _lock(file: int) -> bool:
-    try:
-        import fcntl
-    except ImportError:
-        return _lock_windows(file)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def _lock_windows(file: int) -> bool:
-    import msvcrt
-
-    try:
-        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
-    except OSError:
-        return False
-    return True

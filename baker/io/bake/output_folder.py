@@ -1,29 +1,30 @@
 """Replaces an output folder as a whole: after an error it contains the complete old bake.
 
-All files are first written to a temporary folder beside the output folder. At the end, the temporary folder
-is renamed to the name of the output folder. Renames are recorded in a journal and undone after an error. If
-the output folder itself cannot be renamed (a mount point, the current folder), its files are exchanged one by
-one, with the same journal.
+All files are written to a temporary folder beside the output folder, and both are exchanged at the end in one
+step of the file system. Where the output folder cannot be renamed (a mount point, the current folder) or the
+file system has no exchange, the files are exchanged one by one with a journal, which `recovery` undoes after
+a kill.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
-import re
 import shutil
-from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
 from baker.core.errors import ResourceError, SettingsError
-from baker.io.temporary import Temporary, old_path, temporary_path
+from baker.io.bake.mounts import cannot_move
+from baker.io.bake.recovery import MANIFEST_NAME, NEW, exchange_files, lies_inside, recover, undo
+from baker.io.exchange import exchange_paths
+from baker.io.temporary import TemporaryFolder
 
-MANIFEST_NAME = "bake.json"
+__all__ = ["MANIFEST_NAME", "OutputFolder", "check_out", "file_state", "is_file", "own_files"]
+
 AS_BAKED = "as baked"
-# Relative path with forward slashes. No component is "." or "..", or contains a backslash or a colon.
-_FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None) -> None:
@@ -46,7 +47,7 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     ResourceError
         If the folder cannot be read or written to.
     """
-    folder = out.resolve()
+    folder = _resolved(out)
     if not folder.name:
         raise SettingsError("this is the root of the file system; name a folder in it", file=str(out))
     if folder.exists() and not folder.is_dir():
@@ -54,11 +55,11 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     parent = next(path for path in folder.parents if path.exists())
     if not parent.is_dir():
         raise SettingsError(f"'{parent}' is a file; the output cannot lie in it", file=str(out))
+    recover(folder)
+    _check_writable(folder, parent, out)
     if not folder.exists():
-        _check_writable(parent, out)
         return
     try:
-        _check_writable(folder, out)
         ours = own_files(folder)
         if ours is None and not force and any(folder.iterdir()):
             message = "the folder holds files that baker did not write; name another one, or add `force=True`"
@@ -90,17 +91,9 @@ def own_files(folder: Path) -> set[str] | None:
         manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
         names = {MANIFEST_NAME, *(entry["file"] for entry in manifest["files"])}
         known = isinstance(manifest["versions"]["baker"], str)
-        return names if known and all(_lies_inside(folder, name) for name in names) else None
+        return names if known and all(lies_inside(folder, name) for name in names) else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-
-
-def _lies_inside(folder: Path, name: object) -> bool:
-    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link."""
-    if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
-        return False
-    parents = name.split("/")[:-1]
-    return not any(folder.joinpath(*parents[: n + 1]).is_symlink() for n in range(len(parents)))
 
 
 def is_file(path: Path) -> bool:
@@ -151,18 +144,22 @@ class OutputFolder:
 
     def __init__(self, out: Path) -> None:
         self.out = out.resolve()
-        self._in_place = self.out.is_dir() and _cannot_move(self.out)
-        self.path = temporary_path(self.out, inside=self._in_place)
-        self._aside = old_path(self.path)
-        self._journal: list[tuple[Path, Path]] = []
+        self._in_place = self.out.is_dir() and cannot_move(self.out)
+        self._home = TemporaryFolder(self.out, inside=self._in_place)
         self._made: list[Path] = []
+
+    @property
+    def path(self) -> Path:
+        """Return the folder to write into."""
+        return self._home.path / NEW
 
     def __enter__(self) -> OutputFolder:
         """Create the temporary folder, and the parents of the output folder."""
         try:
-            for parent in reversed([p for p in self.path.parents if not p.exists()]):
+            for parent in reversed([p for p in self._home.path.parents if not p.exists()]):
                 parent.mkdir()
                 self._made.append(parent)
+            self._home.create()
             self.path.mkdir()
         except BaseException:
             self.abort()
@@ -184,27 +181,25 @@ class OutputFolder:
             If a file cannot be moved; the old files are then restored.
         """
         try:
-            if self._in_place:
-                self._exchange_files()
+            if not self.out.exists():
+                self.path.rename(self.out)
             else:
-                self._exchange_folders()
+                self._replace()
         except BaseException:
             self.abort()
             raise
-        self._journal.clear()
         self._made.clear()
-        for leftover in (self._aside, self.path):
-            shutil.rmtree(leftover, ignore_errors=True)
+        self._home.remove()
 
     def abort(self) -> None:
         """Restore the old folder, and remove all temporary files."""
-        while self._journal:
-            source, target = self._journal[-1]
-            if os.path.lexists(target) and not os.path.lexists(source):
-                target.rename(source)
-            self._journal.pop()
-        for leftover in (self._aside, self.path):
-            shutil.rmtree(leftover, ignore_errors=True)
+        try:
+            undo(self._home.path, self.out)
+        except OSError:
+            # A file cannot be moved back: the temporary folder stays, and a later command tries again.
+            self._home.leave()
+            raise
+        self._home.remove()
         while self._made:
             try:
                 self._made.pop().rmdir()
@@ -212,91 +207,54 @@ class OutputFolder:
                 # Another process has created files there.
                 self._made.clear()
 
-    def _exchange_folders(self) -> None:
-        if self.out.exists():
-            _carry_over(self.out, self.path, own_files(self.out) or set())
+    def _replace(self) -> None:
+        new = [p.relative_to(self.path).as_posix() for p in self.path.rglob("*") if p.is_file()]
+        own = own_files(self.out) or set()
+        if not self._in_place:
+            _carry_over(self.out, self.path, own)
             shutil.copymode(self.out, self.path)
-            self._rename(self.out, self._aside)
-        self._rename(self.path, self.out)
-
-    def _exchange_files(self) -> None:
-        new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
-        old = {Path(name) for name in own_files(self.out) or ()} | set(new)
-        # Move the old manifest first and the new one last, so that a folder with a manifest is complete.
-        for name in sorted(old, key=lambda n: (n.as_posix() != MANIFEST_NAME, n)):
-            if (self.out / name).exists():
-                (self._aside / name).parent.mkdir(parents=True, exist_ok=True)
-                self._rename(self.out / name, self._aside / name)
-        for name in sorted(new, key=lambda n: (n.as_posix() == MANIFEST_NAME, n)):
-            (self.out / name).parent.mkdir(parents=True, exist_ok=True)
-            self._rename(self.path / name, self.out / name)
-
-    def _rename(self, source: Path, target: Path) -> None:
-        # Record the rename first, so that `abort` also undoes it after an interruption.
-        self._journal.append((source, target))
-        try:
-            source.rename(target)
-        except OSError:
-            self._journal.pop()
-            raise
+            if exchange_paths(self.path, self.out):
+                return
+        exchange_files(self._home.path, self.out, own, new)
 
 
-def remove_leftovers(out: Path, left: Iterable[Temporary]) -> None:
-    """After a process was killed while writing, restore the old files and remove its temporary folders.
-
-    Parameters
-    ----------
-    out : Path
-        The output folder or file of the process.
-    left : iterable of Temporary
-        The temporary folders of the process, as `temporaries` returns them.
-    """
-    target, left = out.resolve(), list(left)
-    for temporary in left:
-        if temporary.old:
-            _put_back(temporary.path, target)
-    for temporary in left:
-        shutil.rmtree(temporary.path, ignore_errors=True)
-
-
-def _put_back(aside: Path, target: Path) -> None:
-    """Move the old files from the folder `aside` back to the output folder `target`."""
-    if aside.parent != target:
-        if not target.exists():
-            aside.rename(target)
-    elif not (target / MANIFEST_NAME).exists():
-        # The new manifest is moved in last, so without a manifest the new files are incomplete.
-        for path in sorted(path for path in aside.rglob("*") if path.is_file()):
-            name = path.relative_to(aside).as_posix()
-            if _lies_inside(target, name):
-                path.replace(target / name)
-
-
-def _cannot_move(folder: Path) -> bool:
-    """Return whether a folder is a mount point, is in a read-only folder, or contains the current one."""
-    if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
-        return True
+def _resolved(out: Path) -> Path:
     try:
-        return Path.cwd().is_relative_to(folder)
-    except OSError:
-        # The current folder no longer exists.
-        return False
+        return out.resolve()
+    except (OSError, RuntimeError) as error:
+        why = "its links form a loop" if isinstance(error, RuntimeError) else error.strerror
+        raise SettingsError(f"this is no path of a folder ({why}); name another one", file=str(out)) from None
 
 
-def _check_writable(folder: Path, out: Path) -> None:
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise ResourceError(
-            f"nothing can be written to '{folder}'; name another output folder", file=str(out)
-        )
+def _check_writable(folder: Path, parent: Path, out: Path) -> None:
+    """Create and remove the temporary folder of a bake; without the parent of `folder`, one in `parent`."""
+    where = folder if folder.is_dir() else parent
+    probe = TemporaryFolder(parent / folder.name)
+    try:
+        if folder.is_dir():
+            probe = TemporaryFolder(folder, inside=cannot_move(folder))
+        if not os.access(where, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        probe.create()
+    except OSError as error:
+        message = f"nothing can be written to '{where}' ({error.strerror}); name another output folder"
+        raise ResourceError(message, file=str(out)) from None
+    finally:
+        probe.remove()
 
 
 def _carry_over(old: Path, new: Path, own: set[str], prefix: str = "") -> None:
     """Hard-link or copy all files that are not in `own` from the folder `old` to the folder `new`."""
     for entry in sorted(os.scandir(old), key=lambda e: e.name):
         name, target = prefix + entry.name, new / entry.name
-        if name in own or (os.path.lexists(target) and not entry.is_dir(follow_symlinks=False)):
+        is_folder = entry.is_dir(follow_symlinks=False)
+        if name in own:
             continue
-        if entry.is_dir(follow_symlinks=False):
+        if os.path.lexists(target) and not is_folder:
+            if target.is_dir():
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), entry.path)
+            continue
+        if is_folder:
             was_empty = not any(Path(entry.path).iterdir())
             target.mkdir(exist_ok=True)
             _carry_over(Path(entry.path), target, own, f"{name}/")

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 from baker.core.errors import InputError
 from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
+from baker.io.bake.recovery import recover
 
 # Size above which a manifest is not read, bytes.
 _LONGEST = 1 << 30
@@ -23,7 +24,7 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a bake.
+    """Return the manifest of a bake, after recovering from a command that was killed while it wrote one.
 
     Parameters
     ----------
@@ -41,6 +42,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     InputError
         If there is no such folder, it holds no bake, or the manifest is damaged.
     """
+    recover(folder)
     if not folder.exists():
         raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
     if folder.is_file():

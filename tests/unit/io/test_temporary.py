@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from baker.core.errors import ResourceError
-from baker.io.temporary import atomic_path, old_path, temporaries, temporary_path, write_atomically
+from baker.io.temporary import (
+    TemporaryFolder,
+    atomic_path,
+    claim,
+    temporaries,
+    temporary_path,
+    write_atomically,
+)
 
 
 def test_temporary_folders_are_found_by_their_names(tmp_path: Path) -> None:
@@ -18,14 +25,11 @@ def test_temporary_folders_are_found_by_their_names(tmp_path: Path) -> None:
     assert beside != temporary_path(out), "names are random"
     assert (beside.parent, inside.parent) == (tmp_path, out)
     assert temporaries(out) == []
-    for path in (beside, old_path(beside), inside, tmp_path / ".other.baker-1-0a", out / ".baker-1-no"):
+    for path in (beside, inside, tmp_path / ".other.baker-1-0a", out / ".baker-1-no"):
         path.mkdir()
+    beside.with_name(".a[b].c.baker-1-0b").symlink_to(tmp_path)
     found = temporaries(out)
-    assert [(left.path, left.old) for left in found] == [
-        (beside, False),
-        (old_path(beside), True),
-        (inside, False),
-    ]
+    assert [left.path for left in found] == [beside, inside]
     assert {left.process for left in found} == {os.getpid()}
 
 
@@ -33,6 +37,35 @@ def test_no_temporary_folders_where_nothing_is(tmp_path: Path) -> None:
     assert temporaries(tmp_path / "no" / "out") == []
     (tmp_path / "file").write_bytes(b"")
     assert temporaries(tmp_path / "file") == []
+
+
+def test_the_lock_decides_whether_a_writer_lives(tmp_path: Path) -> None:
+    """The process that wrote the number of this process in its name has ended; it is no sign of life."""
+    out = tmp_path / "out"
+    written = TemporaryFolder(out)
+    written.create()
+    abandoned = tmp_path / f".out.baker-{os.getpid()}-00"
+    abandoned.mkdir()
+    reused = tmp_path / ".out.baker-999999999-01"
+    written.path.rename(reused)
+    free = {}
+    for found in temporaries(out):
+        with claim(found) as ended:
+            free[found.path] = ended
+    assert free == {abandoned: True, reused: False}
+    written.leave()
+    with claim(temporaries(out)[1]) as ended:
+        assert ended
+
+
+def test_what_a_killed_process_left_of_a_file_is_removed(tmp_path: Path) -> None:
+    (tmp_path / ".a.png.baker-1-0a").mkdir()
+    (tmp_path / ".a.png.baker-1-0a" / "a.png").write_bytes(b"half")
+    writing = TemporaryFolder(tmp_path / "a.png")
+    writing.create()
+    write_atomically(tmp_path / "a.png", b"whole", "picture")
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == [writing.path.name, "a.png"]
+    writing.remove()
 
 
 def write_half(path: Path, error: BaseException) -> None:

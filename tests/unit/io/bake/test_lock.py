@@ -1,13 +1,12 @@
-"""Locks of output folders end with their process, and what dead writers left is swept."""
+"""Locks of output folders end with their process."""
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
 
-from baker.io.bake.lock import OutputLock, dead_writers, sweep
+from baker.io.bake.lock import OutputLock
 
 HOLDER = """
 import sys, time
@@ -51,19 +50,3 @@ def test_a_killed_holder_does_not_leave_it_locked(tmp_path):
     assert lock.acquire()
     lock.release()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_only_leavings_of_the_dead_are_swept(tmp_path):
-    dead = subprocess.Popen([sys.executable, "-c", ""])
-    dead.wait()
-    out = tmp_path / "out"
-    half, old = tmp_path / f".out.baker-{dead.pid}-0123abcd", tmp_path / f".out.baker-{dead.pid}-0123abcd-old"
-    living = tmp_path / f".out.baker-{os.getpid()}-0123abcd"
-    other = tmp_path / f".out2.baker-{dead.pid}-0123abcd"
-    for folder in (half, old, living, other):
-        folder.mkdir()
-    (old / "bake.json").write_text("yesterday")
-    assert dead_writers(out) == {dead.pid}
-    sweep(out)
-    assert sorted(tmp_path.iterdir()) == sorted([out, living, other])
-    assert (out / "bake.json").read_text() == "yesterday", "it was moved aside and comes back"

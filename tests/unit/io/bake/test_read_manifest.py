@@ -14,12 +14,11 @@ from io_scenes import quad_result
 
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings import make_settings
-from baker.io.bake.output_folder import OutputFolder, check_out, own_files, remove_leftovers
+from baker.io.bake.output_folder import OutputFolder, check_out, own_files
 from baker.io.bake.read_bake import read_bake
 from baker.io.bake.read_manifest import read_manifest
 from baker.io.bake.write_bake import write_bake
 from baker.io.inspect import inspect_path
-from baker.io.temporary import temporaries
 
 
 @pytest.fixture
@@ -156,17 +155,6 @@ def test_a_manifest_that_names_a_file_outside_is_not_bakers(out: Path, tmp_path:
     assert (tmp_path / "victim.txt").read_text() == "mine"
     assert (elsewhere / "victim.txt").read_text() == "mine"
     assert own_files(out) is not None
-
-
-def test_leftovers_are_not_put_back_through_a_link(tmp_path: Path) -> None:
-    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    (out / ".baker-1-00000000-old" / "link").mkdir(parents=True)
-    (out / ".baker-1-00000000-old" / "link" / "victim.txt").write_text("theirs")
-    (elsewhere / "victim.txt").write_text("mine")
-    (out / "link").symlink_to(elsewhere)
-    remove_leftovers(out, temporaries(out))
-    assert (elsewhere / "victim.txt").read_text() == "mine"
 
 
 def test_an_output_folder_in_place_keeps_what_it_does_not_know(tmp_path: Path) -> None:

@@ -23,9 +23,8 @@ from baker.encodings.exr import decode_exr
 from baker.io.bake import output_folder
 from baker.io.bake import write_bake as output
 from baker.io.bake.manifest import manifest_schema
-from baker.io.bake.output_folder import OutputFolder, check_out, remove_leftovers
+from baker.io.bake.output_folder import check_out
 from baker.io.bake.write_bake import check_encodings, write_bake
-from baker.io.temporary import Temporary, temporaries
 
 NOON = datetime(2024, 1, 2, 12, 0, tzinfo=UTC)
 NAMES = ["ao_0.exr", "bake.json", "irradiance_0.exr", "scene.glb", "status_0.png"]
@@ -38,10 +37,6 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 def names(folder: Path) -> list[str]:
     return sorted(p.name for p in folder.iterdir())
-
-
-def left_by(out: Path, process: int) -> list[Temporary]:
-    return [found for found in temporaries(out) if found.process == process]
 
 
 def test_the_folder_holds_what_was_baked(tmp_path: Path) -> None:
@@ -164,16 +159,7 @@ def test_whatever_fails_leaves_the_old_bake_and_nothing_else(
     if place == "glb":
         monkeypatch.setattr(output, "make_glb", fail)
     else:
-        # The second rename of the swap fails: the old folder has been moved aside already.
-        rename, calls = Path.rename, []
-
-        def second_fails(self: Path, target: Path) -> Path:
-            calls.append(self)
-            if len(calls) == (2 if old else 1):
-                raise error
-            return rename(self, target)
-
-        monkeypatch.setattr(Path, "rename", second_fails)
+        monkeypatch.setattr(*((output_folder, "exchange_paths") if old else (Path, "rename")), fail)
     with pytest.raises(ResourceError if isinstance(error, OSError) else type(error)) as caught:
         write_bake(result, out)
     if isinstance(error, OSError):
@@ -241,58 +227,20 @@ def test_the_current_folder_is_written_file_by_file(tmp_path: Path, monkeypatch:
     assert names(out) == sorted({*NAMES, "notes.txt"} - {"irradiance_0.exr"})
     write_bake(result, Path(), created=NOON)
     assert tree(out) == before
-    rename, calls = Path.rename, []
+    replace_file, calls = Path.replace, []
 
     def seventh_fails(self: Path, target: Path) -> Path:
         calls.append(self)
         if len(calls) == 7:
             raise OSError(5, "Input/output error")
-        return rename(self, target)
+        return replace_file(self, target)
 
-    monkeypatch.setattr(Path, "rename", seventh_fails)
+    monkeypatch.setattr(Path, "replace", seventh_fails)
     with pytest.raises(ResourceError, match="Input/output error"):
         write_bake(result, Path())
     assert len(calls) > 7
     assert tree(out) == before
     assert names(out) == sorted([*NAMES, "notes.txt"])
-
-
-@pytest.mark.parametrize("killed_after", [0, 1, 2])
-@pytest.mark.parametrize("inside", [False, True])
-def test_what_a_killed_process_left_is_cleaned_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed_after: int, inside: bool
-) -> None:
-    """Stop like a kill, without clean-up, after `killed_after` renames; one of the two bakes is there."""
-    out = tmp_path / "out"
-    result = quad_result(tmp_path / "in")
-    write_bake(result, out, created=NOON)
-    before = tree(out)
-    if inside:
-        monkeypatch.chdir(out)
-    rename, calls = Path.rename, []
-
-    def dies(self: Path, target: Path) -> Path:
-        if len(calls) == killed_after:
-            raise KeyboardInterrupt
-        calls.append(self)
-        return rename(self, target)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(OutputFolder, "abort", lambda self: None)
-        patch.setattr(Path, "rename", dies)
-        patch.setattr(output_folder.shutil, "rmtree", lambda *_, **__: None)
-        if killed_after < 2 or inside:
-            with pytest.raises(KeyboardInterrupt):
-                write_bake(result, out, created=NOON)
-        else:
-            write_bake(result, out, created=NOON)
-    assert any(".baker-" in name for name in names(out if inside else tmp_path))
-    remove_leftovers(out, left_by(out, os.getpid() + 1))
-    assert any(".baker-" in name for name in names(out if inside else tmp_path)), "another process's"
-    remove_leftovers(out, left_by(out, os.getpid()))
-    assert tree(out) == before
-    assert names(tmp_path) == ["in", "out"]
-    assert names(out) == NAMES
 
 
 def test_a_place_that_cannot_be_written_is_found_before_the_work(

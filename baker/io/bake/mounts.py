@@ -1,0 +1,46 @@
+"""Finds folders that cannot be renamed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+# Table of the mounts that this process sees; the fifth field of a line is the mount point.
+_MOUNT_TABLE = Path("/proc/self/mountinfo")
+
+
+def cannot_move(folder: Path) -> bool:
+    """Return whether a folder cannot be renamed.
+
+    That is so for a mount point, a folder with a mount point in it, a folder in a parent that is not
+    writable, and the current folder of this process or a parent of it, which a shell is in.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder, resolved.
+    """
+    if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
+        return True
+    if any(point.is_relative_to(folder) for point in _mount_points()):
+        return True
+    try:
+        return Path.cwd().is_relative_to(folder)
+    except OSError:
+        # The current folder no longer exists.
+        return False
+
+
+def _mount_points() -> list[Path]:
+    """Return the mount points, bind mounts among them; an empty list on systems without the table."""
+    try:
+        lines = _MOUNT_TABLE.read_bytes().splitlines()
+    except OSError:
+        return []
+    return [Path(os.fsdecode(_unescaped(line.split(b" ")[4]))) for line in lines if line.count(b" ") > 4]
+
+
+def _unescaped(field: bytes) -> bytes:
+    for character in (b" ", b"\t", b"\n", b"\\"):
+        field = field.replace(b"\\%03o" % ord(character), character)
+    return field

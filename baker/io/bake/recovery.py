@@ -1,0 +1,174 @@
+"""Exchanges the files of an output folder one by one, and undoes it after a kill in between.
+
+It is for folders that cannot be renamed. The exchange is recorded in a journal beside the new files before
+the first file moves. The manifest moves last: until then any later command, `recover`, puts the old files
+back; from then on the new bake is complete.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import re
+import shutil
+from collections.abc import Collection, Iterable
+from pathlib import Path
+
+from baker.io.bake.lock import OutputLock
+from baker.io.temporary import claim, temporaries
+
+MANIFEST_NAME = "bake.json"
+# Parts of a temporary folder: the new files, the old ones while they are replaced, and the journal.
+NEW, OLD, JOURNAL = "new", "old", "journal.json"
+# Components without separators and drive letters, none of them "." or "..".
+_FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
+
+
+def lies_inside(folder: Path, name: object) -> bool:
+    """Return whether a name with forward slashes is of a file below `folder`, no parent of it a link."""
+    if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
+        return False
+    parents = name.split("/")[:-1]
+    return not any(folder.joinpath(*parents[: n + 1]).is_symlink() for n in range(len(parents)))
+
+
+def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[str]) -> None:
+    """Replace the files `old` of an output folder by the files `new`, one by one.
+
+    Parameters
+    ----------
+    home : Path
+        The temporary folder, of the file system of `out`; the new files are in its folder `NEW`.
+    out : Path
+        The output folder.
+    old, new : collection of str
+        Paths relative to the folders; one of the new ones is the manifest.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be moved; call `undo`.
+    """
+    leaving = [name for name in _manifest_first({*old, *new}) if os.path.lexists(out / name)]
+    for name in leaving:
+        if (out / name).is_dir() and not (out / name).is_symlink():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(out / name))
+    coming = _manifest_first(new)[::-1]
+    folders = [path for path in _parents(coming) if not os.path.lexists(out / path)]
+    record = json.dumps({"old": leaving, "new": coming, "folders": folders})
+    (home / "journal.tmp").write_text(record, "utf-8")
+    (home / "journal.tmp").rename(home / JOURNAL)
+    for name in leaving:
+        _move(out / name, home / OLD / name)
+    for name in coming:
+        _move(home / NEW / name, out / name)
+    for path in reversed(_parents(leaving)):
+        with contextlib.suppress(OSError):  # it holds other files
+            (out / path).rmdir()
+
+
+def undo(home: Path, out: Path) -> None:
+    """Undo an exchange that was interrupted, unless it is complete; may itself be interrupted and repeated.
+
+    Parameters
+    ----------
+    home : Path
+        The temporary folder.
+    out : Path
+        The output folder.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be moved back; call it again later.
+    """
+    journal = _journal(home, out)
+    new = journal["new"]
+    if not new or not os.path.lexists(home / NEW / new[-1]):
+        return
+    for name in reversed(new):
+        # All new files were in `home` when the journal was written.
+        if os.path.lexists(out / name) and not os.path.lexists(home / NEW / name):
+            _move(out / name, home / NEW / name)
+    for name in reversed(journal["old"]):
+        if os.path.lexists(home / OLD / name):
+            _move(home / OLD / name, out / name)
+    for name in reversed(journal["folders"]):
+        with contextlib.suppress(OSError):
+            (out / name).rmdir()
+    # Without the journal nothing but the removal of `home` remains to be done.
+    (home / JOURNAL).unlink()
+
+
+def recover(out: Path) -> None:
+    """Complete or undo what killed processes left of an output, and remove their temporary folders.
+
+    Every command that reads or writes an output folder calls it first. Where nothing can be written,
+    everything stays.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder or file, which need not exist.
+    """
+    try:
+        target = out.resolve()
+    except (OSError, RuntimeError, ValueError):
+        return  # a loop of links, or no path at all
+    found = temporaries(target)
+    for temporary in found:
+        with claim(temporary) as free:
+            if free:
+                with contextlib.suppress(OSError):
+                    undo(temporary.path, target)
+                    shutil.rmtree(temporary.path, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        lock = OutputLock(target)
+        if lock.path.exists() and lock.acquire():
+            lock.release()
+
+
+def abandoned(out: Path) -> bool:
+    """Return whether a killed process left temporary folders of an output.
+
+    Parameters
+    ----------
+    out : Path
+        The output folder or file.
+    """
+    for found in temporaries(out):
+        with claim(found) as free:
+            if free:
+                return True
+    return False
+
+
+def _journal(home: Path, out: Path) -> dict[str, list[str]]:
+    """Return the lists of a journal, empty without one; raise OSError if baker did not write it."""
+    try:
+        record = json.loads((home / JOURNAL).read_text("utf-8"))
+        parts = {part: list(record[part]) for part in ("old", "new", "folders")}
+    except FileNotFoundError:
+        return {"old": [], "new": [], "folders": []}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise OSError(errno.EINVAL, "the journal is damaged", str(home / JOURNAL)) from None
+    if not all(lies_inside(out, name) for names in parts.values() for name in names):
+        raise OSError(errno.EINVAL, "the journal names a file outside", str(home / JOURNAL))
+    return parts
+
+
+def _move(source: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    source.replace(target)
+
+
+def _manifest_first(names: Iterable[str]) -> list[str]:
+    return sorted(names, key=lambda name: (name != MANIFEST_NAME, name))
+
+
+def _parents(names: Iterable[str]) -> list[str]:
+    """Return all folders of relative paths, parents before their children."""
+    found = {path.as_posix() for name in names for path in Path(name).parents}
+    return sorted(found - {"."}, key=lambda path: (path.count("/"), path))

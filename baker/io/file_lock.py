@@ -1,0 +1,64 @@
+"""File locks of the operating system, which end with the process that holds them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def try_lock(file: int) -> bool:
+    """Lock an open file, or on POSIX systems an open folder, without waiting.
+
+    Parameters
+    ----------
+    file : int
+        Descriptor; closing it releases the lock.
+
+    Returns
+    -------
+    bool
+        False if another descriptor, of any process, holds the lock.
+
+    Raises
+    ------
+    OSError
+        If the file system has no locks.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return _try_lock_windows(file)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def is_at(file: int, path: Path) -> bool:
+    """Return whether an open file is still the one at `path`."""
+    try:
+        return os.path.samestat(os.fstat(file), path.stat())
+    except OSError:
+        return False
+
+
+def is_alive(process: int) -> bool:
+    """Return whether a process of this number exists."""
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _try_lock_windows(file: int) -> bool:
+    import msvcrt
+
+    try:
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+    except OSError:
+        return False
+    return True
