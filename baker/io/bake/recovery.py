@@ -137,6 +137,11 @@ def abandoned(out: Path) -> bool:
     ----------
     out : Path
         The output folder or file.
+
+    Returns
+    -------
+    bool
+        True until `recover` has removed them.
     """
     for found in temporaries(out):
         with claim(found) as free:
