@@ -1,4 +1,4 @@
-"""Numba kernels that several packages share: arrays and numbers only."""
+"""Numba kernels that several packages share. They take arrays and numbers only."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -1,6 +1,8 @@
 """Opacity of MASK and BLEND triangles.
 
-alpha = factor * texture(base uv) * vertex alpha; MASK: 1 where it reaches the cutoff, else 0.
+    alpha = factor * texture alpha * vertex alpha
+
+The opacity of a BLEND triangle is alpha. The opacity of a MASK triangle is 1 where alpha >= cutoff, else 0.
 """
 
 from __future__ import annotations
@@ -13,29 +15,29 @@ from numpy.typing import NDArray
 from baker.kernels.textures import sample_alpha
 from baker.trace.jit import inner, larger, smaller
 
-# Columns of a row. "Edge" columns hold the value at corner 1 or 2 minus that at corner 0:
+# Columns of `AlphaTable.row`. EDGE_1 and EDGE_2 are the value at corner 1 or 2 minus the value at corner 0:
 #
 #     UV, UV_EDGE_1, UV_EDGE_2            image uv (2 each)
 #     ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2   factor times vertex alpha
-#     CUTOFF                              of MASK; -1 for BLEND
-#     TEXTURE                             number in the `TexturePack`, -1 for none
-#     SURFACE                             connected surface of a BLEND triangle, a whole number
+#     CUTOFF                              alpha cutoff of MASK; -1 for BLEND
+#     TEXTURE                             number of the texture in the `TexturePack`, -1 for none
+#     SURFACE                             number of the connected surface of a BLEND triangle, a whole number
 UV, UV_EDGE_1, UV_EDGE_2, ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2, CUTOFF, TEXTURE, SURFACE = (
     0, 2, 4, 6, 7, 8, 9, 10, 11
 )  # fmt: skip
-# The rest is unused: a row is 64 bytes.
+# A row has 64 bytes, a cache line; the last four columns are unused.
 ROW_LENGTH = 16
 
 
 class AlphaTable(NamedTuple):
-    """The K triangles that let light through somewhere.
+    """The K triangles whose opacity is below 1 somewhere.
 
     Attributes
     ----------
     slot : (T,) int32
-        Row of each triangle of the scene, -1 for those that block everywhere; (0,) if all do.
+        Row in `row` of each triangle of the scene, -1 for opaque triangles; (0,) if all triangles are opaque.
     row : (K, 16) float32
-        See the column names.
+        Data of these triangles, see the column names.
     """
 
     slot: NDArray[np.int32]
@@ -48,7 +50,7 @@ def no_alpha() -> AlphaTable:
     Returns
     -------
     AlphaTable
-        Without rows.
+        Arrays of length 0.
     """
     return AlphaTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
@@ -66,14 +68,14 @@ def opacity(row, k, pack, b1, b2):  # type: ignore[no-untyped-def]
         v = np.float64(row[k, UV + 1]) + b1 * row[k, UV_EDGE_1 + 1] + b2 * row[k, UV_EDGE_2 + 1]
         alpha *= sample_alpha(pack, np.int64(row[k, TEXTURE]), u, v)
     if row[k, CUTOFF] >= np.float32(0.0):
-        # Compare as float32: the weights of a lookup may sum to slightly less than 1.
+        # Round to float32, because the weights of a lookup may sum to slightly less than 1.
         return 1.0 if np.float32(alpha) >= row[k, CUTOFF] else 0.0
     return smaller(larger(alpha, 0.0), 1.0)
 
 
 @inner
 def opacity_at(shading, t, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the opacity of triangle t of the scene at barycentrics (b1, b2), 1 if it blocks everywhere.
+    """Return the opacity, 0 to 1, of triangle t of the scene at barycentrics (b1, b2).
 
     shading : Shading
     """

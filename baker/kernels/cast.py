@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""First hits of given rays: triangle and distance."""
+"""Triangle and distance of the first hit of each of n rays."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ def first_hits(buffers, origin, direction, near, far, triangle, distance):
 
     buffers : PacketBuffers
     origin : (n, 3) float32, metres, world; direction : (n, 3) float32, of any length
-    near, far : (n,) float32, ends of the ray, in units of the direction's length
-    triangle : (n,) int32 output, triangle hit, -1 for none
-    distance : (n,) float32 output, to the hit (else `far`), in units of the direction's length
+    near, far : (n,) float32, TNEAR and TFAR of each ray, in units of the direction's length
+    triangle : (n,) int32 output, triangle that was hit, -1 for none
+    distance : (n,) float32 output, distance of the hit, in units of the direction's length; `far` without a
+        hit
     """
     width, scene, intersect = buffers.width, buffers.scene, buffers.intersect
     valid, floats, words = buffers.valid, buffers.floats, buffers.words
     for group in range(0, len(origin), width):
-        # Fill a packet; lanes beyond the last ray are off.
+        # Fill a packet, and disable lanes beyond the last ray.
         for lane in range(width):
             i = group + lane
             valid[lane] = -1 if i < len(origin) else 0
@@ -40,6 +41,6 @@ def first_hits(buffers, origin, direction, near, far, triangle, distance):
                 missed = words[GEOM_ID * width + lane] == NO_HIT
                 triangle[i] = -1 if missed else np.int32(words[PRIM_ID * width + lane])
                 distance[i] = floats[TFAR * width + lane]
-    # Other kernels rely on tnear = 0.
+    # Reset TNEAR to 0, because other kernels do not set it.
     for lane in range(width):
         floats[TNEAR * width + lane] = np.float32(0.0)

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Triangles clipped to the square of a texel: area of the polygon, and points uniform in it.
+"""Clips triangles to the square of a texel; area of the clipped polygon, and uniform points in it.
 
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
@@ -12,7 +12,8 @@ import numpy as np
 
 from baker.trace.jit import inner, larger, scratch, smaller
 
-# A triangle clipped by four half-planes has at most seven corners; clipping needs two more rows.
+# Rows of a polygon array. A triangle clipped by four half-planes has at most seven corners, and clipping
+# needs two more rows.
 MAX_CORNERS = 9
 # Working memory of kernels: a triangle (3, 2) and a clipped polygon (MAX_CORNERS, 2), float64.
 new_triangle = scratch((3, 2), np.float64)
@@ -21,7 +22,7 @@ new_polygon = scratch((MAX_CORNERS, 2), np.float64)
 
 @inner
 def clip_to_square(corner, x0, y0, out, spare):
-    """Clip a triangle to the unit square at (x0, y0); return the number of corners in `out`.
+    """Clip a triangle to the texel [x0, x0 + 1] x [y0, y0 + 1]; return the number of corners in `out`.
 
     corner : (3, 2) float64, texels
     out : (MAX_CORNERS, 2) float64 output, corners relative to (x0, y0)
@@ -59,9 +60,9 @@ def clip_to_square(corner, x0, y0, out, spare):
 
 @inner
 def polygon_area(corner, n):
-    """Return the unsigned area of a convex polygon.
+    """Return the unsigned area of a convex polygon of n corners.
 
-    corner : (MAX_CORNERS, 2) float64, of which the first n count
+    corner : (MAX_CORNERS, 2) float64; rows from n on are ignored
     """
     twice = 0.0
     for i in range(1, n - 1):
@@ -74,9 +75,9 @@ def polygon_area(corner, n):
 
 @inner
 def polygon_point(corner, n, u, v):
-    """Map (u, v) of the unit square to a point (x, y), uniform in a convex polygon.
+    """Map (u, v), uniform in the unit square, to a point (x, y), uniform in a convex polygon of n corners.
 
-    corner : (MAX_CORNERS, 2) float64, of which the first n count
+    corner : (MAX_CORNERS, 2) float64; rows from n on are ignored
     """
     if n < 3:
         x = 0.0
@@ -102,9 +103,10 @@ def polygon_point(corner, n, u, v):
 
 @inner
 def square_touches(corner, x0, y0):
-    """Return the overlap of a triangle and the unit square at (x0, y0): 0 none, 1 part, 2 all of the square.
+    """Return how a triangle overlaps the texel [x0, x0 + 1] x [y0, y0 + 1].
 
     corner : (3, 2) float64, texels
+    Returns 0 if they do not touch, 1 if the triangle covers a part of the texel, 2 if it covers all of it.
     """
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]
@@ -112,7 +114,7 @@ def square_touches(corner, x0, y0):
     inside = twice != 0.0
     for i in range(3):
         j = i + 1 if i < 2 else 0
-        # Inward normal of the edge and its value at the nearest and the farthest corner of the square.
+        # Evaluate the line equation of the edge, positive inside, at the texel's corners.
         nx = -(corner[j, 1] - corner[i, 1])
         ny = corner[j, 0] - corner[i, 0]
         if twice < 0.0:
@@ -121,7 +123,7 @@ def square_touches(corner, x0, y0):
         base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
         if base + larger(nx, 0.0) + larger(ny, 0.0) < 0.0:
             return 0
-        # A triangle without area is a line: it touches the squares that it crosses.
+        # Treat a triangle without area as a line, which touches the texels that it crosses.
         if twice == 0.0 and base + smaller(nx, 0.0) + smaller(ny, 0.0) > 0.0:
             return 0
         if base + smaller(nx, 0.0) + smaller(ny, 0.0) < 0.0:

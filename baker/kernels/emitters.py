@@ -1,8 +1,11 @@
 """Sampling of emissive triangles.
 
-Triangles are grouped into clusters of neighbours. A cluster is chosen in proportion to an estimate of its
-contribution to a tile of texels (power, distance, facing), then a triangle of it in proportion to its power,
-then a point uniform in its area.
+Neighbouring triangles are grouped into clusters. A sample is chosen in three steps:
+
+1. a cluster, in proportion to an estimate of its contribution to a tile of texels, from the cluster's power,
+   distance and orientation;
+2. a triangle of the cluster, in proportion to its power;
+3. a point, uniform in the triangle's area.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 Conty Estevez and Kulla, Importance sampling of many lights with adaptive tree splitting, 2018.
@@ -28,47 +31,48 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 #     NORMAL                       unit face normal (3)
 #     AREA                         m2
 #     TWO_SIDED                    1 if the back emits, too, else 0
-#     SHARE                        probability of the emitter inside its cluster
-#     CUMULATIVE                   running sum of these probabilities, this one included
+#     SHARE                        probability of the emitter if its cluster is chosen
+#     CUMULATIVE                   sum of SHARE of the cluster's emitters up to and including this emitter
 #     CLUSTER                      index of the cluster
 #     RADIANCE                     RGB, cd/m2, without the texture (3)
-#     TEXTURED                     1 if the texture has to be looked up, 0 if not, or NO_CLOSED_FORM
-#     INSIDE                       position in the scene's triangle: barycentrics b1, b2 of corner 0; edge
-#                                  length as a share of the triangle's, negative for parts rotated by 180
-#                                  degrees; (0, 0, 1) for a whole triangle
+#     TEXTURED                     1 if the radiance is RADIANCE times the texture, 0 if it is RADIANCE, or
+#                                  NO_CLOSED_FORM
+#     INSIDE                       position in a triangle of the scene: barycentrics b1, b2 of corner 0, and
+# edge                                  length / edge length of that triangle, negative for parts rotated by
+# 180                                  degrees; (0, 0, 1) for a whole triangle
 CORNER, CORNER_1, CORNER_2, NORMAL, AREA, TWO_SIDED = 0, 3, 6, 9, 12, 13
 SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = 14, 15, 16, 17, 20, 21
 ROW_LENGTH = 24
-# Value of TEXTURED: the radiance is the row's, but the emitter is always sampled.
+# Value of TEXTURED: the radiance is RADIANCE, but the closed form of its irradiance is not used.
 NO_CLOSED_FORM = -1.0
 _three = scratch((3,), np.float64)
 
 
 class Emitters(NamedTuple):
-    """M emissive triangles, or parts of textured ones, in C clusters.
+    """M emitters in C clusters. An emitter is an emissive triangle, or a part of a textured triangle.
 
     Attributes
     ----------
     row : (M, 24) float32
-        Cluster after cluster, see the column names.
+        Data of each emitter, sorted by cluster, see the column names.
     triangle : (M,) int32
-        Triangle of the scene that the emitter is, or is a part of.
+        Triangle of the scene that contains each emitter.
     first : (C + 1,) int32
-        Emitters of cluster c are first[c] to first[c + 1].
+        Cluster c contains the emitters first[c] to first[c + 1] - 1.
     centre : (C, 3) float32
-        Of a sphere around the cluster, metres.
+        Centre of a sphere around each cluster, metres.
     radius : (C,) float32
-        Of that sphere, metres.
+        Radius of that sphere, metres.
     power : (C,) float32
-        Sum of the emitters' powers.
+        Sum of the powers of each cluster's emitters.
     axis : (C, 3) float32
-        Unit axis of a cone that holds the cluster's normals.
+        Unit axis of a cone that contains the cluster's normals.
     spread : (C,) float32
         Half angle of that cone, radians; pi for clusters with two-sided triangles.
     node : (K, 4) int32
         Subdivisions of textured triangles, see `emitter_at`.
     root : (T,) int32
-        Code of each triangle of the scene, see `emitter_at`.
+        Code of each triangle of the scene, from which `emitter_at` finds its emitters.
     """
 
     row: NDArray[np.float32]
@@ -93,10 +97,10 @@ class TileEmitters(NamedTuple):
     chance : (C,) float32
         Probability of each cluster.
     cumulative : (C,) float32
-        Running sum of `chance`.
+        Cumulative sum of `chance`.
     apart : (C,) uint8
-        1 for clusters that are sampled as a separate stratum: gather rays that hit them contribute also at
-        texels that have the complete light of all other emitters.
+        1 for clusters that are sampled as a separate stratum. Gather rays that hit these clusters contribute
+        also at texels for which the light of the other emitters is computed in closed form.
     """
 
     row: NDArray[np.float32]
@@ -121,7 +125,7 @@ def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitte
     Returns
     -------
     TileEmitters
-        With all clusters in one stratum (`apart` is 0).
+        All clusters are in one stratum (`apart` is 0).
     """
     chance = np.zeros(len(emitters.power), np.float32)
     cumulative = np.zeros_like(chance)
@@ -134,9 +138,9 @@ def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitte
 
 
 def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
-    """Return the materials if emitters need them: any is textured, or any triangle lets light through.
+    """Return the materials if any emitter is textured or any triangle lets light through, else None.
 
-    Numba compiles kernels for None without texture lookups.
+    With None, Numba compiles kernels without texture lookups.
 
     Parameters
     ----------
@@ -148,7 +152,7 @@ def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
     Returns
     -------
     Shading or None
-        `shading`, None if no emitter needs it.
+        `shading` or None.
     """
     varied = len(shading.alpha.slot) > 0 or (emitters.row[:, TEXTURED] > 0).any()
     return shading if varied else None
@@ -156,7 +160,7 @@ def needed_shading(emitters: Emitters, shading: Shading) -> Shading | None:
 
 @inner
 def bounding_sphere(origin):  # type: ignore[no-untyped-def]
-    """Return centre x, y, z and radius of a sphere around points: their box's centre and half diagonal.
+    """Return x, y, z of the centre and half the diagonal of the bounding box of points.
 
     origin : (m, w, 3) float32, metres
     """
@@ -174,9 +178,10 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 @kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
-    """Return the largest radius / distance of a cluster as seen from points; inf if their spheres touch.
+    """Return the largest radius / distance of a cluster, with the distance from the nearest possible point.
 
-    emitters : Emitters; origin : (m, w, 3) float32, metres
+    emitters : Emitters; origin : (m, w, 3) float32, metres, points
+    Returns inf if the bounding sphere of the points touches the sphere of a cluster.
     """
     x, y, z, radius = bounding_sphere(origin)
     widest = 0.0
@@ -193,15 +198,16 @@ def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
 
 @kernel
 def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-untyped-def]
-    """Write the probabilities of clusters for points, which are replaced by their bounding sphere.
+    """Write the probability of each cluster for points, which are represented by their bounding sphere.
 
         weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
 
-    `angle` is the smallest angle between a normal of the cluster and a direction to the sphere. A cluster's
-    probability is 0 only if no point of the sphere can see the front of its triangles. 5 % of the probability
-    are divided equally among the others.
+    `angle` is a lower bound of the angle between a normal of the cluster and a direction from the cluster to
+    the sphere. If it is 90 degrees or more, the weight is 0, because no point of the sphere sees an emitting
+    side. 95 % of the probability are proportional to the weights; 5 % are divided equally among the clusters
+    of positive weight.
 
-    emitters : Emitters; origin : (m, w, 3) float32, metres
+    emitters : Emitters; origin : (m, w, 3) float32, metres, points
     chance, cumulative : (C,) float32 output, see `TileEmitters`
     """
     x, y, z, radius = bounding_sphere(origin)
@@ -227,11 +233,11 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
             if angle >= 0.5 * math.pi:
                 weight = 0.0
             elif angle > 0.0:
-                # Limit the factor, since the bound of the angle is rough.
+                # Limit the cosine from below, because the bound of the angle is not tight.
                 weight *= larger(math.cos(angle), 0.05)
         chance[c] = weight
         total += weight
-    # Normalise, mix with equal shares, and sum up.
+    # Normalise the weights, mix them with equal shares, and compute the cumulative sum.
     lit = 0
     for c in range(n):
         lit += chance[c] > 0.0
@@ -245,10 +251,11 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
 
 @inner
 def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untyped-def]
-    """Choose an emitter by a uniform number u.
+    """Choose an emitter with the uniform number u.
 
     row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
-    Returns its number, the probability density of a point on it per m2, and u rescaled to [0, 1) for reuse.
+    Returns the emitter, the probability density of a point on it per m2, and a new uniform number in [0, 1)
+    computed from u.
     """
     # Choose a cluster.
     n = len(cumulative)
@@ -280,11 +287,11 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
 
 @inner
 def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore[no-untyped-def]
-    """Choose an emitter and write a point on it.
+    """Choose an emitter, and write a random point on it.
 
     row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
-    u, v : uniform numbers; point : (3,) output, metres
-    Returns emitter number, density per m2, and the barycentrics b1 and b2 on the emitter.
+    u, v : uniform numbers in [0, 1); point : (3,) output, metres
+    Returns the emitter, the density per m2, and the barycentrics b1 and b2 of the point on the emitter.
     """
     m, density, u = choose_emitter(row, first, chance, cumulative, u)
     b1, b2 = triangle_barycentric(u, v)
@@ -299,8 +306,11 @@ def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
     """Return the emitter at barycentrics (b1, b2) of a triangle that may be subdivided, -1 where it is black.
 
     node : (K, 4) int32, see `Emitters`
-    code : of the triangle: m >= 0, it is emitter m; -1, it emits nothing; -2 - k, it is cut into four parts
-        whose codes are node[k]: at corners 0, 1, 2, then the rotated one in the middle
+    code : code of the triangle, see below
+
+    A code m >= 0 means emitter m. A code -1 means that nothing is emitted. A code -2 - k means a subdivision
+    into four parts with the codes node[k]: the parts at corners 0, 1 and 2, and the rotated part in the
+    middle.
     """
     while code < -1:
         k = -2 - code
@@ -319,7 +329,7 @@ def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def on_triangle(row, m, b1, b2):  # type: ignore[no-untyped-def]
-    """Return barycentrics on the scene's triangle from barycentrics (b1, b2) on emitter m, a part of it.
+    """Convert barycentrics (b1, b2) on emitter m to barycentrics on the triangle of the scene.
 
     row : (M, 24) float32, see `Emitters`
     """
@@ -340,9 +350,9 @@ def emitter_density(row, chance, cumulative, m):  # type: ignore[no-untyped-def]
 
 @inner
 def emitted_radiance(shading, t, b1, b2, out):  # type: ignore[no-untyped-def]
-    """Write the radiance that triangle t emits at barycentrics (b1, b2).
+    """Write the radiance that triangle t emits at barycentrics (b1, b2), texture included.
 
-    shading : Shading; out : (4,) float64 output, RGB, cd/m2, and one item of working memory
+    shading : Shading; out : (4,) float64 output; out[:3] is RGB in cd/m2, out[3] is working memory
     """
     m = shading.material[t]
     out[0] = out[1] = out[2] = 1.0

@@ -1,4 +1,4 @@
-"""The warning for installs where compiled kernels cannot be kept for the next run."""
+"""The warning for installations that cannot store compiled kernels for the next run."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from baker.kernels.surface import place_points
 
 
 def cache_warnings() -> list[SceneWarning]:
-    """Return the warning `kernels-not-kept` if Numba has no folder to keep compiled kernels in.
+    """Return the warning `kernels-not-kept` if Numba has no writable folder for compiled kernels.
 
     Returns
     -------
     list of SceneWarning
-        Empty if kernels are kept.
+        One warning, or none.
     """
-    # All kernels are in the same install, so one of them is checked.
+    # Check one kernel, because all kernels use the same folder.
     if place_points._cache.cache_path is not None:
         return []
     message = (

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Rays from texel points that find points inside other geometry."""
+"""Rays from the sample points of texels that find the points inside geometry."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ from baker.kernels.triangle_lookup import front_facing
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PACKET_WIDTH, PRIM_ID, trace_lanes
 
-# Meaning of the first hit of a ray on a triangle for the ray's origin (`hit_kind`):
+# Values of `hit_kind`: what a first hit on a triangle says about the origin of the ray.
 #
 #     0             nothing
-#     BLACK_BACK    its back is black: a point all of whose rays hit such backs is enclosed
-#     SOLID_BACK    hit from behind: the point is inside a solid
-#     SOLID_FRONT   the same for faces of a solid that are wound inwards: hit from the front
+#     BLACK_BACK    the triangle's back is black; if all rays of a point hit such backs, the point is inside
+#                   geometry
+#     SOLID_BACK    if the ray hits the back, its origin is inside a solid
+#     SOLID_FRONT   if the ray hits the front, its origin is inside a solid whose faces are wound inwards
 BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
-# Rays from the inside of a solid that prove a point to be inside: a single one may pass through an edge.
+# Number of rays with such hits on solids that prove a point to be inside. A single ray may pass through an
+# edge.
 PROOF = 2
-# A count is n_inside + ELSEWHERE * n_elsewhere: rays that start inside a solid, and rays that hit neither a
-# solid from inside nor a black back.
+# Factor in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside is the number of rays that hit a solid from
+# inside, n_elsewhere the number of rays that hit neither a solid from inside nor a black back.
 ELSEWHERE = 16
 
 
@@ -28,17 +30,18 @@ ELSEWHERE = 16
 def inside_hits(
     origin, normal, lookup, hit_kind, buffers, begin, sobol_points, shared, rays_per_point, proof, hits
 ):
-    """Count for each point the rays whose first hit means that it is inside geometry, and that it is outside.
+    """Cast rays from w points of each of m texels, and count their first hits by kind.
 
-    Sixteen items are done together, and no further rays are cast from their points once all are decided.
+    Sixteen texels are processed together. No further rays are cast from their points with the same number
+    after it is decided for each of these points whether it is inside geometry.
 
     origin, normal : (m, w, 3) float32, metres, world, and unit; each point casts `rays_per_point`
         cosine-weighted rays
     lookup : TriangleLookup; hit_kind : (T,) uint8, see above
     buffers : PacketBuffers
-    begin : number of the first of the m items, for its random numbers and its row of `hits`
+    begin : number of the first texel, which seeds its random numbers and is its row of `hits`
     sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
-    proof : number of rays from the inside of solids after which a point is inside
+    proof : number of hits on solids from inside that prove a point to be inside
     hits : (n, w) uint8, counts are added, see `ELSEWHERE`
     Returns the number of rays cast.
     """
@@ -64,7 +67,7 @@ def inside_hits(
             for lane in range(lanes):
                 count = np.int64(hits[begin + group + lane, point])
                 inside, elsewhere = count % ELSEWHERE, count // ELSEWHERE
-                # Outside: the rays that are left are too few for a proof, and some ray went elsewhere.
+                # A point is outside if a ray went elsewhere and the remaining rays are too few for a proof.
                 outside = elsewhere > 0 and inside + rays_per_point - turn < proof
                 decided += 1 if inside >= proof or outside else 0
             if decided == lanes:
@@ -75,7 +78,7 @@ def inside_hits(
                 rays, words, frame, seeds, sobol_points[sample, 0], sobol_points[sample, 1], shared, FAR
             )
             trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
-            # Count the hits by their meaning.
+            # Count the hits by kind.
             for lane in range(lanes):
                 kind = np.int64(0)
                 front = 0

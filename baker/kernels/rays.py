@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
 
-Values that depend on the texel's point only (origin and tangent frame) are kept by lane in rows of `frame`.
-Each sample then needs the scrambles, the map to the hemisphere and a rotation. All rows lie at constant
-offsets of one array, or the compiler could not prove that they do not overlap.
+The tangent frame of each texel's current point is stored in `frame`. For each sample, two Sobol numbers are
+scrambled, mapped to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant
+offsets in one array, so that the compiler can prove that they do not overlap.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from baker.kernels.sampling import cosine_direction, hash_combine, tangent_frame
 from baker.trace.jit import inner, scratch
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, ORG_X, PACKET_WIDTH, TFAR
 
-# TFAR of rays without an end, metres.
+# TFAR of rays of unlimited length, metres.
 FAR = np.float32(1.0e30)
-# Rows of a frame: tangent, bitangent, normal (three each).
+# Rows of a frame: tangent, bitangent, normal (3 each).
 _TANGENT, _BITANGENT, _NORMAL = 0, 3, 6
 FRAME_ROWS = 9
 # Working memory of kernels for sixteen lanes: seeds (2 * 16,) uint32 and frame (9 * 16,) float32.
@@ -26,9 +26,10 @@ new_frame = scratch((FRAME_ROWS * PACKET_WIDTH,), np.float32)
 
 @inner
 def lane_seeds(first, lanes, salt, seeds):
-    """Write the scramble seeds of items `first` to `first + lanes`, for both dimensions of a sample.
+    """Write the scramble seeds of `lanes` items from item `first` on, for both dimensions of a sample.
 
-    salt : int, another one for each kind of rays; seeds : (2 * 16,) uint32 output
+    salt : int, a different number for each kind of rays
+    seeds : (2 * 16,) uint32 output, by dimension and lane
     """
     for lane in range(lanes):
         seeds[lane] = hash_combine(np.uint32(first + lane), np.uint32(2 * salt))
@@ -37,10 +38,11 @@ def lane_seeds(first, lanes, salt, seeds):
 
 @inner
 def load_frames(rays, frame, origin, normal, group, lanes, k):
-    """Write origins of point k of texels `group` to `group + lanes` to `rays`, tangent frames to `frame`.
+    """Write origin and tangent frame of point k of `lanes` texels from texel `group` on, by lane.
 
     origin, normal : (n, w, 3) float32, metres, world, and unit
-    rays : (21 * 16,) float32 output, a packet; frame : (9 * 16,) float32 output
+    rays : (21 * 16,) float32 output, a packet whose origins are set
+    frame : (9 * 16,) float32 output, see the row names
     """
     for lane in range(lanes):
         for a in range(3):
@@ -62,15 +64,15 @@ def load_frames(rays, frame, origin, normal, group, lanes, k):
 
 @inner
 def aim_lanes(rays, words, frame, seeds, first, second, shared, far):
-    """Write the cosine-weighted directions of one sample into all lanes.
+    """Write the cosine-weighted direction of one sample into each lane.
 
-    rays, words : (21 * 16,) float32 and uint32, the packet, one memory; directions, TFAR and GEOM_ID are set
+    rays, words : (21 * 16,) float32 and uint32 views of one packet; directions, TFAR and GEOM_ID are set
     frame : (9 * 16,) float32, from `load_frames`; seeds : (2 * 16,) uint32, from `lane_seeds`
-    first, second : uint32, the sample's bit-reversed Sobol numbers; shared : uint32, see `sampling`
+    first, second : uint32, bit-reversed Sobol numbers of the sample; shared : uint32, see `sampling`
     far : float32, TFAR, metres
     """
     for lane in range(PACKET_WIDTH):
-        # Direction about +z, then into the frame: d = a tangent + b bitangent + c normal.
+        # Compute (a, b, c) about +z, and rotate it into the frame: d = a tangent + b bitangent + c normal.
         u = texel_scramble(first, seeds[lane], shared)
         v = texel_scramble(second, seeds[PACKET_WIDTH + lane], shared)
         a, b, c = cosine_direction(u, v)

@@ -1,9 +1,9 @@
-"""Low-discrepancy numbers and the maps from the unit square to directions and triangles.
+"""Low-discrepancy points in the unit square, and maps from it to directions and triangles.
 
-Points are the first two Sobol dimensions (a (0,2)-sequence) under nested uniform (Owen) scrambling. The first
-bits (`shared`) are scrambled alike for all texels, the others differently for each. So rays of neighbouring
-texels with the same sample number have similar directions, and packets stay coherent; the points of one texel
-are still a fully scrambled net.
+The points are the first two Sobol dimensions (a (0,2)-sequence) with nested uniform (Owen) scrambling. The
+leading bits (`shared`) are scrambled in the same way for all texels, the other bits differently for each
+texel. So sample s of neighbouring texels has similar directions, and ray packets stay coherent. The points of
+one texel are still a fully scrambled net.
 
 Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
 sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,
@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, larger
 
-# Numba widens uint32 arithmetic to 64 bits: every step is wrapped again.
+# Numba widens uint32 arithmetic to 64 bits, so the result of each step is converted back to uint32.
 _u = np.uint32
 _INV_2_24 = np.float32(5.9604645e-08)
 
 
 @inner
 def hash_u32(x):  # type: ignore[no-untyped-def]
-    """Return a well-mixed uint32 of a uint32 (Wellons' lowbias32)."""
+    """Return the uint32 hash of a uint32 (Wellons' lowbias32)."""
     x = _u(x ^ (x >> _u(16)))
     x = _u(x * _u(0x7FEB352D))
     x = _u(x ^ (x >> _u(15)))
@@ -63,11 +63,12 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
 
 @inner
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
-    """Return a float32 in [0, 1): shared bits kept, the others scrambled with the texel's seed.
+    """Return a float32 in [0, 1): a Sobol number with its unshared bits scrambled by the texel's seed.
 
-    shared_reversed : uint32, globally scrambled Sobol number, bit-reversed
-    mask : uint32, the shared bits, lowest in reversed order
-    Truncated to 24 bits: rounding up would move some numbers into the next cell of their net.
+    shared_reversed : uint32, Sobol number, scrambled in the same way for all texels, bit-reversed
+    seed : uint32, seed of the texel
+    mask : uint32, shared bits, which are the lowest bits of a bit-reversed number
+    The result is truncated to 24 bits, because rounding up could move it into the next cell of the net.
     """
     y = scramble_reversed(shared_reversed, seed)
     y = _u((y & _u(~mask)) | (shared_reversed & mask))
@@ -75,7 +76,7 @@ def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
 
 
 def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]:
-    """Return a globally scrambled (0,2)-sequence, bit-reversed.
+    """Return n points of a (0,2)-sequence, scrambled in the same way for all texels, as bit-reversed numbers.
 
     Parameters
     ----------
@@ -84,12 +85,12 @@ def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]
     seed : int
         Seed of the scramble.
     dimension_pair : int
-        Different numbers give independently scrambled sequences, in the same order.
+        Different numbers give independently scrambled sequences.
 
     Returns
     -------
     (n, 2) uint32
-        Numbers for `texel_scramble`.
+        `shared_reversed` of `texel_scramble`.
     """
     number = np.arange(n, dtype=np.uint32)
     seeds = np.array([[_u(3 * dimension_pair)], [_u(3 * dimension_pair + 1)]])
@@ -102,12 +103,15 @@ def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]
 
 
 def shared_bits_mask(n_samples: int) -> np.uint32:
-    """Return the mask of bits that all texels share: one point in each shared cell, at most 16 x 16 cells.
+    """Return the mask of the bits that all texels share.
+
+    The shared bits divide the unit square into equal cells, with at least one sample per cell and at most
+    16 x 16 cells.
 
     Parameters
     ----------
     n_samples : int
-        Samples of a texel.
+        Number of samples of a texel.
 
     Returns
     -------
@@ -121,16 +125,15 @@ def shared_bits_mask(n_samples: int) -> np.uint32:
 def cosine_direction(u, v):  # type: ignore[no-untyped-def]
     """Map (u, v) float32 in [0, 1) to a unit direction x, y, z of the hemisphere about +z; pdf = cos / pi.
 
-    Concentric map to the disc, then projection to the hemisphere. Sine and cosine of angles up to pi/4 are
-    polynomials (error
-    under 3e-7).
+    A concentric map to the disc is followed by a projection to the hemisphere. Sine and cosine of angles up
+    to pi / 4 are polynomials with an error below 3e-7.
     """
     a = np.float32(2.0) * u - np.float32(1.0)
     b = np.float32(2.0) * v - np.float32(1.0)
     wide = abs(a) > abs(b)
     r = a if wide else b
     other = b if wide else a
-    # Avoid branches, so that loops over lanes are vectorised; r = 0 only where `other` is 0, too.
+    # Avoid branches, so that loops over lanes are vectorised. If r is 0, `other` is 0, too.
     t = np.float32(0.78539816) * other / (r if r != np.float32(0.0) else np.float32(1.0))
     t2 = t * t
     c = np.float32(1.0) + t2 * (
@@ -148,7 +151,7 @@ def cosine_direction(u, v):  # type: ignore[no-untyped-def]
 
 @inner
 def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
-    """Return tangent and bitangent (six floats) that make a right-handed frame with a unit normal."""
+    """Return six floats: the tangent and bitangent of a right-handed frame about the unit normal."""
     sign = np.float32(1.0) if nz >= np.float32(0.0) else np.float32(-1.0)
     a = np.float32(-1.0) / (sign + nz)
     b = nx * ny * a
@@ -160,7 +163,9 @@ def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
 
 @inner
 def triangle_barycentric(u, v):  # type: ignore[no-untyped-def]
-    """Map (u, v) of the unit square to barycentrics (b1, b2), uniform in a triangle, with compact strata.
+    """Map (u, v), uniform in the unit square, to barycentrics (b1, b2), uniform in a triangle.
+
+    Compact strata of the square become compact strata of the triangle.
 
     Based on: Heitz, A low-distortion map between triangle and square, 2019.
     """

@@ -1,4 +1,4 @@
-"""Materials of all triangles, as kernels read them."""
+"""The materials of a scene in arrays, from which kernels read base colour, emission and alpha."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from baker.kernels.textures import TexturePack
 
 
 class Shading(NamedTuple):
-    """Materials, textures and vertex colours of M materials, V lightmap vertices and T triangles.
+    """M materials, their textures, and vertex colours; V lightmap vertices and T triangles.
 
     Attributes
     ----------
     pack : TexturePack
         All textures.
     base, emission : (M, 3) float32
-        Factors of base colour, and of emission in cd/m2; linear Rec.709.
+        Base colour factor, and emission factor in cd/m2; linear Rec.709.
     base_texture, emission_texture : (M,) int32
         Number of the texture in `pack`, -1 for none.
     base_uv, emission_uv : (V, 2) float32
-        Image uv of each lightmap vertex, for the material of its triangles; (1, 2) if nothing is textured.
+        Image uv of each lightmap vertex for these textures; (1, 2) if no material has such a texture.
     colour : (V, 3) float32
-        Linear vertex colour; (1, 3) if no mesh has any.
+        Linear vertex colour; (1, 3) if no mesh has vertex colours.
     triangle : (T, 3) int32
-        Lightmap vertices.
+        Lightmap vertices of each triangle.
     material : (T,) int32
+        Material of each triangle.
     alpha : AlphaTable
         Triangles that let light through.
     metallic, roughness : (M,) float32
-        Factors.
+        Factors. Bakes do not read these and the following two arrays.
     reflection_texture : (M,) int32
-        Number of the texture that scales metallic (blue) and roughness (green), -1 for none. Only for
-        reflections: bakes leave the four arrays at their defaults or unused.
+        Number of the texture that scales metallic (blue) and roughness (green), -1 for none.
     reflection_uv : (V, 2) float32
-        Its image uv.
+        Image uv of each lightmap vertex for this texture.
     """
 
     pack: TexturePack

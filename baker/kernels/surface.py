@@ -1,9 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The points of texels, which are ray origins, and the surface they lie on.
+"""The sample points of texels, from which rays start.
 
-Each texel has 16 points. They are uniform in the part of its square that triangles cover, and stratified by
-a scrambled (0,2)-net. Points on low-poly curved surfaces are moved to the smooth surface that the shading
-normals imply (Hanika 2021). Otherwise facets would block each other's rays at the shadow terminator.
+Each texel has 16 points. They are uniformly distributed in the part of its square that triangles cover, and
+stratified by a scrambled (0,2)-net. On low-poly curved surfaces, points are moved to the smooth surface that
+the shading normals imply (Hanika 2021). Otherwise facets would block each other's rays at the shadow
+terminator.
 
 Based on: Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021; Waechter and Binder, A
 fast and robust method for avoiding self-intersection, Ray Tracing Gems, 2019.
@@ -21,55 +22,61 @@ from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygo
 from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
+# Points of a texel.
 N_POINTS = 16
-# Offset of ray origins along the face normal, for a largest coordinate x and a triangle of size s:
-# max(ROUNDING max(x, s), OFFSET min(x, s)). ROUNDING is sixteen steps of float32. Rounding moves an origin
-# and a hit by one step each, and faces that are meant to be coplanar may be a few steps apart.
+# Factors of the offset of ray origins along the face normal. For a largest coordinate x of the point and a
+# triangle of size s, the offset is max(ROUNDING max(x, s), OFFSET min(x, s)). ROUNDING is sixteen relative
+# steps of float32. Rounding moves an origin and a hit by one step each, and faces that are meant to be
+# coplanar may be a few steps apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# Points near the border also move towards the centroid of their triangle: INWARD offsets, at most half way.
+# Distance by which points near the border of their triangle move towards its centroid, as a multiple of the
+# offset. They move at most half way.
 INWARD = 2.0
-# A point is near the border if a barycentric is below this.
+# Barycentric coordinate below which a point is near the border.
 BORDER = 0.01
-# A vertex takes no part in the shadow-terminator offset (Hanika 2021) if the cosine between its normal and
-# the face normal is at most this: it is on a hard edge, not on a smooth surface.
+# Cosine between a vertex normal and the face normal up to which the vertex is left out of the
+# shadow-terminator offset (Hanika 2021). Such a vertex is on a hard edge, not on a smooth surface.
 STEEPEST = 0.7
 _u = np.uint32
-# Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal, and the triangle's size (1).
+# Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal (3 each), triangle size (1).
 _CORNER, _EDGE_1, _EDGE_2, _NORMAL, _SIZE = 0, 1, 2, 3, 4
 _flat_row = scratch((5, 3), np.float64)
 
 
 class Surface(NamedTuple):
-    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` that place points.
+    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` from which points are computed.
+
+    A texel entry is the front of a texel, its back on a double-sided surface, or a further side of a texel
+    that another surface passes through (`radiosity.sides`).
 
     Attributes
     ----------
     position, normal : (V, 3) float32
-        Of lightmap vertices; metres, and unit shading normals.
+        Positions in metres, and unit shading normals, of lightmap vertices.
     uv : (V, 2) float32
         Lightmap uv.
     triangle : (T, 3) int32
-        Lightmap vertices.
+        Lightmap vertices of each triangle.
     face_normal : (T, 3) float32
-        Unit.
+        Unit face normals.
     size : int
         Width and height of a page, texels.
     pixel : (n,) int64
-        Flat pixel of each texel entry.
+        (page * size + row) * size + column of each texel entry.
     front : (n,) int32
-        Front entry of each entry, itself for fronts.
+        Front entry of the same texel.
     back : (n,) bool
-        Whether the entry is the back of a double-sided surface.
+        Whether the entry is on the back of a double-sided surface.
     first : (n_front + 1,) int64
-        Front entry i lies on the triangles entry[first[i]:first[i + 1]], with areas in `entry_area`.
+        Front entry i lies on the triangles `entry[first[i] : first[i + 1]]`.
     entry : (m,) int32
-        Triangle.
+        Triangles.
     entry_area : (m,) float32
-        Area of that triangle in the texel's square, texels.
+        Area of each of these triangles in the texel's square, texels.
     sobol_points : (16, 2) uint32
         Bit-reversed Sobol numbers of the 16 points of a texel.
     min_offset_scale : float32
-        Metres. The term with OFFSET in `offset_step` treats a smaller largest coordinate as this.
+        Lower limit, metres, of the largest coordinate in the OFFSET term of `offset_step`.
     """
 
     position: NDArray[np.float32]
@@ -90,11 +97,11 @@ class Surface(NamedTuple):
 
 @inner
 def inverse_uv(uv, triangle, size, t):
-    """Return the coefficients a to f that map a page position to barycentrics of triangle t.
+    """Return the coefficients a to f of the map from a position in a page to barycentrics of triangle t.
 
-    They are b1 = a x + b y + c and b2 = d x + e y + f, with x and y in texels.
+        b1 = a x + b y + c        b2 = d x + e y + f        x, y: texels
 
-    uv : (V, 2) float32; triangle : (T, 3) int32; size : int, of a page
+    uv : (V, 2) float32; triangle : (T, 3) int32; size : int, width and height of a page, texels
     """
     i0, i1, i2 = triangle[t, 0], triangle[t, 1], triangle[t, 2]
     ax, ay = float(uv[i0, 0]) * size, float(uv[i0, 1]) * size
@@ -111,9 +118,9 @@ def inverse_uv(uv, triangle, size, t):
 
 @inner
 def offset_step(x, y, z, size, min_offset_scale):
-    """Return the offset of a ray origin at (x, y, z) from its triangle, metres; see `OFFSET`.
+    """Return the distance of a ray origin from its triangle at (x, y, z), metres; see `OFFSET`.
 
-    size : largest edge component of the triangle, metres; min_offset_scale : see `Surface`
+    size : largest component of the triangle's edges 1 and 2, metres; min_offset_scale : see `Surface`
     """
     far = larger(larger(abs(x), abs(y)), abs(z))
     return larger(ROUNDING * larger(far, size), OFFSET * smaller(larger(far, min_offset_scale), size))
@@ -145,8 +152,8 @@ def place_point(
     sign = -1.0 if flip else 1.0
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     facing = nx * fx + ny * fy + nz * fz
-    # If the shading normal is zero or points to the other side, use the face normal. Otherwise lift the point
-    # towards the tangent planes of the vertices that it is below, weighted by barycentrics (Hanika 2021).
+    # If the shading normal is zero or points to the other side, use the face normal. Otherwise move the point
+    # towards the tangent planes of the vertices below which it lies, weighted by barycentrics (Hanika 2021).
     lx = ly = lz = 0.0
     if length < 1.0e-6 or facing <= 0.0:
         nx, ny, nz, length = fx, fy, fz, 1.0
@@ -176,8 +183,8 @@ def place_point(
     step = offset_step(px, py, pz, size, min_offset_scale)
     away = sign * step
     if smaller(smaller(b0, b1), b2) < BORDER:
-        # Also move the point along the face: where a wall meets the border of the face, rounding may put a
-        # point on the border behind the wall.
+        # Also move the point along the face. Where a wall meets the border of the face, rounding may
+        # otherwise place a point on the border behind the wall.
         mx = (position[i0, 0] + position[i1, 0] + position[i2, 0]) / 3.0 - px
         my = (position[i0, 1] + position[i1, 1] + position[i2, 1]) / 3.0 - py
         mz = (position[i0, 2] + position[i1, 2] + position[i2, 2]) / 3.0 - pz
@@ -196,9 +203,9 @@ def place_point(
 
 @inner
 def load_flat(position, shading, face, triangle, t, sign, row):
-    """Write the row that `place_flat_point` reads; return whether triangle t is flat.
+    """Write the data of triangle t for `place_flat_point`; return whether the triangle is flat.
 
-    It is flat if the shading normals of its vertices equal its face normal.
+    A triangle is flat if the shading normals of its vertices equal its face normal.
 
     position, shading : (V, 3) float32, metres, and unit shading normals; face : (T, 3) float32, face normals
     triangle : (T, 3) int32; sign : 1 for the front, -1 for the back
@@ -222,7 +229,7 @@ def load_flat(position, shading, face, triangle, t, sign, row):
 
 @inner
 def place_flat_point(row, min_offset_scale, b1, b2, origin, normal, n, k):
-    """Do the same as `place_point` for a point inside a flat triangle, away from its border.
+    """Write the same output as `place_point` for a point of a flat triangle that is not near the border.
 
     row : (5, 3) float64, from `load_flat`; min_offset_scale : see `Surface`
     origin, normal : (N, K, 3) float32 output, items [n, k] are set; metres, and unit
@@ -240,21 +247,21 @@ def place_flat_point(row, min_offset_scale, b1, b2, origin, normal, n, k):
 
 @kernel
 def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_triangle, bary):
-    """Write points of texel entries.
+    """Write ray origins and shading normals of w points of each of m texel entries.
 
     surface : Surface
-    valid_points : (n,) uint16, bit k is set where point k of a texel is not inside geometry; another point of
-        the texel, if it has a valid one, replaces an invalid point
+    valid_points : (n,) uint16, bit k is set where point k of an entry is valid; an invalid point is replaced
+        by a valid point of the same entry, if it has any
     chosen : (m,) int64, entries
-    wanted : (m, w) uint8, numbers of the points to write for each entry; (1, w) if they are the same for all
+    wanted : (m, w) uint8, numbers 0 to 15 of the points of each entry; (1, w): the same for all entries
     origin, normal : (m, w, 3) float32 output, metres, world, and unit
-    hit_triangle : (m, w) int32 output, triangle that each point lies on; with shape (0, w), neither it nor
-        `bary` is written
-    bary : (m, w, 2) float32 output, barycentrics b1 and b2 on it
+    hit_triangle : (m, w) int32 output, triangle on which each point lies; with shape (0, w), `hit_triangle`
+        and `bary` are not written
+    bary : (m, w, 2) float32 output, barycentrics b1 and b2 of each point on its triangle
     """
     corner, cut, spare, flat_row = new_triangle(), new_polygon(), new_polygon(), _flat_row()
     located = len(hit_triangle) > 0
-    # Take the arrays out of the tuple once: each access costs an atomic reference count.
+    # Unpack the tuple once, because each access to an array in it costs an atomic reference count.
     position, shading, face = surface.position, surface.normal, surface.face_normal
     uv, triangle, sobol_points = surface.uv, surface.triangle, surface.sobol_points
     pixels, fronts, back = surface.pixel, surface.front, surface.back
@@ -268,7 +275,7 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
     sign = 1.0
     whole = flat = False
     for n in range(len(chosen)):
-        # Prepare an entry: its pixel, seeds, covered area, and the triangle if it is the only one.
+        # Load the entry's pixel, seeds and covered area, and its triangle if there is only one.
         i = chosen[n]
         if n == 0 or i != chosen[n - 1]:
             pixel = pixels[i]
@@ -288,14 +295,14 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
             sign = -1.0 if back[i] else 1.0
             flat = whole and load_flat(position, shading, face, triangle, t, sign, flat_row)
         for w in range(wanted.shape[1]):
-            # Choose the point of the unit square.
+            # Compute the point of the unit square.
             k = valid_point(valid_points[i], wanted[0 if same else n, w])
             u = texel_scramble(sobol_points[k, 0], seed_x, full)
             v = texel_scramble(sobol_points[k, 1], seed_y, full)
             x = float(u)
             y = float(v)
             if not whole:
-                # Choose a triangle by area, and a point of its part inside the texel.
+                # Choose a triangle in proportion to its area in the texel, and a point in this area.
                 e = first
                 done = 0.0
                 while e < last - 1 and u * total >= done + entry_area[e]:
@@ -314,7 +321,7 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
                     x, y = cut[0, 0], cut[0, 1]
                 else:
                     x, y = polygon_point(cut, m, smaller(larger((u * total - done) / inside, 0.0), 1.0), v)
-            # Place it on the triangle.
+            # Compute the ray origin on the triangle.
             x += x0
             y += y0
             b1 = a * x + b * y + c
@@ -345,9 +352,9 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
 
 @inner
 def valid_point(bits, k):
-    """Return k if bit k is set or none is; else the number of another set bit.
+    """Return k if bit k of `bits` is set or no bit is set.
 
-    Of n set bits, counted from 0, it takes bit k % n.
+    Otherwise return the number of set bit k % n, where the n set bits are counted from 0.
     """
     bits = np.int64(bits)
     k = np.int64(k)

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Centre, normal, area and albedo of texels, from the triangles inside their squares."""
+"""Centroid, position, normal, area and albedo of texels, from the triangles inside their squares."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ _shares = scratch((N_POINTS,), np.float64)
 
 @kernel
 def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position, normal):
-    """Write area, centroid, position and normal of front entries `begin` to `end`.
+    """Write area, centroid, position and normal of front texels `begin` to `end` - 1.
 
-    surface : Surface; triangle_scale : (T,) float32, m2 of surface per texel of area
-    area : (n,) float32 output, m2
-    centroid : (n, 2) float32 output, of the covered part of the square, texels from its centre
-    position, normal : (n, 3) float32 output, metres, world, and unit: the point at the centroid, on the
-        triangle with the largest part
+    surface : Surface; triangle_scale : (T,) float32, m2 per texel of each triangle
+    area : (n,) float32 output, m2 of surface inside the texel
+    centroid : (n, 2) float32 output, centroid of the covered part of the texel's square, texels from its
+        centre
+    position, normal : (n, 3) float32 output, metres, world, and unit; at the centroid, on the triangle with
+        the largest area in the texel
     """
     corner, cut, spare, point, facing = new_triangle(), new_polygon(), new_polygon(), _vector(), _vector()
     for i in range(begin, end):
         rest = surface.pixel[i] % (surface.size * surface.size)
         x0 = rest % surface.size
         y0 = rest // surface.size
-        # Sum area and first moment of the triangles' parts; find the largest part.
+        # Sum area and first moment of the triangles inside the square, and find the triangle of largest area.
         total = metres = cx = cy = 0.0
         main = surface.entry[surface.first[i]]
         most = -1.0
@@ -58,7 +59,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
         centroid[i, 0] = cx / total - 0.5
         centroid[i, 1] = cy / total - 0.5
         area[i] = metres
-        # Place the centroid on the triangle with the largest part.
+        # Compute position and normal at the centroid, on that triangle.
         a, b, c, d, g, h = inverse_uv(surface.uv, surface.triangle, surface.size, main)
         x, y = x0 + cx / total, y0 + cy / total
         place_point(
@@ -83,9 +84,9 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
 
 @inner
 def _centroid(polygon, n):
-    """Return the area centroid of a convex polygon, the mean of its corners if it has no area.
+    """Return the centroid of a convex polygon of n corners, or the mean of the corners if it has no area.
 
-    polygon : (MAX_CORNERS, 2) float64, of which the first n count
+    polygon : (MAX_CORNERS, 2) float64; rows from n on are ignored
     """
     total = polygon_area(polygon, n)
     x = y = 0.0
@@ -108,9 +109,9 @@ def _centroid(polygon, n):
 
 @inner
 def uv_at(uv, triangle, t, b1, b2):
-    """Interpolate uv at barycentrics (b1, b2) of triangle t.
+    """Return u, v at barycentrics (b1, b2) of triangle t.
 
-    uv : (V, 2) float32, by vertex; triangle : (T, 3) int32
+    uv : (V, 2) float32, of each vertex; triangle : (T, 3) int32
     """
     b0 = 1.0 - b1 - b2
     i, j, k = triangle[t, 0], triangle[t, 1], triangle[t, 2]
@@ -119,9 +120,9 @@ def uv_at(uv, triangle, t, b1, b2):
 
 @inner
 def texel_footprint(surface, image_uv, t):
-    """Return the width in image uv of a sixteenth of a texel's area, the share of each of its points.
+    """Return the side, in image uv, of a square with 1/16 of a texel's area, the share of each sample point.
 
-    surface : Surface; image_uv : (V, 2) float32, by vertex; t : triangle
+    surface : Surface; image_uv : (V, 2) float32, of each vertex; t : triangle
     """
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
     lightmap = abs(
@@ -137,12 +138,12 @@ def texel_footprint(surface, image_uv, t):
 
 @kernel
 def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
-    """Write the mean base colour of front entries `begin` to `end`, weighted by opacity.
+    """Write the mean base colour of front texels `begin` to `end` - 1, weighted by opacity.
 
     surface : Surface; shading : Shading
-    valid_points : (n,) uint16, all bits set
+    valid_points : (n,) uint16, all bits set, so that all 16 points are used
     albedo : (n, 3) float32 output, linear Rec.709
-    area : (n,) float32, m2, multiplied by the mean opacity
+    area : (n,) float32, m2, multiplied in place by the mean opacity
     """
     origin, normal, hit, bary = _vectors(), _vectors(), _triangles(), _barycentrics()
     rgba, every, chosen, share = _rgba(), _every(), _chosen(), _shares()
@@ -152,7 +153,7 @@ def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
     coloured = len(shading.colour) > 1
     any_alpha = len(shading.alpha.slot) > 0
     for i in range(begin, end):
-        # One material without texture, vertex colours and alpha: its factor is the albedo.
+        # If the texel has a single material without texture, vertex colours and alpha, copy its factor.
         first = shading.material[surface.entry[surface.first[i]]]
         untextured = not coloured
         for e in range(surface.first[i], surface.first[i + 1]):
@@ -164,7 +165,7 @@ def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
             for c in range(3):
                 albedo[i, c] = shading.base[first, c]
             continue
-        # Else average over the points of the texel.
+        # Otherwise average over the points of the texel.
         chosen[0] = i
         place_points(surface, valid_points, chosen, every, origin, normal, hit, bary)
         for c in range(3):
@@ -175,7 +176,7 @@ def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
                 share[k] = opacity_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
                 total += share[k]
             area[i] *= total / N_POINTS
-            # A texel without any opacity gets the unweighted mean.
+            # Use the unweighted mean if the opacity is 0 at all points.
             for k in range(N_POINTS):
                 share[k] = share[k] * N_POINTS / total if total > 0.0 else 1.0
         for k in range(N_POINTS):

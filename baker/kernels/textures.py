@@ -1,6 +1,6 @@
-"""Material textures packed for kernels: mip pyramids in one flat array, bilinear or nearest lookups.
+"""Material textures for kernels: mip pyramids in one flat array, with bilinear or nearest lookups.
 
-Colours are averaged in linear light when the pyramid is made.
+The levels of a pyramid are averages of linear colours.
 Based on: Williams, Pyramidal parametrics, 1983; IEC 61966-2-1 (the sRGB curve).
 """
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from baker.core.colour import linear_from_srgb
 from baker.trace.jit import inner, larger, smaller
 
+# Largest number of mip levels of a texture.
 MAX_LEVELS = 16
 # Columns of `TexturePack.level`, of `.wrap`, and the alpha channel of pixels.
 OFFSET, WIDTH, HEIGHT = 0, 1, 2
@@ -217,7 +218,7 @@ def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @inner
 def wrapped(i, n, mode):  # type: ignore[no-untyped-def]
-    """Return the column or row 0 to n - 1 that texel i is read from; mode: see `TexturePack.wrap`."""
+    """Return the column or row, 0 to n - 1, for any integer i under a wrap mode, see `TexturePack.wrap`."""
     if mode == _REPEAT:
         return i % n
     if mode == _MIRROR:
@@ -267,14 +268,14 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
     """Write the linear RGBA of texture k at (u, v).
 
     pack : TexturePack
-    footprint : width to average over, in uv of the whole image; it selects the mip level
+    footprint : width of the averaged area in uv, which selects the mip level
     out : (4,) float64 output
     """
-    # Select the level whose texels are nearest in size to the footprint.
+    # Select the level whose texel width is nearest to the footprint.
     width = larger(pack.level[k, 0, WIDTH], pack.level[k, 0, HEIGHT])
     n = 0
     if footprint * width > 1.0:
-        # Take the minimum of floats: an infinite footprint has no integer level.
+        # Take the minimum before the conversion to int, because the footprint may be infinite.
         n = int(smaller(math.log2(footprint * width) + 0.5, float(pack.n_levels[k] - 1)))
     offset, w, h = pack.level[k, n, OFFSET], pack.level[k, n, WIDTH], pack.level[k, n, HEIGHT]
     storage = pack.wrap[k, STORAGE] if n == 0 else FLOATS

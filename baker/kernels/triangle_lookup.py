@@ -1,5 +1,7 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The triangle table of a bake: one cache line a triangle, and the lookup from a hit to a lightmap texel.
+"""The triangle table of a bake, and the lookup from a hit to a lightmap texel.
+
+The table has one cache line (64 bytes) per triangle.
 
 Every surface blocks light from both sides; the back of a one-sided surface is black.
 """
@@ -16,32 +18,32 @@ from baker.trace.jit import inner, larger, smaller
 # Columns of `TriangleLookup.row`:
 #
 #     UV                     lightmap uv of corner 0 (2)
-#     UV_EDGE_1, UV_EDGE_2   uv of corners 1 and 2 minus that of corner 0 (2 each)
+#     UV_EDGE_1, UV_EDGE_2   uv of corner 1 and of corner 2, minus uv of corner 0 (2 each)
 #     PAGE                   page of the atlas, a whole number
-#     DOUBLE_SIDED           1 if the back has texels of its own, else 0
+#     DOUBLE_SIDED           1 if the back has texel entries, else 0
 #     FACE_NORMAL            unit normal of the front, world (3)
 #     FACE_AREA              m2
 #     EMITTER                code of the triangle's emitters, see `emitters.emitter_at`; -1 for none
-#     MATERIAL               a whole number
+#     MATERIAL               number of the material, a whole number
 UV, UV_EDGE_1, UV_EDGE_2, PAGE, DOUBLE_SIDED = 0, 2, 4, 6, 7
 FACE_NORMAL, FACE_AREA, EMITTER, MATERIAL = 8, 11, 12, 13
-# Two columns are unused: a row is 64 bytes.
+# A row has 64 bytes; the last two columns are unused.
 ROW_LENGTH = 16
 # Return value of `hit_pixel` for the black back of a one-sided surface.
 BACK_FACE = -1
 
 
 class TriangleLookup(NamedTuple):
-    """Data of a triangle that a hit needs.
+    """Data of T triangles that kernels read at hits.
 
     Attributes
     ----------
     row : (T, 16) float32
-        One row a triangle, see the column names.
+        One row per triangle, see the column names.
     size : int
         Width and height of a page, texels.
     n_pixels : int
-        Pixels of all pages. The back of pixel p is number p + n_pixels.
+        Number of pixels of all pages. The back of pixel p has the number p + n_pixels.
     """
 
     row: NDArray[np.float32]
@@ -49,8 +51,8 @@ class TriangleLookup(NamedTuple):
     n_pixels: int
 
 
-# The functions below take the arrays of `TriangleLookup` one by one: passing a tuple of arrays to a function
-# costs Numba an atomic reference count for each array and call, which tripled the time of a hit.
+# The functions below take the fields of `TriangleLookup` as separate arguments. Passing the tuple would cost
+# an atomic reference count for each array and call, which tripled the time per hit.
 @inner
 def front_facing(row, prim, dx, dy, dz):
     """Return whether a ray of direction (dx, dy, dz) hits the front of triangle `prim`.
@@ -64,10 +66,12 @@ def front_facing(row, prim, dx, dy, dz):
 
 @inner
 def hit_pixel(row, size, n_pixels, prim, u, v, front):
-    """Return the flat pixel at barycentrics (u, v) of triangle `prim`, or BACK_FACE.
+    """Return the number of the pixel at barycentrics (u, v) of triangle `prim`.
 
     row : (T, 16) float32; size, n_pixels : int, see `TriangleLookup`
-    front : whether the front was hit; n_pixels is added for the back of a double-sided triangle
+    front : whether the ray hit the front
+    Returns (page * size + row) * size + column, plus n_pixels on the back of a double-sided triangle, or
+    BACK_FACE on the back of a one-sided triangle.
     """
     if not front and row[prim, DOUBLE_SIDED] == np.float32(0.0):
         return np.int64(BACK_FACE)

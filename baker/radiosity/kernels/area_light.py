@@ -221,7 +221,7 @@ def light_samples(
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
     # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque. The
-    # early- out tests find occluders with alpha.
+    # early-out tests find the other triangles with alpha, which are occluders.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)
