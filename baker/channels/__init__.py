@@ -1,1 +1,1 @@
-"""Plugins: quantities that can be baked, one channel a file."""
+"""Channels: the quantities that can be baked; each file registers one channel."""

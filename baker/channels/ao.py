@@ -1,6 +1,8 @@
-"""Ambient occlusion: the cosine-weighted share of the hemisphere without a hit within a distance.
+"""Ambient occlusion: the cosine-weighted share of the hemisphere without a hit within a distance r.
 
-AO = 1/pi integral over the hemisphere of V(w, r) cos(theta) dw        1 = open, 0 = closed
+    AO = 1/pi integral over the hemisphere of V(w, r) cos(theta) dw
+
+V(w, r) is 1 if nothing is hit in direction w within r, else 0. AO is 1 if unoccluded, 0 if fully occluded.
 """
 
 from __future__ import annotations
@@ -11,12 +13,13 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 
 
 def ao_layers(transport: Transport) -> tuple[Layer, ...]:
-    """Return ambient occlusion as one layer with a binomial error."""
+    """Return ambient occlusion as a single layer, with the standard error of a binomial distribution."""
     share = transport.ambient_occlusion
     if share is None:
         raise ValueError("the ao channel needs ambient occlusion")
-    # Rays are stratified: the binomial error is an upper bound, measured as 2 to 5 times the real one. Half a
-    # ray is added to hits and misses, so that it stays above 0 at 0 and 1.
+    # Compute the binomial standard error. It is an upper bound, measured as 2 to 5 times the true error,
+    # because rays are stratified. Half a ray is added to hits and to misses, so that the error is not 0 at AO
+    # = 0 or 1.
     n = max(transport.ao_samples, 1)
     bounded = (share.astype(np.float64) * n + 0.5) / (n + 1.0)
     error = np.sqrt(bounded * (1.0 - bounded) / n).astype(np.float32)

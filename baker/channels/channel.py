@@ -1,4 +1,4 @@
-"""The interface of channels: a channel is a map that is computed from the light transport of all texels."""
+"""The interface of channels. A channel computes a map from the results of light transport at all texels."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from baker.core.lightmap import ChannelDescription, Lightmap
 from baker.core.registry import Registry
 
 if TYPE_CHECKING:
-    # Not at run time: the registry is also read where no kernels are needed.
+    # Do not import these at run time, because the registry is also read by code that needs no kernels.
     from baker.radiosity.direct import DirectLight
     from baker.radiosity.final_gather import Gathered
 
 
 @dataclass(frozen=True)
 class Transport:
-    """Results of the ray stages for the front texels; None where no channel needs them.
+    """Results of light transport for the n_front front texels. A result that no channel needs is None.
 
     Attributes
     ----------
     direct : DirectLight or None
+        Direct light of all texel entries; the first n_front entries are the front texels.
     gathered : Gathered or None
+        Light that the final gather found.
     ambient_occlusion : (n_front,) float32 or None
-        Cosine-weighted share of the hemisphere without a hit within the AO distance, 1 = open.
+        Cosine-weighted share of the hemisphere without a hit within the AO distance; 1 is unoccluded.
     ao_samples : int
-        Rays per value of `ambient_occlusion`.
+        Number of rays for each value of `ambient_occlusion`.
     gap : (n_front,) bool or None
-        Texels in a gap about a texel wide.
+        True for texels in a gap about a texel wide.
     """
 
     direct: DirectLight | None = None
@@ -43,18 +45,19 @@ class Transport:
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of a map that is denoised separately; a map is the sum of its layers.
+    """A part of a map that is denoised separately. A map is the sum of its layers.
 
     Attributes
     ----------
     value : (n_front, C) float32
-    error : (n_front,) float32, or (n_front, G) float32
-        Standard error of the mean of each of the channel's G groups of components (`Channel.groups`); one
-        column is the error of each group. A channel of one group may leave the second axis out.
+        The C components of the channel at each front texel.
+    error : (n_front, G), (n_front, 1) or (n_front,) float32
+        Standard error of the mean of the components in each of the channel's G groups (`Channel.groups`). One
+        column, or one axis, is the error of every group.
     bound : bool
-        Whether that is an upper bound, perhaps a loose one.
+        Whether `error` is an upper bound, which may be several times the true error.
     kept : (n_front,) bool or None
-        Texels that are not denoised.
+        True for texels that are not denoised.
     """
 
     value: NDArray[np.float32]
@@ -65,17 +68,18 @@ class Layer:
 
 @dataclass(frozen=True, kw_only=True)
 class Channel(ChannelDescription):
-    """A kind of map.
+    """A quantity that can be baked.
 
     Attributes
     ----------
     lower, upper : float
-        Smallest and largest possible value; `lower` is negative for signed channels.
+        Smallest and largest possible value. `lower` is negative for signed channels.
     needs_light : bool
-        Whether it reads `direct`, `gathered` and `gap` of `Transport`.
+        Whether `layers` reads `direct`, `gathered` and `gap` of `Transport`.
     needs_ambient_occlusion : bool
-        Whether it reads `ambient_occlusion` and `ao_samples` of `Transport`.
-    layers : function from `Transport` to its layers
+        Whether `layers` reads `ambient_occlusion` and `ao_samples` of `Transport`.
+    layers : function of Transport
+        Returns the layers of the map.
     """
 
     lower: float = 0.0
@@ -85,7 +89,7 @@ class Channel(ChannelDescription):
     layers: Callable[[Transport], tuple[Layer, ...]]
 
     def __post_init__(self) -> None:
-        """Refuse bounds that contradict `signed`."""
+        """Raise ValueError if `lower` contradicts `signed`."""
         if self.signed != (self.lower < 0.0):
             raise ValueError("a channel is signed if and only if its lower bound is negative")
 
@@ -94,7 +98,7 @@ CHANNELS: Registry[Channel] = Registry("baker.channels")
 
 
 def chosen_channels(names: tuple[str, ...]) -> dict[str, Channel]:
-    """Look channels up.
+    """Return the channels with the given names.
 
     Parameters
     ----------
@@ -104,30 +108,30 @@ def chosen_channels(names: tuple[str, ...]) -> dict[str, Channel]:
     Returns
     -------
     dict of str to Channel
-        In the order of `names`.
+        Channels by name, in the order of `names`.
 
     Raises
     ------
     SettingsError
-        If there is no channel of a name.
+        If a name is not registered.
     """
     return {name: CHANNELS.require(name, "channel", setting="channels") for name in names}
 
 
 def make_lightmap(name: str, value: NDArray[np.float32]) -> Lightmap:
-    """Make the map of a registered channel.
+    """Make a lightmap from pages and the description of a registered channel.
 
     Parameters
     ----------
     name : str
         Registered name of the channel.
     value : (P, H, W, C) float32
-        Finished pages, in the unit of the channel.
+        P pages of C components, in the unit of the channel.
 
     Returns
     -------
     Lightmap
-        With the description of the channel.
+        The pages with name and description of the channel.
     """
     channel = CHANNELS.require(name, "channel", setting="channels")
     fields = {key: getattr(channel, key) for key in ChannelDescription.__dataclass_fields__}

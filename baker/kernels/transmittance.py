@@ -1,19 +1,20 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Transmittance of BLEND surfaces along rays.
+"""Transmittance of BLEND surfaces along rays, for R, G and B.
 
-    T = (1 - a) lerp(1, c, a)        a: alpha, c: colour of the surface
+    T = (1 - a) lerp(1, c, a)                           a: alpha
+    c = clamp(factor * texture * vertex colour, 0, 1)   colour of the surface
 
-Shadow rays: the filter function multiplies T at each surface on the way (`alpha_filter`).
+Along a shadow ray, the filter function of Embree multiplies the T of all surfaces that the ray crosses
+(`alpha_filter`).
 
-Rays to the first hit: at each hit the filter function lets the ray pass with probability 1 - a, and the light
-of one that passed is multiplied by lerp(1, c, a). Embree reports hits in no particular order, some of them
-beyond the first hit. So the colours are multiplied along a second ray, which ends where the first one did, in
-a second tree that holds the BLEND triangles only.
+A ray to its first hit passes each BLEND surface with probability 1 - a. Its light is then multiplied by
+lerp(1, c, a) for each surface that it passed. Embree calls the filter function for hits in any order,
+including hits beyond the first hit. Therefore the colours are multiplied along a second ray, which ends at
+the first hit of the first ray. The second ray is traced in a second tree that contains only the BLEND
+triangles.
 
-    c = factor * texture(base uv) * vertex colour, each clamped to [0, 1]
-
-Kernels call these functions with `blend`, a `BlendBuffers`, or None in scenes without BLEND surfaces: Numba
-then compiles them to nothing.
+The argument `blend` of these functions is a `BlendBuffers`, or None in scenes without BLEND surfaces. With
+None, Numba compiles the functions to nothing.
 """
 
 from __future__ import annotations
@@ -44,23 +45,23 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of a row: those of `alpha`, then factor times vertex colour: at corner 0, and at corners 1 and 2
-# minus that (3 each).
+# Columns of a row after the columns of `AlphaTable.row`: factor times vertex colour, RGB, at corner 0; the
+# values at corner 1 and at corner 2, minus the value at corner 0 (3 each).
 COLOUR, COLOUR_EDGE_1, COLOUR_EDGE_2 = 12, 15, 18
 ROW_LENGTH = 21
 
 
 class TransmittanceTable(NamedTuple):
-    """The K BLEND triangles that let light through.
+    """The K BLEND triangles that let light through and whose alpha is above 0 somewhere.
 
     Attributes
     ----------
     slot : (T,) int32
-        Row of each triangle of the scene, -1 for the others.
+        Row in `row` of each triangle of the scene, -1 for all other triangles.
     row : (K, 21) float32
-        See the column names.
+        Data of the K triangles, see the column names.
     coloured : bool
-        Whether any of them is not white.
+        Whether the colour c of any of them is not white.
     """
 
     slot: NDArray[np.int32]
@@ -74,18 +75,18 @@ def no_transmittance() -> TransmittanceTable:
     Returns
     -------
     TransmittanceTable
-        Without rows.
+        Arrays of length 0.
     """
     return TransmittanceTable(np.zeros(0, np.int32), np.zeros((0, ROW_LENGTH), np.float32))
 
 
 @inner
 def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, spare_on, spare):
-    """Trace sixteen shadow rays; `transmittance` then returns T of those that are not blocked.
+    """Trace sixteen shadow rays. `transmittance` then returns the product of T along each unblocked ray.
 
-    blend, scene, width, query : of `PacketBuffers`; function : its `occluded`
+    blend, scene, width, query : fields of `PacketBuffers`; function : `PacketBuffers.occluded`
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
-    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     if blend is None:
         trace_lanes(function, scene, width, query, on, rays, spare_on, spare)
@@ -100,10 +101,10 @@ def trace_shadow_lanes(blend, function, scene, width, query, on, rays, words, sp
 
 @inner
 def trace_shadow_packet(blend, function, scene, width, on, packet):
-    """Do the same for one packet, in place.
+    """Trace the shadow rays of one packet of the native width, see `trace_shadow_lanes`.
 
-    blend, scene, width : of `PacketBuffers`, width at most 16; function : its `occluded`
-    on : (width,) int32; packet : (12 * width or more,) float32
+    blend, scene, width : fields of `PacketBuffers`, width at most 16; function : `PacketBuffers.occluded`
+    on : (width,) int32; packet : (12 * width or more,) float32, changed in place
     """
     if blend is None:
         call_embree(function, on, scene, packet)
@@ -119,7 +120,7 @@ def trace_shadow_packet(blend, function, scene, width, on, packet):
 
 @inner
 def reset_transmittance(blend):
-    """Set the transmittance of sixteen rays to 1, and forget the edges they met."""
+    """Set the transmittance of sixteen rays to 1, and delete the edge hits stored for them."""
     colour, edges = blend.transmittance, blend.edges
     for j in range(3 * PACKET_WIDTH):
         colour[j] = _f(1.0)
@@ -129,7 +130,7 @@ def reset_transmittance(blend):
 
 @inner
 def filter_colour_at(row, k, pack, b1, b2, rgba, out):
-    """Write lerp(1, c, a) of row k at barycentrics (b1, b2), and return a.
+    """Write lerp(1, c, a) of the triangle in row k at barycentrics (b1, b2); return alpha a.
 
     row : (K, 21) float32, see `TransmittanceTable`; pack : TexturePack
     rgba : (4,) float64, working memory; out : (3,) float32 output
@@ -150,12 +151,13 @@ def filter_colour_at(row, k, pack, b1, b2, rgba, out):
 
 @inner
 def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare):
-    """Find the colours that sixteen rays have passed; `transmittance` then returns them.
+    """Compute the product of lerp(1, c, a) along sixteen traced rays, which `transmittance` then returns.
 
-    blend, width : of `PacketBuffers`; function : its `occluded`
-    on, rays : (16,) int32 and (21 * 16,) float32, the lanes as they were traced
-    hits : `rays` as uint32 if they were traced to their first hit, None if to any
-    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    blend, width : fields of `PacketBuffers`; function : `PacketBuffers.occluded`
+    on, rays : (16,) int32 and (21 * 16,) float32, the packet after tracing
+    hits : uint32 view of `rays` if the rays were traced to their first hits, None if they were traced to any
+        hit
+    spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     if blend is None:
         return
@@ -166,7 +168,7 @@ def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare)
     for lane in range(PACKET_WIDTH):
         stop[lane] = NO_HIT
         if hits is not None and hits[GEOM_ID * PACKET_WIDTH + lane] != NO_HIT:
-            # The light starts at this hit: it did not pass the surface.
+            # Exclude the triangle that was hit: the light starts on it and does not pass it.
             stop[lane] = hits[PRIM_ID * PACKET_WIDTH + lane]
     _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, 0)
 
@@ -175,8 +177,9 @@ def trace_transmittance(blend, function, width, on, rays, hits, spare_on, spare)
 def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number):
     """Call `_trace_blend` for sixteen rays, in packets of the native width.
 
-    on : (16,) int32; rays : (21 * 16,) float32; number : 0 or PASSES, see `packets`
-    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    on : (16,) int32; rays : (21 * 16,) float32
+    number : 0 to multiply by lerp(1, c, a), PASSES to multiply by T
+    spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     for first in range(0, PACKET_WIDTH, width):
         some = False
@@ -194,11 +197,11 @@ def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number
 
 @inner
 def trace_transmittance_packet(blend, function, width, on, packet, hits):
-    """Do the same for one packet, in place.
+    """Compute the transmittance for one packet of the native width, see `trace_transmittance`.
 
-    blend, width : of `PacketBuffers`, width at most 16; function : its `occluded`
-    on : (width,) int32; packet : (12 * width or more,) float32
-    hits : whether it was traced to first hits
+    blend, width : fields of `PacketBuffers`, width at most 16; function : `PacketBuffers.occluded`
+    on : (width,) int32; packet : (12 * width or more,) float32, the packet after tracing; changed in place
+    hits : bool, whether the rays were traced to their first hits
     """
     if blend is None:
         return
@@ -217,8 +220,10 @@ def trace_transmittance_packet(blend, function, width, on, packet, hits):
 def _trace_blend(blend, function, width, on, packet, first):
     """Trace a packet against the BLEND triangles.
 
-    The filter function multiplies the transmittance of rays `first` and on, and rejects every hit.
+    The filter function multiplies the transmittance of each ray at each hit, and rejects the hit.
+
     on : (width,) int32; packet : (12 * width or more,) float32
+    first : number of the packet's first ray among the sixteen, plus 0 or PASSES, see `_trace_blend_lanes`
     """
     words = packet.view(np.uint32)
     for lane in range(width):
@@ -230,7 +235,7 @@ def _trace_blend(blend, function, width, on, packet, first):
 
 @inner
 def gather_turns(blend):
-    """Return how often each gather ray is traced, see `trace_gather`."""
+    """Return how many times each gather ray is traced, see `trace_gather`."""
     return 1 if blend is None else 2
 
 
@@ -238,12 +243,14 @@ def gather_turns(blend):
 def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):
     """Trace sixteen gather rays to their first hit.
 
-    With BLEND surfaces each ray is traced twice. In turn 0 it stops at them with probability alpha, which
-    samples the light from these surfaces. In turn 1 it passes all of them (where alpha < 1), and the light of
-    its hit is multiplied by T.
-    blend, scene, width, query : of `PacketBuffers`; intersect : its `intersect`
+    In scenes with BLEND surfaces, each ray is traced twice. In turn 0 the ray stops at each BLEND surface
+    with probability alpha; hits on BLEND surfaces sample the light that these surfaces reflect. In turn 1 the
+    ray passes all BLEND surfaces where alpha < 1, and the light of its hit is multiplied by T of these
+    surfaces.
+
+    blend, scene, width, query, intersect : fields of `PacketBuffers`; turn : 0 or 1
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
-    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     if blend is None:
         trace_lanes(intersect, scene, width, query, on, rays, spare_on, spare)
@@ -255,9 +262,9 @@ def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, s
 
 @inner
 def set_blend_rule(blend, words, number):
-    """Set the treatment of BLEND surfaces by sixteen rays: their ID row.
+    """Write the ID row of sixteen rays, which determines where they stop at BLEND surfaces (see `packets`).
 
-    blend : BlendBuffers or None; nothing is done for None
+    blend : BlendBuffers, or None: nothing is written
     words : (21 * 16,) uint32, the packet; number : uint32, 0, `packets.UNAWARE` or `packets.SOLID`
     """
     if blend is None:
@@ -268,9 +275,9 @@ def set_blend_rule(blend, words, number):
 
 @inner
 def any_stopped(blend, words):
-    """Return whether any of sixteen rays ended at a BLEND surface; True without such surfaces.
+    """Return whether any of sixteen rays ended at a BLEND surface; True if `blend` is None.
 
-    words : (21 * 16,) uint32, the packet
+    words : (21 * 16,) uint32, the packet after tracing
     """
     if blend is None:
         return True
@@ -282,13 +289,16 @@ def any_stopped(blend, words):
 
 @inner
 def trace_gather_transmittance(blend, turn, function, width, on, rays, words, spare_on, spare):
-    """Find the factors of the light that gather rays find in a turn, see `transmittance`.
+    """Compute the RGB factors of the light of sixteen gather rays, which `transmittance` then returns.
 
-    Turn 0: the colours passed before it for a ray that stopped at a BLEND surface, 0 for the others.
-    Turn 1: the transmittance of all BLEND surfaces on the way for the others, 0 for those.
-    blend, width : of `PacketBuffers`; function : its `occluded`
+    In turn 0, the factor of a ray that stopped at a BLEND surface is the product of lerp(1, c, a) of the
+    surfaces that it passed before. All other rays have the factor 0. In turn 1, rays that stopped at a BLEND
+    surface have the factor 0. The factor of all other rays is the product of T of all BLEND surfaces that
+    they passed.
+
+    blend, width : fields of `PacketBuffers`; turn : 0 or 1; function : `PacketBuffers.occluded`
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
-    spare_on, spare : packet memory of the native width, of `PacketBuffers`
+    spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     if blend is None:
         return
@@ -306,7 +316,7 @@ def trace_gather_transmittance(blend, turn, function, width, on, rays, words, sp
 
 @inner
 def transmittance(blend, c, lane):
-    """Return the transmittance of channel c along a lane's ray, after it was traced."""
+    """Return the transmittance of colour channel c along the traced ray of a lane; 1 if `blend` is None."""
     if blend is None:
         return _f(1.0)
     return blend.transmittance[c * PACKET_WIDTH + lane]
@@ -314,7 +324,7 @@ def transmittance(blend, c, lane):
 
 @inner
 def count_coloured(blend):
-    """Return how many transmittances of sixteen rays are below 1: 0 if none met a BLEND surface."""
+    """Return the number of RGB transmittances of sixteen rays that are not 1; 0 if none crossed BLEND."""
     if blend is None:
         return 0
     colour = blend.transmittance

@@ -1,4 +1,4 @@
-"""Emissive triangles as a table of emitters."""
+"""Lights: emissive triangles as a table of emitters, and lights without area (`kinds`)."""
 
 from baker.trace.kernel_cache import keep_kernels
 

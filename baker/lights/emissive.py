@@ -1,9 +1,10 @@
-"""The bake's emitters: emissive triangles with their power, in clusters of neighbours.
+"""Builds the table of emitters: emissive triangles with their power, in clusters of neighbours.
 
-    power = pi area L (twice that if two-sided)      L: luminance, or mean of RGB of a textured part
+    power = pi area L        L: luminance, or mean of R, G and B of the radiance of a textured part
 
-Textured triangles are cut into parts (`emissive_texture`), and each part has a row like a triangle. A part
-has its exact mean radiance if its texture is constant, or too fine for the largest number of parts.
+The power of a two-sided triangle is twice as large. Textured triangles are cut into parts
+(`emissive_texture`), and each part is an emitter. A part has its exact mean radiance instead of the texture
+if the texture is constant in the part, or too finely structured for the largest number of parts.
 
 Based on: see `kernels.emitters`.
 """
@@ -35,28 +36,32 @@ from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# Largest number of clusters, each of which is weighted for every tile of texels.
+# Largest number of clusters. It limits the time to compute the weights of clusters for each tile of texels.
 MAX_CLUSTERS = 256
-# Parts that cutting may add to the textured triangles.
+# Largest number of parts into which textured triangles are cut, beyond one part per triangle.
 MOST_PARTS = 32768
-# The parts of one triangle are counted as at most this number of triangles when clusters are formed.
+# Largest total weight of the parts of one triangle when clusters are formed. An uncut triangle has weight 1.
 _CROWD = 64.0
-# Limits of variance / mean^2. Parts below the first (relative standard deviation 0.001) have uniform
-# radiance. Parts above the second use their mean radiance, too: there were no further parts to divide them,
-# and most samples would be black.
+# Limits of variance / mean^2 of the radiance in a part. Below the first limit (relative standard deviation
+# 0.001), the part has uniform radiance. Above the second limit, the part has its mean radiance, because most
+# texture samples would be black and no more parts were available to divide it.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Parts at most a texel wide and this share of the scene's diagonal have their mean radiance. The difference
-# is not visible from larger distances, and it avoids the noise of sampling the texture.
+# Longest edge of parts, as a share of the scene's diagonal, up to which a part has its mean radiance if it is
+# also at most one texture texel wide. The difference is visible only from small distances, and the mean has
+# no noise.
 _SMALL = 1.0 / 128.0
 
 
 @dataclass(frozen=True)
 class _Pieces:
-    """Rows of the table before they are ordered: whole triangles, then parts.
+    """The m emitters before they are sorted: whole triangles, then parts.
 
-    triangle (m,) int64; inside (m, 3) float64, see `emissive_texture.Parts`; radiance (m, 3) float64, means;
-    brightness (m,) float64, one number for them; textured (m,) bool; node (k, 4), root (T,) int32, see
-    `Emitters`.
+    triangle : (m,) int64, triangle of the scene
+    inside : (m, 3) float64, see `emissive_texture.Parts`
+    radiance : (m, 3) float64, mean radiance, cd/m2
+    brightness : (m,) float64, luminance, or mean of R, G and B of a part; cd/m2
+    textured : (m,) bool, whether the texture is looked up
+    node (k, 4), root (T,) int32 : see `Emitters`, with indices of these m emitters
     """
 
     triangle: NDArray[np.int64]
@@ -69,21 +74,21 @@ class _Pieces:
 
 
 def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_PARTS) -> Emitters:
-    """Find the triangles that emit and group them.
+    """Find the triangles that emit, and group them into clusters.
 
     Parameters
     ----------
     geometry : Geometry
-        The scene's triangles.
+        Triangles of the scene.
     shading : Shading
-        Their materials.
+        Materials of these triangles.
     most_parts : int
-        Parts that cutting may add to the textured triangles.
+        Largest number of parts into which textured triangles are cut, beyond one part per triangle.
 
     Returns
     -------
     Emitters
-        In spatial order, in at most `MAX_CLUSTERS` clusters.
+        Emitters in spatial order, in at most `MAX_CLUSTERS` clusters.
     """
     piece = _find_pieces(geometry, shading, most_parts)
     area = (geometry.area[piece.triangle] * piece.inside[:, 2] ** 2).astype(np.float32)
@@ -121,7 +126,10 @@ def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_
 
 
 def _renumbered(piece: _Pieces, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the codes of nodes and triangles for rows `chosen`; parts without power count as black."""
+    """Return `node` and `root` for the new numbering, in which emitter i is emitter chosen[i] of `piece`.
+
+    Emitters that are not chosen, which have no power, get the code -1 (black).
+    """
     number = np.full(len(piece.triangle) + 1, -1, np.int32)
     number[chosen] = np.arange(len(chosen))
     node, root = (
@@ -132,7 +140,7 @@ def _renumbered(piece: _Pieces, chosen: NDArray[np.int64]) -> tuple[NDArray[np.i
 
 
 def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Pieces:
-    """List the triangles that emit, textured ones in parts."""
+    """Return the untextured triangles that emit, and the parts of textured triangles that emit."""
     candidate = np.flatnonzero((shading.emission.max(axis=1) > 0)[geometry.material] & (geometry.area > 0))
     material = geometry.material[candidate]
     whole = np.tile([0.0, 0.0, 1.0], (len(candidate), 1))
@@ -152,7 +160,8 @@ def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Piec
     )
     untextured = candidate[~textured]
     root[untextured] = np.arange(len(untextured))
-    # With alpha, radiance and alpha must be those of the same point: no part has its mean radiance.
+    # Look up the texture in all parts of triangles with alpha, because radiance and alpha of the same point
+    # are multiplied.
     varied = (parts.spread > _CONSTANT) & (parts.spread <= _SPARSE)
     if len(shading.alpha.slot):
         varied |= shading.alpha.slot[image][parts.owner] >= 0
@@ -171,14 +180,17 @@ def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Piec
 
 
 def _longest(corner: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the length (n,) of the longest edge of triangles (n, 3, 3)."""
+    """Return (n,) float64: the length of the longest edge of each triangle.
+
+    corner : (n, 3, 3) float32, positions of the corners
+    """
     edge = corner.astype(np.float64) - corner[:, [1, 2, 0]]
     longest: NDArray[np.float64] = np.linalg.norm(edge, axis=2).max(axis=1)
     return np.maximum(longest, 1e-300)
 
 
 def _corners(geometry: Geometry, piece: _Pieces) -> NDArray[np.float32]:
-    """Return the corners (m, 3, 3) of triangles and parts, metres."""
+    """Return (m, 3, 3) float32: the positions of the corners of each emitter, metres."""
     corner = geometry.position[geometry.triangle[piece.triangle]]
     part = np.flatnonzero(piece.inside[:, 2] != 1.0)
     if len(part):
@@ -191,20 +203,27 @@ def _corners(geometry: Geometry, piece: _Pieces) -> NDArray[np.float32]:
 
 
 def _cluster_bounds(triangle: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Return the first emitter of each cluster, and the end of the last, (C + 1,)."""
+    """Return (C + 1,) int32: cluster c contains the emitters bound[c] to bound[c + 1] - 1.
+
+    triangle : (m,) int64, triangle of each emitter, in spatial order
+    """
     n = len(triangle)
     n_clusters = min(n, MAX_CLUSTERS)
     _, which, count = np.unique(triangle, return_inverse=True, return_counts=True)
     if not n or count.max() == 1:
         return np.linspace(0, n, n_clusters + 1).round().astype(np.int32)
-    # Limit the weight of a screen of a thousand parts, so that other emitters keep clusters of their own.
+    # Limit the total weight of a triangle's parts. Otherwise a screen of a thousand parts would get nearly
+    # all clusters.
     weight = np.cumsum(np.minimum(_CROWD / count, 1.0)[which.reshape(-1)])
     bound = np.searchsorted(weight, np.linspace(0, weight[-1], n_clusters + 1)[1:-1])
     return np.unique(np.concatenate([[0], bound, [n]])).astype(np.int32)
 
 
 def _spatial_order(corner: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Order triangles so that neighbours in space follow each other; ties keep their order."""
+    """Return (m,) int64: the order of triangles along a 3D Morton curve through their centroids.
+
+    corner : (m, 3, 3) float32, positions of the corners
+    """
     if not len(corner):
         return np.zeros(0, np.int64)
     centre = corner.mean(axis=1).astype(np.float64)
@@ -223,7 +242,10 @@ def _bounds(
     two_sided: NDArray[np.bool_],
     first: NDArray[np.int32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Return sphere centre and radius, mean normal and largest angle to it for each cluster."""
+    """Return `centre`, `radius`, `axis` and `spread` of each cluster, see `Emitters`.
+
+    corner : (m, 3, 3) float32, metres; normal : (m, 3) float32; first : (C + 1,) int32, see `Emitters`
+    """
     n = len(first) - 1
     centre, axis = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
     radius, spread = np.zeros(n, np.float32), np.full(n, np.pi, np.float32)

@@ -1,12 +1,16 @@
-"""Textured emission: exact means over triangles, and subdivision of triangles into parts of low variance.
+"""Textured emission: divides triangles into parts of low variance, with exact mean radiance.
 
-A triangle is cut at the midpoints of its edges into four parts, repeatedly, where power times variance of the
-texture is largest. Black parts are dropped; uniform points of the others are samples of low variance.
+A triangle is cut at the midpoints of its edges into four parts. The parts with the largest product of power
+and variance of the texture are cut again. Black parts are dropped. Uniformly distributed points of the
+remaining parts are then samples of low variance.
 
-    noise = sum share (E[L^2] / E[L]^2 - 1)      over the parts of a triangle, share: of its power
+    noise = sum share (E[L^2] / E[L]^2 - 1)
 
-Based on: Clarberg, Jarosz, Akenine-Moller and Jensen, Wavelet importance sampling, 2005 (means in a tree;
-here the tree is that of the triangle itself, so that no part has to be clipped).
+The sum is over the parts of a triangle. L is the radiance in a part, and share is the part's power divided by
+the triangle's power.
+
+Based on: Clarberg, Jarosz, Akenine-Moller and Jensen, Wavelet importance sampling, 2005 (means in a tree).
+Here the tree divides the triangle itself, so that no part has to be clipped.
 """
 
 from __future__ import annotations
@@ -22,41 +26,44 @@ from baker.kernels.textures import TexturePack
 from baker.lights.texture_levels import TextureLevels, fair_limit
 from baker.lights.uv_integral import uv_means
 
-# A triangle with less noise is not cut further.
+# Noise (see the module) up to which a triangle is not cut further.
 ENOUGH = 0.05
-# Parts of this size are not cut further: float32 barycentrics would not distinguish their parts.
+# Edge length of a part, as a share of its triangle's edge, at which the part is not cut further. float32
+# barycentrics would not distinguish smaller parts.
 _SMALLEST = 2.0**-14
-# Parts with at least this share of the largest gain are cut in the same round.
+# Share of the largest gain (noise times weight) above which parts are cut in the same round.
 _TOGETHER = 0.125
-# Texel lines that the edges of all parts may cross together, about a second. Parts beyond that are averaged
-# over a smaller version of their texture; parts that cross at most the second number never are.
+# MOST_CROSSED: total number of texel lines (borders between texels) that the edges of all parts may cross.
+# This limits the time to about a second. Beyond it, parts are averaged over a smaller version of their
+# texture. FEW_CROSSED: number of crossed texel lines up to which a part always uses the full resolution.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
-# Share of the remaining texel lines that a round of cutting may always use.
+# Share of the remaining texel lines that one round of cutting may always cross.
 _ROUND = 0.25
-# Lines that are crossed in one call of the kernel; signals are handled between calls.
+# Texel lines that are crossed in one call of the kernel. Signals such as Ctrl-C are handled between calls.
 _CALL = 2.5e5
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Parts of n textured triangles.
+    """The m parts of n textured triangles that are not black.
 
     Attributes
     ----------
     owner : (m,) int64
-        The triangle of each part.
+        Triangle of each part.
     inside : (m, 3) float64
-        Barycentrics b1, b2 of the part's corner 0 in its triangle, and its size, negative if it is turned:
-        its point (u, v) is (b1 + size u, b2 + size v).
+        Barycentrics b1, b2 of the part's corner 0 in its triangle, and its size. Barycentrics (u, v) of the
+        part are (b1 + size u, b2 + size v) in the triangle. The size is the part's edge length divided by the
+        triangle's, negative if the part is rotated by 180 degrees.
     mean : (m, 3) float64
-        Mean radiance, cd/m2; black parts are left out.
+        Mean radiance, cd/m2.
     spread : (m,) float64
-        Variance of the radiance inside the part over its mean squared; 0 if it is too small to be seen.
+        Variance / mean^2 of the radiance inside the part; 0 for parts that are treated as uniform.
     node : (k, 4) int32
-        Parts of each subdivision, see `kernels.emitters.emitter_at`: a part's number, -1 black, -2 - k node
-        k.
+        Codes of the four parts of each subdivision, see `kernels.emitters.emitter_at`: the number of a part,
+        -1 for a black part, -2 - k for subdivision k.
     root : (n,) int32
-        Each triangle, in the same code.
+        Code of each triangle.
     """
 
     owner: NDArray[np.int64]
@@ -68,7 +75,7 @@ class Parts:
 
 
 class EmissiveTextures:
-    """The emission of textured triangles, which can be averaged over any part of them."""
+    """Computes the mean emission over parts of n textured triangles."""
 
     def __init__(
         self,
@@ -77,23 +84,30 @@ class EmissiveTextures:
         factor: NDArray[np.float64],
         uv: NDArray[np.float64],
     ) -> None:
-        """Prepare triangles: texture (n,) in the pack, radiance without it (n, 3), image uv (n, 3, 2)."""
+        """Prepare n triangles.
+
+        texture : (n,) int, number of each triangle's texture in `pack`
+        factor : (n, 3), radiance without the texture, cd/m2; uv : (n, 3, 2), image uv of the corners
+        """
         self.pack, self.factor, self.uv = pack, factor, uv.copy()
-        # Materials that differ in brightness only share one set of sums.
+        # Use the same running sums for materials that differ only in a common factor of R, G and B.
         scaled = self.factor / np.maximum(self.factor.max(axis=1, keepdims=True), 1e-300)
         key = np.column_stack([texture, scaled])
         kinds, kind = np.unique(key, axis=0, return_inverse=True)
         self.kind = kind.reshape(-1)
         self.levels = [TextureLevels(pack, int(row[0]), row[1:] ** 2) for row in kinds]
-        # Texel lines that may still be crossed.
+        # Number of texel lines that may still be crossed.
         self.left = MOST_CROSSED
-        # Texels that each triangle is wide, the larger of both axes.
+        # (n,) width or height of each triangle's uv bounding box in texels, the larger of both.
         self.texels = np.zeros(len(uv))
         self._bring_near()
 
     @classmethod
     def of(cls, shading: Shading, triangle: NDArray[np.int64]) -> EmissiveTextures:
-        """Prepare triangles (n,) of the scene, all of materials with an emissive texture."""
+        """Prepare triangles of the scene whose materials have an emissive texture.
+
+        triangle : (n,) int64, numbers of the triangles
+        """
         material = shading.material[triangle]
         uv = np.zeros((len(triangle), 3, 2))
         if len(shading.emission_uv) > 1:
@@ -102,7 +116,7 @@ class EmissiveTextures:
         return cls(shading.pack, shading.emission_texture[material], factor, uv)
 
     def _bring_near(self) -> None:
-        """Shift uv by whole repeats of the texture, so that they are near 0."""
+        """Shift the uv of each triangle by whole periods of the texture, so that they are near 0."""
         for k, levels in enumerate(self.levels):
             own = np.flatnonzero(self.kind == k)
             uv = self.uv[own]
@@ -114,7 +128,12 @@ class EmissiveTextures:
     def means(
         self, owner: NDArray[np.int64], inside: NDArray[np.float64], ahead: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean radiance (m, 3) and spread (m,) of parts, see `Parts`; `ahead` more may follow."""
+        """Return `mean` (m, 3) and `spread` (m,) of parts, see `Parts`.
+
+        owner (m,), inside (m, 3) : see `Parts`
+        ahead : largest number of parts in this call and all later calls, by which the remaining texel lines
+            are divided
+        """
         corner = self.uv[owner]
         edge = corner[:, 1:] - corner[:, :1]
         first = corner[:, 0] + np.einsum("mk,mka->ma", inside[:, :2], edge)
@@ -148,17 +167,17 @@ class EmissiveTextures:
 
 
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of R, G and B, by which parts are chosen; by luminance, blue would get few samples.
+    """Return the mean of R, G and B, the measure of power for parts. With luminance, blue would be noisy.
 
     Parameters
     ----------
     radiance : (n, 3) float64
-        cd/m2.
+        RGB, cd/m2.
 
     Returns
     -------
     (n,) float64
-        cd/m2.
+        Mean, cd/m2.
     """
     mean: NDArray[np.float64] = radiance.mean(axis=1)
     return mean
@@ -167,23 +186,24 @@ def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
 def cut(
     textures: EmissiveTextures, area: NDArray[np.float64], finest: NDArray[np.float64], most: int
 ) -> Parts:
-    """Cut triangles until sampling their parts has little more variance than if each were constant.
+    """Cut n triangles into parts until the noise of each triangle is at most `ENOUGH`.
 
     Parameters
     ----------
     textures : EmissiveTextures
-        Of n triangles.
-    area : (n,) float64
-        m2.
+        Emission of the triangles.
+    area : (n,) float64, m2
+        Areas of the triangles.
     finest : (n,) float64
-        Size, as in `Parts.inside`, below which parts at most a texel wide count as constant.
+        Size (see `Parts.inside`) up to which parts are treated as uniform, if they are also at most one texel
+        wide.
     most : int
-        Parts that cutting may add.
+        Largest number of parts beyond one part per triangle.
 
     Returns
     -------
     Parts
-        Black parts are left out.
+        All parts that are not black.
     """
     n = len(area)
     owner = np.arange(n)
@@ -191,7 +211,7 @@ def cut(
     finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
     mean, spread = _means_of_parts(textures, owner, inside, finest, n + 4 * max(most // 3, 0))
     whole = area * brightness(mean)
-    # Half of the parts are distributed by power, half equally: emitters of dim rooms are cut, too.
+    # Weight triangles half by power and half equally, so that emitters of dim rooms are cut, too.
     lit = max(int((whole > 0).sum()), 1)
     weight = 0.5 * whole / max(float(whole.sum()), 1e-300) + 0.5 / lit
     child = np.full(n, -1, np.int64)
@@ -233,7 +253,10 @@ def _means_of_parts(
 
 
 def _quarters(inside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the parts (m, 4, 3) at the three corners, and the turned one in the middle."""
+    """Return `inside` (m, 4, 3) of the four parts of each part: at corners 0 to 2, and in the middle.
+
+    inside : (m, 3) float64, see `Parts`
+    """
     half = 0.5 * inside[:, 2]
     step = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, -1.0]])
     out: NDArray[np.float64] = half[:, None, None] * step

@@ -1,7 +1,9 @@
 """Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
-A smaller texture holds the exact means of the areas of its texels and, in its fourth column, the variance
-inside each texel. The axes are halved independently: a strip of many repeats keeps its resolution across.
+A texel line is a border between two rows or columns of texels. Each texel of a smaller texture contains the
+exact mean of the original texture over its area (RGB) and, in the fourth column, the variance inside this
+area. Width and height are halved independently. So a narrow triangle across many repeats loses resolution
+only along its length.
 
 Based on: Heckbert, Survey of texture mapping, 1986 (box-filtered levels).
 """
@@ -24,7 +26,7 @@ _STRIP = 256
 
 
 class Level(NamedTuple):
-    """A texture at one resolution: pixels (h * w, 4) float32, w and h, and the sums of its rows."""
+    """A texture at one resolution: pixels (h * w, 4) float32, w and h in texels, running sums of the rows."""
 
     pixels: NDArray[np.float32]
     w: int
@@ -33,7 +35,7 @@ class Level(NamedTuple):
 
 
 class TextureLevels:
-    """One texture of a pack at all resolutions; each is made on first use."""
+    """One texture of a pack at all resolutions; each resolution is computed on first use."""
 
     def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
         """Prepare a texture; weight (3,): factor of each channel in the sum of squares."""
@@ -46,7 +48,10 @@ class TextureLevels:
         self._sizes = [_halvings(finest.w), _halvings(finest.h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
-        """Return the texture after `along_u` and `along_v` halvings; beyond one texel nothing changes."""
+        """Return the texture after `along_u` halvings of its width and `along_v` halvings of its height.
+
+        A width or height of one texel is not halved further.
+        """
         key = min(along_u, len(self._sizes[0]) - 1), min(along_v, len(self._sizes[1]) - 1)
         if key not in self._made:
             u, v = key
@@ -59,9 +64,12 @@ class TextureLevels:
         return self._made[key]
 
     def crossed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the texel lines (n, 2) along u and v that the edges of triangles (n, 3, 2) cross."""
+        """Return (n, 2) float64: the texel lines that each triangle's edges cross along u, and along v.
+
+        uv : (n, 3, 2) float64, corners of the triangles
+        """
         lines = np.abs(uv - uv[:, [1, 2, 0]]) * self.size
-        # Outside of a clamped texture there are no lines.
+        # Limit the number for clamped axes, because there are no texel lines outside the texture.
         most = np.where(self.wrap[:2] == _CLAMP, self.size + 2.0, np.inf)
         total: NDArray[np.float64] = np.minimum(lines, most).sum(axis=1)
         return total
@@ -69,23 +77,25 @@ class TextureLevels:
     def choose(
         self, lines: NDArray[np.float64], most: float
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Choose resolutions at which triangles cross at most `most` texel lines each.
+        """Choose a resolution for each triangle at which its edges cross at most `most` texel lines.
 
         Parameters
         ----------
         lines : (n, 2) float64
             Texel lines crossed at the finest resolution, see `crossed`.
+        most : float
+            Largest number of texel lines crossed by one triangle.
 
         Returns
         -------
         halved : (n, 2) int64
-            Number of halvings along u and v. More halvings than lead to one texel mean that the triangle may
-            be projected along that axis: the texture is constant there.
+            Number of halvings along u and v. One halving more than the axis allows means that the texture is
+            constant along the axis, so the uv of the triangle may be set to 0 there.
         crossed : (n,) float64
             Texel lines crossed at that resolution.
         """
         halved = np.zeros((len(lines), 2), np.int64)
-        # Share of the lines at each level; 0 if the axis is projected away.
+        # Compute the share of the lines that remains at each level, and 0 for a constant axis.
         left = [np.append(np.array(sizes) / sizes[0], 0.0) for sizes in self._sizes]
         now = lines.copy()
         while len(over := np.flatnonzero(now.sum(axis=1) > most)):
@@ -97,15 +107,18 @@ class TextureLevels:
         return halved, now.sum(axis=1)
 
     def is_constant(self, axis: int, halved: int) -> bool:
-        """Return whether triangles are projected along an axis after `halved` halvings."""
+        """Return whether the texture is treated as constant along an axis after `halved` halvings."""
         return halved >= len(self._sizes[axis])
 
 
 def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
-    """Return the largest limit with which wanted amounts (n,), each cut to it, add up to `total` at most."""
+    """Return the largest x for which sum(min(wanted, x)) <= total; inf if sum(wanted) <= total.
+
+    wanted : (n,) float64
+    """
     ascending = np.sort(wanted)
     before = np.concatenate([[0.0], np.cumsum(ascending)[:-1]])
-    # The equal share of amount k and all larger ones.
+    # Compute the limit if amount k of the ascending amounts and all larger amounts are cut.
     equal = (total - before) / np.arange(len(wanted), 0, -1)
     short = np.flatnonzero(equal < ascending)
     return float(equal[short[0]]) if len(short) else np.inf
@@ -159,7 +172,11 @@ def _halvings(n: int) -> list[int]:
 def _halved(
     image: NDArray[np.float32], axis: int, weight: NDArray[np.float64], has_variance: bool
 ) -> NDArray[np.float32]:
-    """Average texels (h, w, 4) along an axis; for odd numbers, texels are divided between neighbours."""
+    """Halve the number of texels along an axis, rounded up, by averages over the areas of the new texels.
+
+    image : (h, w, 4) float32; axis : 0 halves the height, 1 the width
+    weight : (3,) float64, see `TextureLevels`; has_variance : whether column 3 of `image` is a variance
+    """
     shape = list(image.shape)
     n = shape[axis]
     shape[axis] = (n + 1) // 2
@@ -167,7 +184,7 @@ def _halved(
     wide = n / shape[axis]
     low = wide * np.arange(shape[axis])
     first = np.floor(low + 1e-9).astype(np.int64)
-    # A wider texel reaches into three narrow ones at most.
+    # A new texel overlaps at most three old texels.
     which = first[:, None] + np.arange(3)
     share = np.minimum(which + 1, (low + wide)[:, None]) - np.maximum(which, low[:, None])
     share = np.where(share > 1e-9, share, 0.0) / wide

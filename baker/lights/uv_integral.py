@@ -1,10 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Exact means of a texture over triangles in its uv space, at any size: one texel's corner or many repeats.
+"""Exact means of a texture over triangles in uv space, smaller than a texel or larger than the texture.
 
     integral of f over a triangle = closed integral of F(x, y) dy along its edges,   dF / dx = f     (Green)
 
-Between two texel borders F is a polynomial of degree 3 at most along an edge: Simpson's rule is exact there.
-F comes from running sums of each row of texels. The cost is that of the texels that the *edges* cross.
+f is the filtered texture, and x and y are in texels. Between two texel borders, F along an edge is a
+polynomial of degree 3 at most, so Simpson's rule is exact. F is computed from running sums along each row of
+texels. The computing time is proportional to the number of texels that the *edges* cross, not to the area.
 
 Based on: Green's theorem; Crow, Summed-area tables for texture mapping, 1984 (the running sums).
 """
@@ -20,17 +21,18 @@ from numpy.typing import NDArray
 from baker.kernels.textures import wrapped
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Running sums are stored for each 32nd texel of a row; the others are added on demand.
+# Distance, texels, between the stored running sums of a row. The texels between are added on demand.
 BLOCK = 32
-# Columns of the integrand: red, green, blue, sum of their weighted squares.
+# Number of columns of f: red, green, blue, and the weighted sum of their squares.
 N_SUMS = 4
-# Triangles with less area than this share of their longest edge's square are integrated along that edge.
+# area / (longest edge)^2 up to which a triangle is integrated along its longest edge.
 _THIN = 1.0e-9
-# Cells a side of the uv box up to which the variation of a bilinear texture is measured at points.
+# Largest side of a triangle's uv bounding box, texels, up to which the spread of a bilinear texture is
+# estimated from sixteen points.
 _FEW_CELLS = 3.0
-# A sum below this share of its terms is rounding: the triangle is black.
+# Share of the sum of the magnitudes of its terms below which an integral is rounding error: it is set to 0.
 _ROUNDING = 1.0e-12
-# The spread of a triangle that is lit only between the measured points.
+# Spread of a triangle whose mean is positive although the texture is black at all sixteen points.
 _UNSEEN = 15.0
 _four, _prefix, _texel = scratch((4,), np.float64), scratch((4,), np.float64), scratch((4,), np.float64)
 _row_terms = scratch((2, 3, 4), np.float64)
@@ -38,11 +40,13 @@ _corner_memory, _totals, _sizes = (scratch(shape, np.float64) for shape in ((3, 
 
 
 class RowSums(NamedTuple):
-    """Running sums along the rows of one texture's finest level.
+    """Running sums along the rows of one texture at one resolution.
 
-    block (H, W // 32 + 1, 4) float64: sums of the texels before each 32nd; weight (4,) float64: factor of
-    each channel in the sum of squares, and 1 if the fourth column is the variance inside each texel, else 0;
-    texture int, number in the pack.
+    block : (H, W // 32 + 1, 4) float64, sums of texels 0 to 32 b - 1 of each row; columns R, G, B, and the
+        weighted sum of their squares
+    weight : (4,) float64, factors of R^2, G^2 and B^2 in the sum of squares; then 1 if column 3 of the pixels
+        is the variance inside each texel, else 0
+    texture : int, number of the texture in its `TexturePack`
     """
 
     block: NDArray[np.float64]
@@ -52,11 +56,12 @@ class RowSums(NamedTuple):
 
 @kernel
 def fill_row_sums(pixels, offset, weight, block):
-    """Fill `block` (see `RowSums`) with the sums of w texels a row from `pixels[offset]` on.
+    """Write `block`, see `RowSums`, for the texture whose texels begin at `pixels[offset]`.
 
-    The order of additions is that of `_sum_before`, so adding black texels leaves a sum bitwise equal.
+    Texels are added in the same order as in `_sum_before`, so that sums over black texels are equal bit for
+    bit.
 
-    pixels : (H * W, 4) float32; offset : first texel; weight : (4,) float64
+    pixels : (H * W, 4) float32; offset : index of the first texel; weight : (4,) float64, see `RowSums`
     """
     h, n_blocks = block.shape[0], block.shape[1]
     w = len(pixels) // h
@@ -76,7 +81,10 @@ def fill_row_sums(pixels, offset, weight, block):
 
 @inner
 def _add_texel(pixels, at, weight, sums):
-    """Add texel `at` of pixels (H * W, 4) to sums (4,) float64; weight (4,) float64, see `RowSums`."""
+    """Add R, G, B and the weighted sum of squares of texel `at` to `sums` (4,) float64.
+
+    pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`
+    """
     square = weight[3] * np.float64(pixels[at, 3])
     for c in range(3):
         value = np.float64(pixels[at, c])
@@ -87,7 +95,7 @@ def _add_texel(pixels, at, weight, sums):
 
 @inner
 def _sum_before(pixels, w, weight, block, j, i, out):
-    """Write the sums of texels 0 to i (0 <= i <= w) of row j to out (4,) float64.
+    """Write the sums of texels 0 to i - 1 of row j, with 0 <= i <= w, to `out` (4,) float64.
 
     pixels : (H * W, 4) float32; weight, block : see `RowSums`
     """
@@ -100,7 +108,10 @@ def _sum_before(pixels, w, weight, block, j, i, out):
 
 @inner
 def _read(pixels, w, weight, j, i, out):
-    """Write texel i of row j of pixels (H * W, 4) to out (4,) float64; weight (4,) float64, see `RowSums`."""
+    """Write R, G, B and the weighted sum of squares of texel i of row j to `out` (4,) float64.
+
+    pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`
+    """
     for c in range(4):
         out[c] = 0.0
     _add_texel(pixels, j * w + i, weight, out)
@@ -108,9 +119,12 @@ def _read(pixels, w, weight, j, i, out):
 
 @inner
 def _running(pixels, w, weight, block, mode, j, i, out, spare):
-    """Write the sums of row j from texel 0 to any integer i, continued by the wrap mode, to out (4,).
+    """Write the sums of row j from column 0 to column i - 1, for any integer i, to `out` (4,) float64.
 
-    pixels : (H * W, 4) float32; weight, block : see `RowSums`; spare : (4,) float64, working memory
+    Outside the texture, the row is continued by the wrap mode. For negative i, the sums are negative.
+
+    pixels : (H * W, 4) float32; weight, block : see `RowSums`; mode : see `TexturePack.wrap`
+    spare : (4,) float64, working memory
     """
     if mode == 2:
         inside = smaller(larger(i, 0), w)
@@ -134,8 +148,9 @@ def _running(pixels, w, weight, block, mode, j, i, out, spare):
 
 @inner
 def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
-    """Write the filtered texel at lattice coordinates, and the weighted sum of its squares, to out (4,).
+    """Write R, G, B of the filtered texture at (x, y), and the weighted sum of their squares, to `out` (4,).
 
+    x, y : texels, at texel centres integer with bilinear filtering
     pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
     spare : (4,) float64, working memory
     """
@@ -160,9 +175,10 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
 
 @inner
 def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):
-    """Write the coefficients of F in cell (i, j) to terms (2, 3, 4): of two rows, the sum since column
-    `first` and both texels.
+    """Write the coefficients of F in cell (i, j), the square from (i, j) to (i + 1, j + 1).
 
+    terms : (2, 3, 4) float64 output; for rows j and j + 1, the integral from column `first` to column i, the
+        texel in column i, and the texel in column i + 1
     pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
     a, b : (4,) float64, working memory
     """
@@ -178,7 +194,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
         for c in range(4):
             terms[r, 1, c] = terms[r, 2, c] = a[c]
         if not nearest:
-            # Trapezoids between texel centres: subtract half of the first and of the last texel.
+            # Convert the sum to an integral between texel centres by the trapezoidal rule.
             _read(pixels, w, weight, line, wrapped(first, w, wrap[0]), b)
             for c in range(4):
                 terms[r, 0, c] += 0.5 * (a[c] - b[c])
@@ -189,7 +205,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
 
 @inner
 def _primitive(terms, nearest, c, fx, fy):
-    """Return F of channel c at (fx, fy) inside the cell of terms (2, 3, 4), see `_load_cell`."""
+    """Return F of column c at (fx, fy), 0 to 1, inside a cell; terms (2, 3, 4) from `_load_cell`."""
     upper = terms[0, 0, c] + terms[0, 1, c] * fx
     if nearest:
         return upper
@@ -200,7 +216,10 @@ def _primitive(terms, nearest, c, fx, fy):
 
 @inner
 def _next(at, step, start, low, high):
-    """Return the parameter at which an edge crosses line `at`; 2 if it does not or not in low to high."""
+    """Return the parameter t at which the coordinate start + t step of an edge reaches the texel line `at`.
+
+    Returns 2 if `step` is 0, or if `at` is beyond the last line between `low` and `high`.
+    """
     if step == 0.0 or (step > 0.0 and at > high) or (step < 0.0 and at < low):
         return 2.0
     return (at - start) / step
@@ -208,18 +227,20 @@ def _next(at, step, start, low, high):
 
 @inner
 def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total, size):
-    """Add the integral along an edge to `total` (4,) and the magnitudes of its terms to `size` (4,).
+    """Add the integral along an edge to `total` (4,), and the magnitudes of its terms to `size` (4,).
 
     pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
-    ends : 6 float, x, y of both ends and the weights of f at both ends
-    along : whether to add the weighted integral of f along the edge; else the integral of F dy
+    first : column from which F is integrated
+    ends : six float: x0, y0, x1, y1 of the ends in texels, and the weights of f at both ends
+    along : bool; if true, the integral of f along the edge, with linearly interpolated weights, is added,
+        otherwise the integral of F dy
     """
     x0, y0, x1, y1, first_weight, last_weight = ends
     dx, dy = x1 - x0, y1 - y0
     if not along and dy == 0.0:
         return
     terms, a, b = _row_terms(), _prefix(), _texel()
-    # Outside of a clamped texture there are no lines.
+    # Limit texel lines to the texture if it is clamped.
     low_x, high_x = (-1.0, w + 1.0) if wrap[0] == 2 else (-1.0e30, 1.0e30)
     low_y, high_y = (-1.0, h + 1.0) if wrap[1] == 2 else (-1.0e30, 1.0e30)
     line_x = math.floor(x0) + 1.0 if dx > 0.0 else math.ceil(x0) - 1.0
@@ -240,7 +261,7 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
         if along:
             for k in range(3):
                 s = t if k == 0 else (middle if k == 1 else end)
-                # Evaluate just inside the piece: at its ends two texels meet.
+                # Evaluate f just inside the piece, because two texels meet at its ends.
                 inside = middle + (s - middle) * (1.0 - 1.0e-9)
                 _value(pixels, w, h, weight, wrap, nearest, x0 + inside * dx, y0 + inside * dy, a, b)
                 share = (4.0 if k == 1 else 1.0) / 6.0 * (end - t)
@@ -263,9 +284,10 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
 
 @inner
 def _measured_spread(pixels, w, h, weight, wrap, nearest, corner, lit):
-    """Return E[f^2] / E[f]^2 - 1 from the centroids of sixteen equal parts of a triangle, corner (3, 2).
+    """Return E[f^2] / E[f]^2 - 1, estimated at the centroids of sixteen equal parts of a triangle.
 
     pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
+    corner : (3, 2) float64, texels; lit : whether the mean over the triangle is positive
     """
     a, b, mean = _prefix(), _texel(), _four()
     for part in range(16):
@@ -294,12 +316,13 @@ def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
 
     Parameters
     ----------
-    uv : (n, 3, 2) float64
-    pixels : (H * W, 4) float32, linear; wrap : (3,) int64, see `TexturePack.wrap`
+    uv : (n, 3, 2) float64, corners of the triangles
+    pixels : (H * W, 4) float32, linear; w, h : width and height, texels
+    wrap : (3,) int64, see `TexturePack.wrap`
     weight, block : see `RowSums`
-    mean : (n, 3) float64, output, exact up to rounding
-    spread : (n,) float64, output: variance of the texture over the square of its mean, channels weighted; of
-        large triangles with a bilinear texture a bound, of small ones an estimate
+    mean : (n, 3) float64 output, RGB, exact up to rounding
+    spread : (n,) float64 output, weighted variance / mean^2 of the texture; with a bilinear texture it is an
+        estimate for triangles at most `_FEW_CELLS` wide, and an upper bound for larger triangles
     """
     nearest = wrap[2] != 0
     shift = 0.0 if nearest else 0.5
@@ -322,7 +345,9 @@ def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
             _value(pixels, w, h, weight, wrap, nearest, corner[0, 0], corner[0, 1], total, size)
             area = 1.0
         elif thin:
-            # Integrate a degenerate triangle along its longest edge; its density is a tent over corner `top`.
+            # Integrate a degenerate triangle along its longest edge. The weight of f is proportional to the
+            # triangle's width there: it rises linearly from 0 to the projection of corner `top`, and falls to
+            # 0.
             p, q = (top + 1) % 3, (top + 2) % 3
             way_x, way_y = corner[q, 0] - corner[p, 0], corner[q, 1] - corner[p, 1]
             at = (corner[top, 0] - corner[p, 0]) * way_x + (corner[top, 1] - corner[p, 1]) * way_y

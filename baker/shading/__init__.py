@@ -1,1 +1,1 @@
-"""Materials resolved for triangles, transmittance and alpha, and the ray tree."""
+"""Material tables of a scene for kernels (base colour, emission, alpha, transmittance), and its ray tree."""

@@ -1,4 +1,4 @@
-"""Finds the triangles that let light through, and builds their table of alpha."""
+"""Finds the triangles whose opacity is below 1 somewhere, and builds the table of their alpha."""
 
 from __future__ import annotations
 
@@ -35,28 +35,28 @@ def build_alpha(
     base_texture: NDArray[np.int32],
     base_uv: NDArray[np.float32],
 ) -> AlphaTable:
-    """Find the triangles of MASK and BLEND materials that let light through somewhere.
+    """Find the triangles of MASK and BLEND materials whose opacity is below 1 somewhere.
 
     Parameters
     ----------
     scene : Scene
         Materials and meshes.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
     pack : TexturePack
         Textures.
     base_texture : (M,) int32
         Number in `pack` of each material's base colour texture, -1 for none.
     base_uv : (V, 2) float32
-        Its image uv by lightmap vertex; (1, 2) if nothing is textured.
+        Image uv of each lightmap vertex for this texture; (1, 2) if no material is textured.
 
     Returns
     -------
     AlphaTable
-        The triangles that let light through.
+        Alpha of these triangles.
     """
     mode = np.array([m.alpha_mode for m in scene.materials])
-    # Alpha from which a material blocks: the cutoff of MASK, 1 for BLEND.
+    # Smallest alpha at which each material blocks all light: the cutoff of MASK, 1 for BLEND.
     blocks = np.array(
         [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
     )
@@ -89,30 +89,30 @@ def build_alpha(
 
 
 def hit_filter(shading: Shading, table: TransmittanceTable | None = None) -> HitFilter | None:
-    """Return the filter of triangles that let light through, None without any.
+    """Return the filter that accepts or rejects ray hits on triangles that let light through.
 
     Parameters
     ----------
     shading : Shading
         Materials.
     table : TransmittanceTable, optional
-        BLEND triangles; None without any.
+        BLEND triangles; None if there are none.
 
     Returns
     -------
     HitFilter or None
-        For `RayScene`.
+        Argument `hit_filter` of `RayScene`; None if all triangles are opaque.
     """
     if not len(shading.alpha.row):
         return None
-    # Loading the compiled function takes time: only scenes that need it do so.
+    # Import the compiled function only if it is needed, because loading it takes time.
     from baker.shading.kernels.alpha_filter import filter_of
 
     return filter_of(shading.alpha, table, shading.pack)
 
 
 def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return (n, 3) float32: the vertex colours' alpha at the corners of triangles, 1 without colours."""
+    """Return (n, 3) float32: the vertex alpha at the corners of n triangles, 1 without vertex colours."""
     alpha = np.ones((len(triangle), 3), np.float32)
     # Triangles are sorted by instance.
     bound = np.searchsorted(geometry.instance[triangle], np.arange(len(scene.instances) + 1))
@@ -125,10 +125,10 @@ def _corner_alpha(scene: Scene, geometry: Geometry, triangle: NDArray[np.int64])
 
 
 def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return (n,) int64, below 2^24: equal numbers for triangles of one connected surface of an instance.
+    """Return (n,) int64: the number, below 2^24, of the connected surface of each triangle.
 
-    Corners at the same position are one vertex. Triangles with the same three vertices are layers: each
-    belongs to another surface.
+    Corners of one instance at the same position are one vertex. Triangles that share vertices are connected.
+    Triangles with the same three vertices are separate layers and get different numbers.
     """
     if not len(triangle):
         return np.zeros(0, np.int64)
@@ -136,7 +136,7 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     from scipy.sparse.csgraph import connected_components
 
     corner = geometry.triangle[triangle].reshape(-1)
-    # Adding 0 makes -0 equal to 0.
+    # Add 0 to convert -0 to 0, because rows are compared by their bytes.
     position = geometry.position[corner] + np.float32(0.0)
     instance = np.repeat(geometry.instance[triangle], 3)[:, None]
     kept, vertex = unique_rows([position, instance], len(corner))
@@ -149,7 +149,7 @@ def _connected_surface(geometry: Geometry, triangle: NDArray[np.int64]) -> NDArr
     begins = np.flatnonzero(np.diff(same[order], prepend=-1))
     layer = np.zeros(len(same), np.int64)
     layer[order] = np.arange(len(same)) - np.repeat(begins, np.diff(begins, append=len(same)))
-    # float32 holds whole numbers up to 2^24.
+    # Reduce the numbers modulo 2^24, because float32 represents only whole numbers up to 2^24 exactly.
     return unique_rows([part[:, None], layer[:, None]], len(part))[1] % (1 << 24)
 
 

@@ -1,4 +1,4 @@
-"""Resolves materials for triangles: factors, texture numbers and the uv of each corner."""
+"""Builds `Shading`: factors and textures of all materials, and the image uv and colour of each vertex."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from baker.shading.alpha import build_alpha
 
 
 def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = False) -> Shading:
-    """Pack the textures of all materials, and find the uv of every triangle corner.
+    """Pack the textures of all materials, and compute the image uv of every lightmap vertex.
 
     Parameters
     ----------
     scene : Scene
         Materials and meshes.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
     reflections : bool
-        Whether to resolve metallic and roughness textures, too, which bakes do not use.
+        Whether to include metallic-roughness textures, which bakes do not use.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
         if texture is None:
             return -1
-        # Nearest samplers are applied to emission only: elsewhere the difference is not visible in a bake.
+        # Use nearest filtering for emission only. For base colour the difference is not visible in a bake.
         sharp = sharp and texture.nearest
         key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:
@@ -76,14 +76,14 @@ def corner_uv(scene: Scene, geometry: Geometry, textures: list[Texture | None]) 
     scene : Scene
         Meshes.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
     textures : list of Texture or None
         Texture of each material.
 
     Returns
     -------
     (V, 2) float32
-        0 where a vertex has no texture; (1, 2) if no material has one.
+        Image uv, 0 for vertices without a texture; (1, 2) if no material has a texture.
     """
     if all(texture is None for texture in textures):
         return np.zeros((1, 2), np.float32)
@@ -115,12 +115,12 @@ def vertex_colour(scene: Scene, geometry: Geometry) -> NDArray[np.float32]:
     scene : Scene
         Meshes.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
 
     Returns
     -------
     (V, 4) float32
-        Linear RGB and alpha; (1, 4) ones if no mesh has any.
+        Linear RGB and alpha, 1 without vertex colours; shape (1, 4) if no mesh has vertex colours.
     """
     if all(scene.meshes[i.mesh].colour is None for i in scene.instances):
         return np.ones((1, 4), np.float32)

@@ -1,4 +1,4 @@
-"""Builds the ray tree of a scene, with the filters of triangles that let light through."""
+"""Builds the Embree scene of a bake, with filter functions for triangles that let light through."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from baker.trace.embree import RayScene
 
 
 def build_ray_tree(geometry: Geometry, shading: Shading, *, threads: int) -> RayScene:
-    """Return the tree of all triangles.
+    """Build the Embree scene of all triangles.
 
     Parameters
     ----------
     geometry : Geometry
         Triangles.
     shading : Shading
-        Their materials.
+        Materials of these triangles.
     threads : int
-        Threads of the build; 0 means all.
+        Number of threads that build the tree; 0 means all.
 
     Returns
     -------
     RayScene
-        The tree.
+        The Embree scene.
     """
     table = build_transmittance_table(shading)
     passing, colouring = hit_filter(shading, table), transmittance_filter(shading, table)

@@ -1,4 +1,4 @@
-"""Classifies the triangles of a scene as solids, rooms and sheets, and the meaning of a first hit on each."""
+"""Classifies the triangles of a scene: solids, rooms, covers, sheets; and what a first hit on each proves."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
     Parameters
     ----------
     scene : Scene
-        A part with one of its lights or cameras inside is a room.
+        Lights and cameras. A closed part that contains a light or camera is a room.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
     shading : Shading
         Materials.
 
@@ -43,23 +43,23 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
-    """Make the faces of solids one-sided, and return the meaning of a first hit on each triangle.
+    """Make the faces of solids without holes one-sided, and return what a first hit on each triangle proves.
 
-    No light arrives at the backs of a solid without holes, whether or not its material is double-sided.
+    No light arrives inside a solid without holes, so the backs of its faces need no texels.
 
     Parameters
     ----------
     scene : Scene
         Lights and cameras.
     geometry : Geometry
-        Made from the same scene.
+        Triangles of the scene.
     shading : Shading
         Materials.
 
     Returns
     -------
     Geometry
-        With those faces not double-sided.
+        The geometry with `double_sided` false for these faces.
     hit_kind : (T,) uint8
         See `kernels.probe`.
     """
@@ -71,10 +71,10 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
 
 
 def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
-    """Return the meaning of a first hit on each triangle for the ray's origin.
+    """Return for each triangle what a first hit on it says about the ray's origin.
 
-    Backs of one-sided sheets are black, and those of covers are treated as black. Hits on rooms and on
-    triangles that let light through have no meaning (0).
+    Backs of one-sided sheets are black, and backs of covers are treated as black. Hits on rooms and on
+    triangles that let light through say nothing (0).
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[n
     shading : Shading
         Materials.
     solids : Solids
-        Their classification.
+        Classification of the triangles.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[n
 
 
 def _opaque(geometry: Geometry, shading: Shading) -> NDArray[np.bool_]:
-    """Return (T,) bool: triangles that let no light through anywhere."""
+    """Return (T,) bool: the triangles that are opaque everywhere."""
     slot = shading.alpha.slot
     found: NDArray[np.bool_] = slot < 0 if len(slot) else np.ones(len(geometry.triangle), bool)
     return found

@@ -1,4 +1,4 @@
-"""Builds the table of BLEND triangles: the data from which their transmittance is computed."""
+"""Builds the table of BLEND triangles, from which their transmittance is computed at ray hits."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
     Returns
     -------
     TransmittanceTable or None
-        None without any.
+        None if there are no such triangles.
     """
     alpha = shading.alpha
-    # Rows are in the order of triangles.
+    # The rows of `alpha.row` are in the order of triangles.
     triangle = np.flatnonzero(alpha.slot >= 0)
     if not len(triangle):
         return None
@@ -41,7 +41,7 @@ def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
     )
     highest = corner_alpha.max(axis=1) * np.array([highest for _, highest in limits], np.float32)[material]
     white = (colour.min(axis=1) * darkest >= 1.0).all(axis=1)
-    # Triangles whose alpha is 0 everywhere do nothing, whatever their colour.
+    # Leave out triangles whose alpha is 0 everywhere, because their transmittance is 1 for any colour.
     has_alpha = (alpha.row[:, CUTOFF] < 0) & (highest > 0)
     chosen = np.flatnonzero(has_alpha)
     if not len(chosen):
@@ -58,30 +58,30 @@ def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
 
 
 def transmittance_filter(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None:
-    """Return the filter that multiplies colours in the tree of BLEND triangles, None without any.
+    """Return the filter that multiplies transmittance at ray hits in the tree of BLEND triangles.
 
     Parameters
     ----------
     shading : Shading
         Materials.
     table : TransmittanceTable or None
-        `build_transmittance_table` of the same.
+        Result of `build_transmittance_table`.
 
     Returns
     -------
     HitFilter or None
-        For `RayScene`.
+        Argument `blend_filter` of `RayScene`; None if `table` is None.
     """
     if table is None:
         return None
-    # Loading the compiled function takes time: only scenes that need it do so.
+    # Import the compiled function only if it is needed, because loading it takes time.
     from baker.shading.kernels.transmittance_filter import filter_of
 
     return filter_of(table, shading.pack)
 
 
 def _limits(pack: TexturePack, k: int) -> tuple[np.ndarray[Any, Any], float]:
-    """Return the smallest RGB (3,) in texture k, and its largest alpha; ones for no texture."""
+    """Return the smallest R, G and B (3,) and the largest alpha in texture k; ones if k is negative."""
     if k < 0:
         return np.ones(3, np.float32), 1.0
     (red, green, blue, _), (_, _, _, alpha) = value_limits(pack, k)

@@ -1,4 +1,4 @@
-"""Plugins: one kind of light without area a file."""
+"""Kinds of lights without area; each file registers one kind."""
 
 from baker.trace.kernel_cache import keep_kernels
 

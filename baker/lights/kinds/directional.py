@@ -1,4 +1,4 @@
-"""Directional light: E lux from one direction, as the sun.
+"""Directional light: parallel light of E_light lux on a perpendicular surface, such as sunlight.
 
     E = E_light cos(theta)
 
@@ -41,9 +41,9 @@ def _fill(
 
 @kernel
 def _fill_parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
-    """Fill rays and weights (see `FillRays`) of parallel light.
+    """Write shadow rays towards a directional light, and the weights cos(theta).
 
-    direction : (3,) float64, unit, in which the light travels, world
+    direction : (3,) float64, unit vector in which the light travels, world
     normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
     """
     for i in range(ray.shape[0]):
@@ -74,7 +74,7 @@ DIRECTIONAL = LIGHT_KINDS.register("directional")(
         has_position=False,
         has_direction=True,
         gltf_type="directional",
-        # The sun at its highest gives 1.2e5 lx.
+        # Direct sunlight is at most about 1.2e5 lx.
         plausible_max=2e5,
         read=_read,
         write=_write,

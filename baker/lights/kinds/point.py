@@ -1,6 +1,6 @@
-"""Point light: I candela from a point without size.
+"""Point light: a point that emits I candela in all directions.
 
-    E = I cos(theta) / r^2 * clamp(1 - (r / range)^4, 0, 1)
+    E = I cos(theta) / r^2 * clamp(1 - (r / range)^4, 0, 1)        r: distance
 
 Based on: KHR_lights_punctual, "Point" and "Range Property"; Lambert's cosine and inverse-square laws.
 """
@@ -17,12 +17,12 @@ from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, Light
 from baker.core.scene import PunctualLight
 from baker.trace.jit import inner, kernel, larger
 
-# Shadow rays end at this share of the distance to the light.
+# TFAR of shadow rays, as a share of the distance to the light.
 _SHORT = np.float32(0.99999)
 
 
 def read_range(light: LightJson) -> float:
-    """Return the range of a light with a position, as glTF has it.
+    """Read `range` of a point or spot light in a glTF file.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def read_range(light: LightJson) -> float:
     Returns
     -------
     float
-        Metres; inf without a range.
+        Range in metres; inf if the light has none.
 
     Raises
     ------
@@ -46,17 +46,17 @@ def read_range(light: LightJson) -> float:
 
 
 def finite_range(light: PunctualLight) -> dict[str, float]:
-    """Return the range, metres, as glTF and the manifest have it: nothing if there is none.
+    """Return the JSON entry of a light's range, for glTF and `bake.json`.
 
     Parameters
     ----------
     light : PunctualLight
-        A light with a position.
+        A point or spot light.
 
     Returns
     -------
     dict of str to float
-        "range", or empty.
+        {"range": metres}; empty if the range is infinite.
     """
     return {"range": light.range} if math.isfinite(light.range) else {}
 
@@ -86,17 +86,20 @@ def _fill(
 
 @inner
 def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
-    """Return clamp(1 - (r / range)^4, 0, 1) for r^2 and 1 / range^2 (0: no range)."""
+    """Return clamp(1 - (r / range)^4, 0, 1).
+
+    square : r^2, square of the distance; inverse_range : 1 / range^2, 0 without a range
+    """
     share = square * inverse_range
     return larger(1.0 - share * share, 0.0)
 
 
 @kernel
 def fill_inverse_square(position, inverse_range, origin, normal, ray, weight):  # type: ignore[no-untyped-def]
-    """Fill rays to a position and weights cos / r^2, faded out towards the range.
+    """Write shadow rays to a light at `position`, and the weights cos / r^2 times `range_window`.
 
-    position : (3,) float64, metres, relative to the origin of `origin`
-    inverse_range : float, 1 / range^2, see `PunctualLight.inverse_range`
+    position : (3,) float64, metres, in the same space as `origin`
+    inverse_range : float, 1 / range^2, 0 without a range, see `PunctualLight.inverse_range`
     origin, normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
     """
     for i in range(origin.shape[0]):

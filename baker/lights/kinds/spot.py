@@ -1,7 +1,9 @@
-"""Spot light: a point light inside a cone with glTF's fall-off.
+"""Spot light: a point light of I candela whose intensity falls off between an inner and an outer cone.
 
     E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
         * clamp(1 - (r / range)^4, 0, 1)
+
+r is the distance and a the angle between the spot's axis and the direction to the point.
 
 Based on: KHR_lights_punctual, "Inner and Outer Cone Angles" and "Range Property".
 """
@@ -23,7 +25,7 @@ from baker.trace.jit import kernel, larger, smaller
 def _read(light: LightJson, world_from_light: NDArray[np.float64]) -> dict[str, Any]:
     fields: dict[str, Any] = {"range": read_range(light)}
     spot = light.child_or_empty("spot")
-    # Exporters write pi/2 in single precision, a little over the limit.
+    # Accept slightly more than pi / 2, because exporters write pi / 2 rounded to single precision.
     outer = spot.number("outerConeAngle", math.pi / 4, low=0.0, high=math.pi / 2 + 1e-3)
     inner = spot.number("innerConeAngle", 0.0, low=0.0)
     if inner > outer * (1 + 1e-6):
@@ -47,7 +49,7 @@ def _describe(light: PunctualLight) -> dict[str, Any]:
 
 
 def _cone_scale(light: PunctualLight) -> float:
-    """Return 1 / (cos inner - cos outer), at most 1000."""
+    """Return 1 / (cos inner - cos outer), limited to 1000."""
     return 1.0 / max(0.001, math.cos(light.inner_cone) - math.cos(light.outer_cone))
 
 
@@ -66,11 +68,12 @@ def _fill(
 
 @kernel
 def _multiply_by_cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
-    """Multiply weights by the cone's fall-off.
+    """Multiply the weights by the angular fall-off of a spot light.
 
-    direction : (3,) float64, unit, the cone's axis, world
-    outer, scale : float, cosine of the outer angle and `_cone_scale`
-    ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`; rays are read
+    direction : (3,) float64, unit axis of the cone, world
+    outer, scale : float, cosine of the outer angle, and `_cone_scale`
+    ray : (n, 16, 4) float32, see `FillRays`; read
+    weight : (n, 16) float32, see `FillRays`; changed in place
     """
     for i in range(ray.shape[0]):
         for k in range(ray.shape[1]):

@@ -1,4 +1,4 @@
-"""Filter functions that Embree calls at hits on triangles that let light through."""
+"""Filter functions that Embree calls for hits on triangles that let light through."""
 
 from baker.trace.kernel_cache import keep_kernels
 

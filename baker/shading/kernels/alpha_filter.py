@@ -1,16 +1,17 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The filter function of MASK and BLEND triangles: accepts or rejects hits.
+"""The filter function of MASK and BLEND triangles, which accepts or rejects ray hits.
 
-A MASK hit counts where alpha reaches the cutoff. A BLEND hit depends on the ray (its ID row):
+A hit on a MASK triangle is accepted if alpha is at least the cutoff. For a hit on a BLEND triangle of alpha a
+and colour c, the ID of the ray decides:
 
-- Shadow rays (ID 1 to 16, the ray's number): the transmittance T = (1 - a) lerp(1, c, a) is multiplied into
-  `packets.BlendBuffers.transmittance`, and the hit does not count. The ends of these rays are fixed, so
-  Embree reports every crossing on the way, in any order.
-- Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit counts only where alpha is 1.
-- Rays between points of a texel (ID `packets.SOLID`): the hit counts wherever alpha is above 0.
-- Other rays (ID 0): the hit counts with probability alpha. The random number is a hash of the bits of the ray
-  and the triangle: a ray has the same result in any packet and on any thread, and the decisions at different
-  surfaces along a ray, and of different rays, are independent.
+- Shadow rays (ID 1 to 16, the ray's number): `packets.BlendBuffers.transmittance` is multiplied by
+  T = (1 - a) lerp(1, c, a), and the hit is rejected. So Embree calls the filter for every crossing of the
+  ray, in any order.
+- Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit is accepted only if a is 1.
+- Rays between points of a texel (ID `packets.SOLID`): the hit is accepted if a is above 0.
+- Other rays (ID 0): the hit is accepted with probability a. The random number is a hash of the bits of the
+  ray and of the triangle. So a ray has the same result in any packet and on any thread. Decisions at
+  different surfaces, and of different rays, are independent.
 
 Based on: Enderton et al., Stochastic transparency, 2010; Embree 4 API reference, RTCFilterFunctionN.
 """
@@ -54,13 +55,13 @@ _INV_2_32 = 1.0 / 4294967296.0
 # The user data: address and length of each array.
 _ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 18, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# Shadow rays whose transmittance is below this are blocked.
+# Transmittance (largest of R, G and B) below which a shadow ray is blocked.
 _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
 
 def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: TexturePack) -> HitFilter:
-    """Return the filter of triangles that let light through; `blend` are the BLEND ones, None without any."""
+    """Return the filter of the triangles in `alpha`; `blend` is the table of BLEND triangles, or None."""
     blend = no_transmittance() if blend is None else blend
     arrays = (
         *(alpha.slot, alpha.row, *pack),
@@ -72,7 +73,10 @@ def filter_of(alpha: AlphaTable, blend: TransmittanceTable | None, pack: Texture
 
 @inner
 def _hash_ray(bits, ray, n, lane):
-    """Return a hash of `bits` and of origin and direction of the ray in a lane; ray : (12 * n,) uint32."""
+    """Return a uint32 hash of `bits` and of the origin and direction of the ray in a lane.
+
+    ray : (12 * n,) uint32, n rays as Embree passes them
+    """
     for axis in range(3):
         bits = hash_u32(np.uint32(bits ^ ray[(ORG_X + axis) * n + lane]))
         bits = hash_u32(np.uint32(bits ^ ray[(DIR_X + axis) * n + lane]))
@@ -81,10 +85,14 @@ def _hash_ray(bits, ray, n, lane):
 
 @inner
 def _surface_bits(surface, ray, hit, n, lane):
-    """Return a uint32 that is the same for all triangles of a surface at an edge that a ray crosses.
+    """Return a uint32 hash of a surface and of the side from which a ray hits it.
 
-    A closed surface is crossed from outside and from inside, so the side is one of the bits.
-    surface : float32, a whole number; ray, hit : (12 * n,) and (6 * n,) float32, as Embree passes them
+    It replaces the triangle's number if the ray crosses an edge, so that the decision is the same for all
+    triangles at the edge. The side is included because a ray crosses a closed surface twice, from outside and
+    from inside.
+
+    surface : float32, `AlphaTable` column SURFACE
+    ray, hit : (12 * n,) and (6 * n,) float32, arrays that Embree passes; n : packet width
     """
     facing = np.float32(0.0)
     for axis in range(3):
@@ -94,12 +102,12 @@ def _surface_bits(surface, ray, hit, n, lane):
 
 @cfunc(types.void(types.voidptr), cache=True, error_model="numpy")
 def _let_through(arguments):
-    """Set `valid` to 0 for hits that light passes; multiply the transmittance of shadow rays.
+    """Reject hits by setting `valid` to 0, and multiply the transmittance of shadow rays.
 
     arguments : address of RTCFilterFunctionNArguments
     """
-    # View the arguments as arrays. N has four bytes. Only the context of shadow rays is followed by
-    # `BlendBuffers`.
+    # View the arguments as arrays. N has four bytes. The arrays of `BlendBuffers` follow the query context
+    # only for shadow rays.
     given = carray(arguments, (6,), np.int64)
     n = given[FILTER_WIDTH] & 0xFFFFFFFF
     valid = carray(pointer(given[FILTER_VALID]), (n,), np.int32)
@@ -125,7 +133,7 @@ def _let_through(arguments):
     for lane in range(n):
         if valid[lane] != -1:
             continue
-        # Fully opaque: the hit counts. Fully transparent: it does not.
+        # Accept the hit if the triangle is opaque there, reject it if it is fully transparent.
         prim = hit_words[_PRIM * n + lane]
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
@@ -137,7 +145,7 @@ def _let_through(arguments):
             continue
         if ray_words[ID * n + lane] == SOLID:
             continue
-        # A ray to its first hit: accept with probability alpha.
+        # For a ray to its first hit, accept with probability alpha.
         number = np.int64(ray_words[ID * n + lane]) - 1
         if number < 0:
             bits = hash_u32(prim)
@@ -146,7 +154,8 @@ def _let_through(arguments):
             if _hash_ray(bits, ray_words, n, lane) * _INV_2_32 >= share:
                 valid[lane] = 0
             continue
-        # A shadow ray: reject, and multiply its transmittance, unless an edge was crossed before.
+        # For a shadow ray, reject the hit, and multiply the transmittance unless the hit is on an edge of a
+        # surface that was already crossed there.
         valid[lane] = 0
         if number >= PACKET_WIDTH:
             continue

@@ -1,10 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Merges the hits of a ray on an edge that triangles share: the ray crosses their surface once.
+"""Merges the hits of a ray on an edge that triangles share, so that the surface is crossed only once.
 
-With Embree's ROBUST test no ray passes between two triangles, but both are reported where a ray meets
-their edge to within rounding, and all triangles around a vertex. Hits on edges are rare, so those of each ray
-are stored, and later ones are compared with them. Two surfaces at the same position are two crossings: only
-triangles of one connected surface (`alpha.SURFACE`) are merged.
+With Embree's ROBUST flag, no ray passes between two adjacent triangles. But if a ray meets their common edge
+to within rounding, hits on both triangles are reported; at a vertex, hits on all triangles around it. Such
+hits are rare, so the edge hits of each ray are stored and compared with later ones. Two different surfaces at
+the same position are crossed separately. Only hits on triangles of one connected surface (`alpha.SURFACE`)
+are merged.
 
 Based on: Woop, Benthin and Wald, Watertight ray/triangle intersection, 2013.
 """
@@ -16,10 +17,10 @@ import numpy as np
 from baker.trace.jit import inner
 from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
-# A hit lies on an edge if a barycentric coordinate is at most this. Embree accepts coordinates down to minus
-# 1.2e-7, and two triangles of one edge are both hit only within that.
+# Barycentric coordinate up to which a hit lies on an edge. Embree accepts coordinates down to -1.2e-7, so
+# both triangles at an edge are hit only within this distance from it.
 EDGE = 1.0e-6
-# Rounding changes the distance of a crossing by at most this share.
+# Largest relative difference of the distances of two hits at the same crossing, which rounding causes.
 SAME = np.float32(4.0e-6)
 
 
@@ -31,10 +32,11 @@ def on_edge(b1, b2):
 
 @inner
 def crossed_before(context, words, number, surface, distance):
-    """Return whether ray `number` has hit an edge of the surface at the same distance; store this hit if not.
+    """Return whether ray `number` already hit an edge of the surface at this distance; if not, store the hit.
 
-    context, words : (CONTEXT_WORDS,) float32 and uint32, one memory, see `packets`
-    surface : float32, `alpha.SURFACE`; distance : float32, in units of the direction's length
+    context, words : (CONTEXT_WORDS,) float32 and uint32 views of the same memory, see `packets`
+    surface : float32, number of the surface (`alpha.SURFACE`)
+    distance : float32, distance of the hit in units of the direction's length
     """
     first = BLEND_EDGE_HITS + number * (2 * EDGE_HITS)
     count = np.int64(words[BLEND_EDGES + number])

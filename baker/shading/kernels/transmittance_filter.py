@@ -1,7 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The filter function of the tree of BLEND triangles: multiplies colours, and rejects every hit.
+"""The filter function of the tree of BLEND triangles, which multiplies transmittance and rejects every hit.
 
-The ray's ID row holds its number (`packets.PASSES`); the results are stored after the query's context
+The ID of a ray is its number, 1 to 16, or PASSES plus its number (`packets.PASSES`). For a ray without
+PASSES, the transmittance is multiplied by lerp(1, c, a), with alpha a and colour c of the surface. With
+PASSES it is multiplied by (1 - a) lerp(1, c, a). The transmittance is stored after the query context
 (`packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
@@ -91,7 +93,7 @@ def _multiply_colour(arguments):
         number -= PASSES if full else 0
         if not full and prim == context_words[BLEND_STOP + number]:
             continue
-        # Skip an edge that was crossed before; else multiply.
+        # Skip the hit if it is on an edge of a surface that was already crossed there. Otherwise multiply.
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
         if on_edge(b1, b2) and crossed_before(
