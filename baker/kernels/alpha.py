@@ -57,7 +57,7 @@ def no_alpha() -> AlphaTable:
 
 @inner
 def opacity(row, k, pack, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the opacity of row k at barycentrics (b1, b2), 0 to 1.
+    """Return the opacity, 0 to 1, of the triangle in row k at barycentrics (b1, b2).
 
     row : (K, 16) float32, see `AlphaTable`
     pack : TexturePack

@@ -18,39 +18,40 @@ from baker.trace.jit import inner, larger, smaller
 
 # Largest number of mip levels of a texture.
 MAX_LEVELS = 16
-# Columns of `TexturePack.level`, of `.wrap`, and the alpha channel of pixels.
+# Columns of `TexturePack.level`, columns of `TexturePack.wrap`, and the alpha column of pixels.
 OFFSET, WIDTH, HEIGHT = 0, 1, 2
 WRAP_U, WRAP_V, NEAREST, STORAGE = 0, 1, 2, 3
 ALPHA = 3
 # Values of WRAP_U and WRAP_V.
 _REPEAT, _MIRROR, _CLAMP = 0, 1, 2
 _WRAP = {"repeat": _REPEAT, "mirror": _MIRROR, "clamp": _CLAMP}
-# Values of STORAGE.
+# Values in column STORAGE.
 FLOATS, SRGB_BYTES, LINEAR_BYTES = 0, 1, 2
-# Rows of the finest level that are decoded at a time while the pyramid is built; even.
+# Rows of a level that are decoded in one step while the next level is computed; an even number.
 _STRIP = 256
 
 
 class TexturePack(NamedTuple):
     """RGBA of K textures with their mip levels.
 
-    The finest level of an 8-bit image stays in 8 bits and is decoded by each lookup. All other levels are
-    linear float32. An image of n texels takes 9.3 n bytes, or 21.3 n bytes if it is float32.
+    The finest level of an 8-bit image is stored in 8 bits, and each lookup decodes it. All other levels are
+    linear float32. An 8-bit image of n texels takes 9.3 n bytes, a float32 image 21.3 n bytes.
 
     Attributes
     ----------
     pixels : (n, 4) float32
-        Linear rows of all levels that are stored as floats.
+        Linear RGBA of all levels that are stored as floats, row after row.
     coded : (m, 4) uint8
-        Rows of the finest levels of 8-bit images, as in the image.
+        RGBA of the finest levels of 8-bit images, unchanged, row after row.
     level : (K, 16, 3) int64
-        OFFSET, WIDTH and HEIGHT of each level, finest first. OFFSET is a row of `coded` if the level is the
-        finest and STORAGE is not `FLOATS`, else a row of `pixels`.
+        OFFSET, WIDTH and HEIGHT of each level, finest first. OFFSET is the index of the level's first texel.
+        It is an index of `coded` if the level is the finest and STORAGE is not `FLOATS`, else of `pixels`.
     n_levels : (K,) int64
-        Levels of each texture.
+        Number of levels of each texture.
     wrap : (K, 4) int64
-        WRAP_U and WRAP_V: 0 repeat, 1 mirror, 2 clamp. NEAREST: 1 if lookups take the nearest texel. STORAGE
-        of the finest level: 0 float32, 1 bytes with sRGB-encoded colour and linear alpha, 2 linear bytes.
+        WRAP_U and WRAP_V: 0 repeat, 1 mirror, 2 clamp. NEAREST: 1 if lookups take the nearest texel, 0 if
+        they interpolate. STORAGE of the finest level: 0 float32, 1 bytes with sRGB-encoded colour and linear
+        alpha, 2 linear bytes.
     """
 
     pixels: NDArray[np.float32]
@@ -61,7 +62,7 @@ class TexturePack(NamedTuple):
 
 
 _LINEAR_BYTE = (np.arange(256) / np.float32(255.0)).astype(np.float32)
-# Linear value of each byte: the row is STORAGE, which has no bytes in row 0.
+# Linear value of each byte, (3, 256); the row is the value of STORAGE. Row 0 (FLOATS) is not used.
 _VALUE_OF_BYTE = np.stack([_LINEAR_BYTE, linear_from_srgb(np.arange(256) / 255.0), _LINEAR_BYTE])
 
 
@@ -97,7 +98,7 @@ def pack_textures(images: Sequence[PackImage]) -> TexturePack:
     Returns
     -------
     TexturePack
-        In the order of `images`; one row of each array, without texels, if there are none.
+        Textures in the order of `images`. Without images, each array has one row of zeros.
     """
     pack = _empty_pack(images)
     for k, image in enumerate(images):
@@ -106,7 +107,7 @@ def pack_textures(images: Sequence[PackImage]) -> TexturePack:
 
 
 def _empty_pack(images: Sequence[PackImage]) -> TexturePack:
-    """Return the pack of images with all levels laid out and all texels 0."""
+    """Return the pack of the images with the position of each level computed and all texels 0."""
     count = max(len(images), 1)
     level = np.zeros((count, MAX_LEVELS, 3), np.int64)
     n_levels, wrap = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
@@ -131,7 +132,7 @@ def _empty_pack(images: Sequence[PackImage]) -> TexturePack:
 
 
 def _fill(pack: TexturePack, k: int, image: NDArray[Any]) -> None:
-    """Write all levels of texture k."""
+    """Write all levels of texture k; `image` is its finest level."""
     level_rows(pack, k, 0)[:] = image.reshape(-1, 4)
     for n in range(1, int(pack.n_levels[k])):
         before, after = (
@@ -155,7 +156,7 @@ def level_rows(pack: TexturePack, k: int, n: int) -> NDArray[Any]:
     Returns
     -------
     (H * W, 4) float32 or uint8
-        A view. Bytes are decoded by `decoded`.
+        View of `pixels` or `coded`. `decoded` converts bytes to linear float32.
     """
     offset, width, height = (int(x) for x in pack.level[k, n])
     rows = pack.coded if n == 0 and pack.wrap[k, STORAGE] != FLOATS else pack.pixels
@@ -168,9 +169,9 @@ def decoded(stored: NDArray[Any], storage: int) -> NDArray[np.float32]:
     Parameters
     ----------
     stored : (..., 4) uint8 or float32
-        RGBA as in `level_rows`.
+        RGBA, from `level_rows`.
     storage : int
-        STORAGE of the texture; read if `stored` is uint8.
+        STORAGE of the texture; used only if `stored` is uint8.
 
     Returns
     -------
@@ -204,7 +205,10 @@ def value_limits(pack: TexturePack, k: int) -> tuple[NDArray[np.float32], NDArra
 
 
 def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Average blocks of 2 x 2 texels; an odd last row or column is left out, a single one is kept."""
+    """Return the averages of blocks of 2 x 2 texels.
+
+    If the number of rows or columns is odd, the last one is left out, unless it is the only one.
+    """
     rows = (
         image
         if image.shape[0] == 1
@@ -229,7 +233,10 @@ def wrapped(i, n, mode):  # type: ignore[no-untyped-def]
 
 @inner
 def _texel(pack, storage, at, c):  # type: ignore[no-untyped-def]
-    """Return channel c of row `at` of `pack.pixels`, or, if `storage` is not FLOATS, of `pack.coded`."""
+    """Return channel c of a texel, linear.
+
+    storage : FLOATS reads row `at` of `pack.pixels`, the other values read row `at` of `pack.coded`
+    """
     if storage == FLOATS:
         return pack.pixels[at, c]
     return _VALUE_OF_BYTE[storage if c != ALPHA else LINEAR_BYTES, pack.coded[at, c]]
@@ -243,7 +250,7 @@ def sample_alpha(pack, k, u, v):  # type: ignore[no-untyped-def]
     """
     offset, w, h = pack.level[k, 0, OFFSET], pack.level[k, 0, WIDTH], pack.level[k, 0, HEIGHT]
     storage = pack.wrap[k, STORAGE]
-    # Keep only the fraction of two periods of a repeated uv.
+    # Reduce a repeated uv modulo 2, the period of mirroring.
     wrap_u, wrap_v = pack.wrap[k, WRAP_U], pack.wrap[k, WRAP_V]
     x = (u - math.floor(u / 2.0) * 2.0 if wrap_u != _CLAMP else smaller(larger(u, -1.0), 2.0)) * w - 0.5
     y = (v - math.floor(v / 2.0) * 2.0 if wrap_v != _CLAMP else smaller(larger(v, -1.0), 2.0)) * h - 0.5
@@ -279,7 +286,7 @@ def sample_texture(pack, k, u, v, footprint, out):  # type: ignore[no-untyped-de
         n = int(smaller(math.log2(footprint * width) + 0.5, float(pack.n_levels[k] - 1)))
     offset, w, h = pack.level[k, n, OFFSET], pack.level[k, n, WIDTH], pack.level[k, n, HEIGHT]
     storage = pack.wrap[k, STORAGE] if n == 0 else FLOATS
-    # Keep only the fraction of two periods of a repeated uv.
+    # Reduce a repeated uv modulo 2, the period of mirroring.
     wrap_u, wrap_v = pack.wrap[k, WRAP_U], pack.wrap[k, WRAP_V]
     x = (u - math.floor(u / 2.0) * 2.0 if wrap_u != _CLAMP else smaller(larger(u, -1.0), 2.0)) * w - 0.5
     y = (v - math.floor(v / 2.0) * 2.0 if wrap_v != _CLAMP else smaller(larger(v, -1.0), 2.0)) * h - 0.5

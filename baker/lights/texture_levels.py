@@ -19,9 +19,10 @@ from baker.kernels.textures import HEIGHT, STORAGE, WIDTH, TexturePack, decoded,
 from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
-# Texels a side of an emissive image above which a coarser level is used, if no texel is lost by halving.
+# Width or height of an emissive image, texels, above which a coarser mip level is used, if its width and
+# height are even.
 LARGEST_SIDE = 2048
-# Rows that are averaged together; this bounds the working memory.
+# Largest number of rows or columns that are averaged in one step, which limits the working memory.
 _STRIP = 256
 
 
@@ -38,13 +39,17 @@ class TextureLevels:
     """One texture of a pack at all resolutions; each resolution is computed on first use."""
 
     def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
-        """Prepare a texture; weight (3,): factor of each channel in the sum of squares."""
+        """Prepare a texture.
+
+        texture : number of the texture in `pack`; weight : (3,) factors of R^2, G^2 and B^2 in sums of
+            squares
+        """
         finest = finest_level(pack, texture, weight)
         self.wrap = pack.wrap[texture]
         self.size = np.array([finest.w, finest.h])
         self._texture, self._weight = texture, weight
         self._made = {(0, 0): finest}
-        # Widths and heights of the levels down to one texel.
+        # Widths, and heights, of all levels down to one texel.
         self._sizes = [_halvings(finest.w), _halvings(finest.h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
@@ -125,10 +130,10 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
 
 
 def finest_level(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> Level:
-    """Return the level of a texture whose means guide the sampling of its emission.
+    """Return the mip level of a texture from which the means of its emission are computed.
 
-    It is the finest level of the pack. An image with more than `LARGEST_SIDE` texels a side and an even width
-    and height is represented by a coarser level of the pack, whose texels are means of 2 x 2 texels.
+    This is the finest level whose width and height are at most `LARGEST_SIDE` texels, or the first level of
+    odd width or height.
 
     Parameters
     ----------
@@ -137,12 +142,12 @@ def finest_level(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -
     texture : int
         Number of the texture.
     weight : (3,) float64
-        Factor of each channel in the sum of squares.
+        Factors of R^2, G^2 and B^2 in sums of squares.
 
     Returns
     -------
     Level
-        Linear texels and the running sums of their rows.
+        Linear texels, and the running sums along their rows.
     """
     n = 0
     size = pack.level[texture, :, [WIDTH, HEIGHT]].T

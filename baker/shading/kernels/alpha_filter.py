@@ -52,7 +52,7 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _INV_2_32 = 1.0 / 4294967296.0
-# The user data: address and length of each array.
+# Indices in the user data of the filter, which holds address and length of each array.
 _ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 18, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
 # Transmittance (largest of R, G and B) below which a shadow ray is blocked.

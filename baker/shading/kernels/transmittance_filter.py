@@ -42,7 +42,7 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# The user data: address and length of each array.
+# Indices in the user data of the filter, which holds address and length of each array.
 _SLOT, _ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP = range(0, 14, 2)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
