@@ -1,14 +1,14 @@
-"""Compares `baker` with Blender Cycles: same scene, uv and page, alternating in one run, at equal error.
+"""Compares bake times of `baker` and Blender Cycles at equal error, for the same scene, uv and page size.
 
     python -m venv elsewhere && elsewhere/bin/pip install 'bpy==4.5.*' mitsuba
     python benchmarks/against_cycles.py --python elsewhere/bin/python --markdown
 
-Optional: it needs Blender as a Python module (Python 3.11) and Mitsuba 3, which needs LLVM 17 or newer
-(DRJIT_LIBLLVM_PATH names the library if it is not found). Neither may share an environment with `baker`.
+This benchmark needs Blender as a Python module (Python 3.11) and Mitsuba 3, which needs LLVM 17 or newer. If
+LLVM is not found, set DRJIT_LIBLLVM_PATH to its library. Install both in a separate environment from `baker`.
 
-Mitsuba's path tracer, which is independent of both, computes the truth at the same random texels. The
-error of a texel is |value / truth - 1| of the mean of R, G, B; texels inside geometry (truth under 1 % of
-the median) are left out.
+The two programs bake alternately. Mitsuba's path tracer, which is independent of both, computes the truth at
+random texels. The error of a texel is |value / truth - 1|, where value and truth are means of R, G and B.
+Texels inside geometry are left out: their truth is below 1 % of the median.
 """
 
 from __future__ import annotations
@@ -35,7 +35,11 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass
 class Row:
-    """Is one setting of one program: the seconds of its turns, and the errors of its last."""
+    """The results of one program with one setting.
+
+    `seconds` and `bake_seconds` have one entry for each turn: the time of the whole process and of the bake
+    alone. `error` is that of the last turn.
+    """
 
     program: str
     samples: int
@@ -46,12 +50,12 @@ class Row:
 
     @property
     def label(self) -> str:
-        """Name the setting."""
+        """Return program, samples and denoising as text."""
         return f"{self.program}, {self.samples}{', denoised' if self.denoise else ''}"
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Bake with both alternately, compute the errors of both, print the tables."""
+    """Bake alternately with both programs, compute their errors and print the tables."""
     options = _options(argv)
     if options.source:
         result = json.loads(options.source.read_text(encoding="utf-8"))
@@ -73,26 +77,28 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--python", default=sys.executable, help="Python that has bpy and mitsuba")
     parser.add_argument(
-        "--scene", type=Path, default=ROOT / "assets" / "cornell.glb", help="plain colours only"
+        "--scene", type=Path, default=ROOT / "assets" / "cornell.glb", help="scene without textures"
     )
     parser.add_argument("--resolution", type=int, default=512)
-    parser.add_argument("--samples", default="4,16,64,256", help="of baker: gather and shadow rays per texel")
+    parser.add_argument("--samples", default="4,16,64,256", help="gather and shadow rays per texel of baker")
     parser.add_argument("--cycles-samples", default="4,16,64,256")
-    parser.add_argument("--repeat", type=int, default=2, help="turns; the least of each is shown")
-    parser.add_argument("--texels", type=int, default=1000, help="texels compared")
-    parser.add_argument("--spp", type=int, default=32768, help="paths per texel of the truth")
-    parser.add_argument("--truth", type=Path, help="keep the truth here, and use it again if it is there")
+    parser.add_argument("--repeat", type=int, default=2, help="turns; the shortest time is shown")
+    parser.add_argument("--texels", type=int, default=1000, help="number of texels to compare")
+    parser.add_argument("--spp", type=int, default=32768, help="paths per texel for the truth")
+    parser.add_argument("--truth", type=Path, help="file of the truth; read if it exists, else written")
     parser.add_argument("--json", type=Path, help="write all numbers to this file")
     parser.add_argument("--markdown", action="store_true", help="tables as Markdown")
     parser.add_argument("--from", dest="source", type=Path, help="show an earlier --json file; bake nothing")
-    parser.add_argument("--into", type=Path, help="put the Markdown tables between the marks in this file")
+    parser.add_argument(
+        "--into", type=Path, help="insert the tables between the marker lines of this document"
+    )
     return parser.parse_args(argv)
 
 
 def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     cache, size = folder / "kernels", options.resolution
     flags = ["--resolution", str(size), "--channels", "irradiance", "--dtype", "float"]
-    # The first bake unwraps and compiles; all others, and Cycles, use its uv.
+    # Unwrap and compile in a first bake. All other bakes, and Cycles, use the uv of this bake.
     bake(options.scene, folder / "first", flags=[*flags, "--samples", "4"], cache=cache)
     scene = folder / "first" / "scene.glb"
     flags += ["--uv", "keep"]
@@ -146,7 +152,7 @@ def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 class _Truth:
-    """Holds path-traced irradiance of some texels."""
+    """The path-traced irradiance of some texels."""
 
     def __init__(self, path: Path) -> None:
         truth = np.load(path)
@@ -162,7 +168,7 @@ class _Truth:
         }
 
     def error(self, image: NDArray[np.float32]) -> dict[str, float]:
-        """Return figures of an (H, W, 3) irradiance map against the truth."""
+        """Return the median, 95 % quantile and bias of the relative error of an irradiance map (H, W, 3)."""
         value = image[self._place].mean(axis=1)
         relative = np.abs(value / self._value - 1.0)
         return {
@@ -180,7 +186,7 @@ def _cycles(
     denoise: bool,
     surface: Path | None = None,
 ) -> tuple[float, dict[str, str], dict[str, Any]]:
-    """Bake in a Blender process; return its whole seconds, versions, and what it wrote."""
+    """Bake in a Blender process; return its duration in seconds, versions, and the arrays that it wrote."""
     out = folder / "cycles.npz"
     run = {"samples": samples, "denoise": denoise, "seed": 1, "out": str(out)}
     job = {"scene": str(scene), "resolution": options.resolution, "runs": [run]}
@@ -194,7 +200,10 @@ def _cycles(
 def _trace_truth(
     options: argparse.Namespace, folder: Path, surface: Path, mask: NDArray[np.bool_], out: Path
 ) -> dict[str, str]:
-    """Path-trace random texels of those that Cycles covers (their centre lies on the surface)."""
+    """Path-trace random texels among those that Cycles covers, whose centre lies on the surface.
+
+    Writes the irradiance to `out` and returns the versions of the programs.
+    """
     covered = np.flatnonzero(mask.ravel())
     chosen = np.sort(
         np.random.default_rng(0).choice(covered, min(options.texels, len(covered)), replace=False)
@@ -258,9 +267,10 @@ def _tables(result: dict[str, Any], *, markdown: bool) -> str:
 
 
 def _equal(rows: list[dict[str, Any]]) -> list[tuple[str | float, ...]]:
-    """Set each setting of Cycles beside the quickest of baker whose median error is no larger.
+    """Return a row for each setting of Cycles with the fastest setting of baker whose error is not larger.
 
-    Cycles counts without Blender's start and import, baker with everything: the ratio is a lower bound.
+    The error is the median error. The ratio of the times is a lower bound: Cycles' time is that of the bake
+    alone, baker's time is that of the whole process.
     """
     ours = [row for row in rows if row["program"] == "baker"]
     found: list[tuple[str | float, ...]] = []

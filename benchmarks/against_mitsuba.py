@@ -1,12 +1,13 @@
-"""Compares the reference path tracer with Mitsuba 3: path segments and occlusion rays a second, alternating.
+"""Compares the speed of the reference path tracer and Mitsuba 3: path segments and occlusion rays per second.
 
     pip install -e '.[mitsuba]'        llvm_ad_rgb needs LLVM 17 or newer, Debian: libllvm19
     python benchmarks/against_mitsuba.py --into docs/PERFORMANCE.md
 
-Both trace the same flat Lambertian triangles from the same camera, with one shadow ray at every vertex and
-MIS. Paths end after `SEGMENTS` closest-hit rays without roulette, so both cast as many: ours are counted, and
-Mitsuba's, which does not count, are taken to be the same for each path. Occlusion rays start at what the
-camera sees, cosine-weighted, within a tenth of the scene's diagonal. Compiling is not timed.
+Both programs run alternately. They trace the same flat Lambertian triangles from the same camera, with MIS
+and one shadow ray at every vertex. Paths end after `SEGMENTS` closest-hit rays, without Russian roulette, so
+both cast the same number of rays. The rays of the reference path tracer are counted; Mitsuba does not count
+rays, so the same number per path is assumed. Occlusion rays start at the first hits of camera rays. They are
+cosine-weighted and end after a tenth of the scene's diagonal. Compilation is not timed.
 """
 
 from __future__ import annotations
@@ -35,13 +36,16 @@ from baker.pathtracer.radiance import radiance_pass
 from baker.pathtracer.scene import build_reference
 
 ROOT = Path(__file__).resolve().parent.parent
+# Size of the picture, pixels.
 WIDTH, HEIGHT = 512, 384
+# Number of closest-hit rays of a path.
 SEGMENTS = 4
+# Number of occlusion rays at each point.
 OPEN_SAMPLES = 64
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Measure both alternately and print a table."""
+    """Measure both programs alternately and print a table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -49,7 +53,9 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--repeat", type=int, default=3)
     parser.add_argument("--json", type=Path, help="write all numbers to this file")
-    parser.add_argument("--into", type=Path, help="put the tables between the marks in this file")
+    parser.add_argument(
+        "--into", type=Path, help="insert the tables between the marker lines of this document"
+    )
     options = parser.parse_args(argv)
     mi.set_variant("llvm_ad_rgb")
     found = measure(options.scene, options.spp, options.repeat)
@@ -65,7 +71,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
-    """Return rates, million rays a second, of each turn."""
+    """Return the rates of each turn, in million rays per second, and the mean results of both programs."""
     from mitsuba_scene import flat, mitsuba_camera, mitsuba_scene
 
     threads = thread_count(None)
@@ -102,7 +108,7 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
             share = _mitsuba_ao(other, where[0][:, 0], where[2][:, 0], reach, turn)
             theirs_open = perf_counter() - start
             if turn == 0:
-                # The first turn compiles.
+                # Discard the first turn, which compiles.
                 continue
             segments = estimate.segments / 1e6
             rates["segments"].append(segments / own)
@@ -120,7 +126,10 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
 
 
 def _mitsuba_ao(scene: Any, position: Any, normal: Any, reach: float, seed: int) -> float:
-    """Return the unoccluded share of cosine-weighted rays, `OPEN_SAMPLES` a point."""
+    """Return the unoccluded share of cosine-weighted rays, `OPEN_SAMPLES` at each point.
+
+    position, normal : (n, 3), world; reach : float, length of the rays, metres
+    """
     n = len(position)
     point, up = mi.Point3f(position.T.astype(np.float32)), mi.Normal3f(normal.T.astype(np.float32))
     index = dr.arange(mi.UInt32, n * OPEN_SAMPLES) % n
@@ -135,7 +144,7 @@ def _mitsuba_ao(scene: Any, position: Any, normal: Any, reach: float, seed: int)
 
 
 def tables(found: dict[str, Any], *, markdown: bool) -> str:
-    """Return the rates and the machine."""
+    """Return the tables of rates and of the machine as text."""
     head = ("what", "ours", "median", "Mitsuba llvm_ad_rgb", "median ", "times")
     rows = []
     for name, own in found["ours"].items():

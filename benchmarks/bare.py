@@ -1,7 +1,8 @@
-"""The rate of Embree alone: packets of rays as a bake casts them, and nothing done with what they hit.
+"""Measures the ray rate of Embree alone: packets of rays as in a bake, without any evaluation of the hits.
 
-Two loops each: `ready` reads packets that were made before the clock starts; `made` also makes the rays,
-as the bake's own kernels do. Both use the bake's own points, directions, packet width, tiles and threads.
+There are two loops. `ready` traces packets that were created before the measurement. `made` also creates the
+rays inside the measurement, like the kernels of a bake. Both use the points, directions, packet width, tiles
+and threads of a bake.
 """
 
 from __future__ import annotations
@@ -33,11 +34,13 @@ from baker.trace.packets import (
     trace_lanes,
 )
 
-# Rows of a packet that hold the ray; the hit needs only its geometry number reset.
+# Number of rows of Embree's packet layout that describe the ray.
 RAY_ROWS = 12
+# Row of the hit's geometry ID, the only row of the hit that must be reset before each call.
 GEOM_ROW = 18
-# Texels in a tile, and the most rays that are kept ready at once (about 50 bytes each).
+# Number of texels in a tile.
 TILE = 256
+# Largest number of rays that are stored for `ready`, about 50 bytes each.
 MOST_READY = 4_000_000
 
 
@@ -51,7 +54,12 @@ def _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seed
 
 @njit(cache=True, nogil=True)
 def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative):  # type: ignore[no-untyped-def]
-    """Aim at points uniform on the emitters' area; lanes that cannot be lit take no part, as in a bake."""
+    """Aim the rays of a packet at points distributed uniformly over the emitters' area.
+
+    As in a bake, a lane is inactive if the emitter or the point faces away. Shapes: rays, the packet's
+    float32 rows; on : (PACKET_WIDTH,) int32, -1 for active lanes; origin, normal : (n, 16, 3) float32; net :
+    (s, 2) uint32, Sobol points; corner : (M, 12) and cumulative : (M,) float32 from `_emitter_corners`.
+    """
     k = s * N_POINTS // len(net)
     d = np.zeros(3, np.float32)
     for lane in range(lanes):
@@ -76,7 +84,10 @@ def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, 
 
 @njit(cache=True, nogil=True)
 def _made(function, buffers, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
-    """Make and trace all hemisphere rays of a tile; return a number that depends on them."""
+    """Create and trace all hemisphere rays of a tile.
+
+    Returns a number that depends on all results, so that the compiler does not remove the loop.
+    """
     width, scene = buffers.width, buffers.scene
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
     spare_on, spare = buffers.valid, buffers.floats
@@ -96,9 +107,10 @@ def _made(function, buffers, origin, normal, begin, net, shared, far):  # type: 
 
 @njit(cache=True, nogil=True)
 def _store(buffers, origin, normal, begin, net, shared, far, corner, cumulative, bank, lanes_on):  # type: ignore[no-untyped-def]
-    """Write the packets of a tile to `bank` (packets, 12 * width) and their lanes to `lanes_on`.
+    """Create all packets of a tile, towards emitters if `corner` has rows, else over the hemisphere.
 
-    With emitters in `corner` the rays go there, else over the hemisphere.
+    bank : (packets, RAY_ROWS * width) float32 output, rays
+    lanes_on : (packets, width) int32 output, -1 for active lanes
     """
     width = buffers.width
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
@@ -127,7 +139,7 @@ def _store(buffers, origin, normal, begin, net, shared, far, corner, cumulative,
 
 @njit(cache=True, nogil=True)
 def _ready(function, buffers, bank, lanes_on):  # type: ignore[no-untyped-def]
-    """Trace stored packets; return a number that depends on them."""
+    """Trace the packets stored by `_store`; return a number that depends on all results, see `_made`."""
     width, scene, valid, floats, words = (
         buffers.width,
         buffers.scene,
@@ -162,18 +174,22 @@ class _Tile:
 
 
 class BareRays:
-    """Rays of one kind from texels spread over the whole page, kept ready to be traced again and again.
+    """Stored rays of one kind from texels of all parts of the pages, which can be traced repeatedly.
 
     Parameters
     ----------
     world : PreparedScene
-        See `baker.pipeline.prepare.prepare_scene`.
+        Result of `baker.pipeline.prepare.prepare_scene`.
     n_samples : int
-        Rays per texel.
+        Number of rays per texel.
+    seed : int
+        Seed of the directions.
+    threads : int
+        Number of threads.
     occlusion : bool
-        Ask only whether something is in the way.
+        Trace occlusion rays instead of closest-hit rays.
     distance : float
-        Reach in metres, inf for no end.
+        Length of the rays, metres; inf for unlimited.
     to_emitters : bool
         Aim at emissive triangles instead of over the hemisphere.
     """
@@ -227,12 +243,13 @@ class BareRays:
         return _Tile(begin, origin, normal, bank, lanes_on, (end - begin) * n_samples)
 
     def rate(self, *, ready: bool) -> float:
-        """Trace all rays once and return Mrays/s.
+        """Trace all rays once and return the rate in Mrays/s.
 
         Parameters
         ----------
         ready : bool
-            Use the stored packets; else make the rays inside the clock (hemisphere rays only).
+            Whether to trace the stored packets. Otherwise the rays are created inside the measurement, which
+            is only possible for hemisphere rays.
         """
         if not ready and not self._made_too:
             raise ValueError("rays to emitters are only measured ready-made")
@@ -255,7 +272,7 @@ class BareRays:
         return self.rays / (perf_counter() - start) / 1e6
 
     def warm(self) -> None:
-        """Compile the loops on the first tile."""
+        """Compile the kernels by tracing the first tile."""
         first, self._tiles = self._tiles, self._tiles[:1]
         self.rate(ready=True)
         if self._made_too:
@@ -264,7 +281,10 @@ class BareRays:
 
 
 def _emitter_corners(emitters: Emitters, *, wanted: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return (M, 12) corners and normal of the emissive triangles, and (M,) running share of area."""
+    """Return the geometry of M emissive triangles; M = 0 if `wanted` is false.
+
+    Returns (M, 12) float32, three corners and the normal, and (M,) float32, the cumulative share of area.
+    """
     if not wanted or not len(emitters.row):
         return np.zeros((0, 12), np.float32), np.zeros(0, np.float32)
     area = emitters.row[:, 12].astype(np.float64)

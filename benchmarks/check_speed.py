@@ -1,7 +1,7 @@
-"""How long `baker check` takes: a million triangles with lightmap uv, and a hundred kit pieces at once.
+"""Measures `baker check` on a mesh of a million triangles with lightmap uv, and on a hundred kit pieces.
 
-python benchmarks/check_speed.py            both, each as one process of `baker check`, after one to warm up
-python benchmarks/check_speed.py --profile  seconds of every check on the million triangles
+python benchmarks/check_speed.py            both cases, each as one process, after a process that warms up
+python benchmarks/check_speed.py --profile  time of each check on the million triangles
 """
 
 from __future__ import annotations
@@ -17,13 +17,17 @@ from pathlib import Path
 import numpy as np
 
 KIT = Path(__file__).parents[1] / "assets" / "third-party"
-# Vertices a side of the grid: 2 * 708^2 = 1 002 528 triangles.
+# Number of vertices along a side of the grid, which has 2 * 708^2 = 1 002 528 triangles.
 SIDE = 709
+# Number of charts along a side of the grid.
 CHARTS = 12
 
 
 def bumpy_sheet(side: int = SIDE) -> bytes:
-    """Return a GLB of one wavy sheet, its uv cut into square charts a few texels apart at 2048."""
+    """Return a GLB file of one wavy sheet.
+
+    Its uv consists of square charts, whose distance is a few texels on a page of 2048 texels a side.
+    """
     cells = side - 1
     per_chart = cells // CHARTS
     position, uv, triangle = [], [], []
@@ -47,7 +51,7 @@ def bumpy_sheet(side: int = SIDE) -> bytes:
 
 
 def pack(position: np.ndarray, uv: np.ndarray, triangle: np.ndarray) -> bytes:
-    """Return a GLB of one mesh, with normals along +Y."""
+    """Return a GLB file of one mesh with all normals along +Y."""
     arrays = [
         (np.float32(position), "VEC3", 5126),
         (np.float32(np.tile([0.0, 1.0, 0.0], (len(position), 1))), "VEC3", 5126),
@@ -73,13 +77,13 @@ def pack(position: np.ndarray, uv: np.ndarray, triangle: np.ndarray) -> bytes:
 
 
 def kit_pieces(count: int = 100) -> list[str]:
-    """Return `count` paths of small kit pieces, some of them several times."""
+    """Return `count` paths of small kit pieces, repeated if there are fewer pieces."""
     pieces = sorted(p for p in KIT.rglob("*.glb") if p.parts[-2].startswith(("kaykit", "kenney")))
     return [str(pieces[k % len(pieces)]) for k in range(count)]
 
 
 def timed(*arguments: str) -> float:
-    """Return the seconds of one `baker check`."""
+    """Run `baker check` once and return its duration in seconds."""
     start = time.perf_counter()
     subprocess.run(
         [sys.executable, "-m", "baker.cli", "check", *arguments, "-q"], check=False, stdout=subprocess.DEVNULL
@@ -88,7 +92,7 @@ def timed(*arguments: str) -> float:
 
 
 def profile(path: Path) -> None:
-    """Print the seconds of each check, slowest first."""
+    """Print the duration of the 20 slowest checks and of all checks together, slowest first."""
     from baker.checks.run import check_scene
     from baker.checks.settings import CheckSettings
     from baker.core.settings import BakeSettings
@@ -100,7 +104,7 @@ def profile(path: Path) -> None:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure both cases, or profile the first, and print the durations."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "million.glb"
         path.write_bytes(bumpy_sheet())

@@ -1,13 +1,17 @@
-"""Bakes a scene.glb with Blender's Cycles onto its second uv set; run by `against_cycles.py` where `bpy` is.
+"""Bakes a scene.glb with Blender's Cycles in its second uv set.
+
+`against_cycles.py` runs this script in the Python environment that has `bpy`:
 
     python cycles_bake.py JOB.json
 
 JOB.json: {"scene", "resolution", "runs": [{"samples", "denoise", "seed", "out"}], "surface": FILE.npz}.
-Each `out` is an .npz with `irradiance` (H, W, 3), first row v = 0 as in glTF, `covered` (H, W) and
-`seconds` of the bake alone; `surface` gets the triangles as Blender sees them, for the path tracer.
+Each `out` is an .npz file with `irradiance` (H, W, 3), where the first row is v = 0 as in glTF, `covered`
+(H, W) and `seconds`, the duration of the bake alone. Blender's triangles are written to `surface`, for the
+path tracer.
 
-What makes the two bakes the same quantity: a diffuse bake without colour is E / pi; every material becomes
-plainly Lambertian with one emission, black on its back; no clamping, no light left out, 64 bounces.
+The following settings make Cycles bake the same quantity as baker. A diffuse bake without colour is E / pi.
+Every material is replaced by a Lambertian material with constant emission and a black back. Clamping and
+light thresholds are off, and paths have up to 64 bounces.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ BOUNCES = 64
 
 
 def main() -> None:
-    """Load the scene once and do all runs of the job."""
+    """Load the scene and bake all runs of the job."""
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=job["scene"])
@@ -41,10 +45,10 @@ def main() -> None:
     bpy.ops.object.select_all(action="DESELECT")
     for item in meshes:
         item.select_set(True)
-        # The importer keeps the order of texture coordinates: the last one is TEXCOORD_1.
+        # Bake to the last uv layer, which is TEXCOORD_1: the importer keeps the order of the sets.
         item.data.uv_layers.active = item.data.uv_layers[-1]
     bpy.context.view_layer.objects.active = meshes[0]
-    # One object, one bake: Cycles would build its tree again for each object.
+    # Join all objects and bake once, because Cycles builds its BVH again for each baked object.
     bpy.ops.object.join()
     if job.get("surface"):
         _write_surface(bpy.context.view_layer.objects.active, colours, job["surface"])
@@ -54,7 +58,7 @@ def main() -> None:
 
 
 def _make_plain(material: Any, image: Any) -> tuple[list[float], list[float]]:
-    """Replace a material's nodes; return its albedo and emission."""
+    """Replace a material's nodes by Lambertian reflection and emission; return its albedo and emission."""
     tree = material.node_tree
     old = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
     if old.inputs["Base Color"].links or old.inputs["Emission Color"].links:
@@ -93,7 +97,7 @@ def _write_surface(item: Any, colours: dict[str, tuple[list[float], list[float]]
     corner = np.array([[mesh.vertices[v].co for v in t.vertices] for t in triangles])
     world = np.array(item.matrix_world)
     uv = np.array([[layer[k].uv for k in t.loops] for t in triangles])
-    # Blender counts v from the other end.
+    # Flip v, because Blender has v = 0 at the bottom of the image.
     uv[..., 1] = 1.0 - uv[..., 1]
     names = [slot.material.name for slot in item.material_slots]
     shade = [colours[names[t.material_index]] for t in triangles]
@@ -121,7 +125,8 @@ def _bake(run: dict[str, Any], image: Any) -> None:
     settings.margin, settings.use_clear = 0, True
     colour = 1.0
     if run["denoise"]:
-        # Cycles denoises only a combined bake: that is albedo x E / pi once emission is left out.
+        # Use a combined bake, because Cycles denoises no other type. Without emission it is albedo x E / pi,
+        # so bake the albedo first and divide by it.
         settings.use_pass_emit = settings.use_pass_glossy = settings.use_pass_transmission = False
         kind = {"type": "COMBINED"}
         cycles.samples, cycles.use_denoising = 1, False

@@ -1,4 +1,4 @@
-"""What a measurement was made on: processor, cores, memory, versions, date."""
+"""Describes the machine of a measurement: date, processor, cores, memory and versions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PACKAGES = ("baker", "numpy", "scipy", "numba", "embreex", "xatlas", "pyoidn", "
 
 
 def describe() -> dict[str, str | float | int]:
-    """Return the machine and the versions as one flat table."""
+    """Return {property: value} of the machine, and the versions of Python and of `PACKAGES`."""
     found: dict[str, str | float | int] = {
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
         "processor": _processor(),
@@ -30,7 +30,7 @@ def describe() -> dict[str, str | float | int]:
 
 
 def load() -> float:
-    """Return the load average of the last minute; 0 where it is unknown."""
+    """Return the load average of the last minute; 0 if the system does not report it."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else 0.0
 
 
@@ -43,7 +43,7 @@ def _processor() -> str:
             facts.setdefault(key.strip(), value.strip())
     name = facts.get("model name") or platform.processor() or "unknown"
     if "model" in facts and "cpu family" in facts:
-        # Virtual machines often report only the maker's name; family and model identify the generation.
+        # Add family and model, which identify the processor if a virtual machine reports only the vendor.
         name += f" (family {facts['cpu family']}, model {facts['model']})"
     if "avx512f" in facts.get("flags", ""):
         name += ", AVX-512"

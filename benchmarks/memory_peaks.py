@@ -1,9 +1,9 @@
-"""Compares the estimate of a bake's memory (`baker/core/budget.py`) with measured peaks, as a table.
+"""Prints a table of estimated (`baker/core/budget.py`) and measured peaks of a bake's memory.
 
 python benchmarks/memory_peaks.py
 
-Each bake runs in its own process, whose largest resident memory Linux reports; all take some minutes. Small
-cases are tested in `tests/unit/core/test_budget.py`.
+Each bake runs in a separate process, whose largest resident memory Linux reports. All bakes together take
+some minutes. `tests/unit/core/test_budget.py` tests small cases.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ print(open("/proc/self/status").read())
 
 
 def measured_peak(scene: Path, values: dict[str, Any]) -> int:
-    """Bake a scene and return the largest resident memory, bytes."""
+    """Bake a scene in a new process and return its largest resident memory, bytes."""
     command = [sys.executable, "-c", BAKE, str(scene), json.dumps(values)]
     status = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     found = re.search(r"VmHWM:\s*(\d+) kB", status)

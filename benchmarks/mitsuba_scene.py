@@ -1,7 +1,8 @@
-"""A scene of the reference path tracer, handed to Mitsuba 3 triangle for triangle.
+"""Converts a scene of the reference path tracer to Mitsuba 3, with the same triangles.
 
-Only what both mean alike: Lambertian fronts with plain or textured colours, black backs, flat normals, point
-and directional lights. The variant must have been set.
+Only features with the same meaning in both programs are converted: Lambertian fronts with constant or
+textured colours, black backs, flat normals, and point and directional lights. Callers set Mitsuba's variant
+first.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ from baker.pathtracer.scene import FACE, SHADING, Reference
 
 
 def flat(reference: Reference) -> Reference:
-    """Return the reference with its triangles' own normals instead of interpolated ones."""
+    """Return the reference with face normals as shading normals."""
     row = reference.surfaces.row.copy()
     row[:, SHADING : SHADING + 9] = np.tile(row[:, FACE : FACE + 3], 3)
     return replace(reference, surfaces=reference.surfaces._replace(row=row))
 
 
 def mitsuba_scene(scene: Scene, reference: Reference, **more: Any) -> Any:
-    """Return the Mitsuba scene; `more` are further objects of its dictionary.
+    """Return the Mitsuba scene; `more` are additional objects, by their name in Mitsuba's dictionary.
 
     Raises
     ------
     ValueError
-        If something of the scene means another thing to Mitsuba.
+        If the scene has a feature that is not converted.
     """
     geometry, shading = reference.geometry, reference.shading
     if geometry.double_sided.any() or len(shading.alpha.slot) or len(shading.colour) > 1:
@@ -67,12 +68,12 @@ def mitsuba_scene(scene: Scene, reference: Reference, **more: Any) -> Any:
             }
         else:
             raise ValueError("Mitsuba's spots fall off in another way than glTF's")
-    # Otherwise Mitsuba merges equal parts of a dictionary, but a meter can have only one parent.
+    # Switch optimisation off: it merges equal objects, but an irradiance meter can have only one parent.
     return mi.load_dict(parts, optimize=False)
 
 
 def mitsuba_camera(camera: Camera, width: int, height: int) -> dict[str, Any]:
-    """Return the same pinhole, a box for a pixel."""
+    """Return Mitsuba's description of the same pinhole camera, with a box filter of one pixel."""
     target = np.add(camera.position, camera.forward)
     return {
         "type": "perspective",

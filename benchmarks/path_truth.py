@@ -1,13 +1,15 @@
-"""Path-traced irradiance of single texels by Mitsuba 3, the reference of both bakes; see `against_cycles.py`.
+"""Path-traces the irradiance of single texels with Mitsuba 3, as the truth for `against_cycles.py`.
 
     python path_truth.py JOB.json
 
 JOB.json: {"surface": FILE.npz from cycles_bake, "texels": FILE.npz, "resolution", "spp", "out": FILE.npz}.
-`texels` holds `row`, `column` (n,); `out` gets `irradiance` and `standard_error` (n, 3) and `seconds`.
+`texels` contains `row` and `column` (n,). `irradiance` (n, 3), `standard_error` (n, 3) and `seconds` are
+written to `out`. The irradiance is
 
-    E = integral of L cos = direct (emitter sampled) + pi x mean of L over cosine rays that see no emitter
+    E = integral of L cos = E_direct + pi x mean of L_indirect over cosine-weighted rays
 
-Rays start from points distributed over the part of the surface inside the texel's square.
+where E_direct is estimated by sampling emitters, and L_indirect excludes emission at the first hit. Rays
+start at points distributed over the part of the surface inside the texel's square.
 """
 
 from __future__ import annotations
@@ -23,15 +25,18 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-# Places in each texel, and paths that run at once.
+# Number of points in each texel.
 PLACES = 64
+# Largest number of paths that are traced at once.
 AT_ONCE = 1 << 21
+# Distance by which points are moved along their normals, metres.
 OFFSET = 1e-5
+# Number of independent batches, from which the standard error is computed.
 BATCHES = 16
 
 
 def main() -> None:
-    """Trace the texels of the job."""
+    """Path-trace the texels of the job and write the result."""
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     mi.set_variant("llvm_ad_rgb")
     surface = np.load(job["surface"])
@@ -45,7 +50,7 @@ def main() -> None:
 
 
 def _scene(surface: Any) -> Any:
-    """Return the Mitsuba scene: one mesh for each pair of albedo and emission, one-sided."""
+    """Return the Mitsuba scene, with one one-sided mesh for each pair of albedo and emission."""
     key = np.concatenate([surface["albedo"], surface["emission"]], axis=1)
     kinds, of = np.unique(key, axis=0, return_inverse=True)
     parts: dict[str, Any] = {"type": "scene"}
@@ -71,7 +76,10 @@ def _scene(surface: Any) -> Any:
 def _places(
     surface: Any, row: NDArray[np.int64], column: NDArray[np.int64], size: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return origins and normals (n, PLACES, 3), uniform in the part of each texel that is surface."""
+    """Return the points (n, PLACES, 3) and their normals (n, PLACES, 3).
+
+    The points are distributed uniformly over the part of each texel that is covered by surface.
+    """
     generator = np.random.default_rng(1)
     a, b, c = (surface["uv"][:, k] * size for k in range(3))
     det = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
@@ -106,7 +114,7 @@ def _places(
 def _irradiance(
     scene: Any, position: NDArray[np.float64], normal: NDArray[np.float64], spp: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return mean and standard error (n, 3) of E at the texels, from `BATCHES` independent batches."""
+    """Return the irradiance (n, 3) of the texels and its standard error (n, 3), from `BATCHES` batches."""
     integrator = mi.load_dict({"type": "path", "max_depth": 1000, "rr_depth": 8})
     n = len(position)
     rounds = max(1, spp // (PLACES * BATCHES))
@@ -114,7 +122,7 @@ def _irradiance(
     batch = np.zeros((BATCHES, n, 3))
     for number in range(BATCHES):
         for begin in range(0, n, span):
-            # Every place is used `rounds` times in a batch.
+            # Trace `rounds` paths from each point in a batch.
             p = np.repeat(position[begin : begin + span].reshape(-1, 3), rounds, axis=0).astype(np.float32)
             m = np.repeat(normal[begin : begin + span].reshape(-1, 3), rounds, axis=0).astype(np.float32)
             total = np.array(_sample(scene, integrator, p, m, number * 1_000_003 + begin))
@@ -126,7 +134,7 @@ def _irradiance(
 def _sample(
     scene: Any, integrator: Any, position: NDArray[np.float32], normal: NDArray[np.float32], seed: int
 ) -> Any:
-    """Return one estimate of E (3, m) at each of m points."""
+    """Return (3, m): one estimate of the irradiance at each of m points, from one path."""
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(position))
     p, n = mi.Point3f(position.T), mi.Normal3f(normal.T)
@@ -138,7 +146,7 @@ def _sample(
     direction = mi.Frame3f(n).to_world(mi.warp.square_to_cosine_hemisphere(sampler.next_2d()))
     ray = mi.RayDifferential3f(p, direction)
     seen = integrator.sample(scene, sampler, ray)[0]
-    # What the ray sees of an emitter is in `direct` already.
+    # Subtract the emission at the first hit, which `direct` contains.
     hit = scene.ray_intersect(ray)
     return direct + dr.pi * (seen - hit.emitter(scene).eval(hit))
 

@@ -1,4 +1,4 @@
-"""Runs `baker bake` as its own process and measures it from outside: seconds, processor time, memory."""
+"""Runs `baker bake` in a separate process and measures its duration, processor time and memory."""
 
 from __future__ import annotations
 
@@ -12,23 +12,25 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-# Seconds between two measurements of the memory of all processes of a bake.
+# Time between two measurements of the memory of all processes of a bake, seconds.
 _LOOK = 0.05
 
 
 @dataclass(frozen=True)
 class Run:
-    """Is what one bake took.
+    """The measurements of one bake.
 
     Attributes
     ----------
     seconds : float
-        The whole process, from its start to its end.
+        Duration of the whole process, from its start to its end.
     cpu : float
-        Processor seconds of it and all its helpers: what another load on the machine changes least.
+        Processor time of the process and all its child processes, seconds. Other load on the machine affects
+        it less than `seconds`.
     peak : float
-        MiB resident, helpers included: the largest sum seen, at least the largest single process.
-    timings, rays, solve, pages : from `bake.json`
+        Largest resident memory, MiB: the maximum over time of the sum over all processes of the bake, or the
+        peak of a single process if that is larger.
+    timings, rays, solve, pages : entries of `bake.json`
     """
 
     seconds: float
@@ -40,27 +42,31 @@ class Run:
     pages: list[dict[str, Any]]
 
     def plain(self) -> dict[str, Any]:
-        """Return the run as plain data."""
+        """Return the measurements as a dict that JSON can hold."""
         return asdict(self)
 
 
 def bake(scene: Path, out: Path, *, flags: list[str], cache: Path) -> Run:
-    """Bake `scene` to `out` in a process of its own.
+    """Bake `scene` to `out` in a separate process.
 
     Parameters
     ----------
+    scene : Path
+        Scene file.
+    out : Path
+        Output folder.
     flags : list of str
         Further flags of `baker bake`.
     cache : Path
-        Folder for Numba's compiled kernels; an empty one makes this a first run.
+        Folder for Numba's compiled kernels. With an empty folder, the bake compiles all kernels.
 
     Raises
     ------
     RuntimeError
-        If the bake fails; its own words are in the message.
+        If the bake fails; the message contains its standard error.
     """
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    # A setting that keeps Python from storing bytecode would add its compilation to every start.
+    # Let Python store bytecode. Otherwise every process would compile all modules.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     command = [sys.executable, "-m", "baker.cli", "bake", str(scene), "-o", str(out), "--force", "-q", *flags]
     start = perf_counter()
@@ -78,8 +84,7 @@ def bake(scene: Path, out: Path, *, flags: list[str], cache: Path) -> Run:
     return Run(
         seconds=seconds,
         cpu=usage.ru_utime + usage.ru_stime,
-        # Linux counts the memory of the process that started a program as that program's, so its own
-        # high-water mark is read instead where there is one.
+        # Prefer the measured peak: on Linux, `ru_maxrss` includes the memory of this process at the fork.
         peak=memory.peak or usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 1024),
         timings=manifest["timings"],
         rays=manifest["rays"],
@@ -89,7 +94,7 @@ def bake(scene: Path, out: Path, *, flags: list[str], cache: Path) -> Run:
 
 
 class _Memory(threading.Thread):
-    """Looks again and again at the resident memory of a process and all below it (Linux only)."""
+    """Measures the resident memory of a process and all its descendants at intervals (Linux only)."""
 
     def __init__(self, pid: int) -> None:
         super().__init__(daemon=True)
@@ -105,9 +110,9 @@ class _Memory(threading.Thread):
                 try:
                     status = (folder / "status").read_text(encoding="utf-8")
                     fact = dict(line.split(":", 1) for line in status.splitlines())
-                    # Shared pages (libraries, memory from before a fork) count once, in the first process.
+                    # Add file-backed pages (libraries) of the first process only, since processes share them.
                     total += _mib(fact["RssAnon"]) + (0.0 if total else _mib(fact["RssFile"]))
-                    # What was larger between two looks, in one process.
+                    # Include the high-water mark of each process, for peaks between two measurements.
                     self.peak = max(self.peak, _mib(fact["VmHWM"]))
                     for thread in (folder / "task").iterdir():
                         waiting += [int(word) for word in (thread / "children").read_text().split()]
@@ -121,5 +126,5 @@ class _Memory(threading.Thread):
 
 
 def _mib(text: str) -> float:
-    """Return MiB of a line of /proc/PID/status, like " 1024 kB"."""
+    """Convert a value of /proc/PID/status, such as " 1024 kB", to MiB."""
     return int(text.split()[0]) / 1024

@@ -1,4 +1,4 @@
-"""Ray rates of the bake's stages and of the loops of `bare`, measured alternately in one process."""
+"""Measures the ray rates of a bake's stages and of the loops of `bare`, alternately in one process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from baker.pipeline.transport import trace_transport
 from baker.radiosity.inside_geometry import find_inside_geometry
 from baker.uv.unwrap import unwrap_scene
 
-# Stage of the bake -> kind of bare rays that it is compared with.
+# For each stage of the bake, the kind of bare rays that it is compared with.
 BESIDE = {
     Stage.FINAL_GATHER: "closest hit",
     Stage.FORM_FACTORS: "closest hit",
@@ -36,7 +36,7 @@ BESIDE = {
 
 
 def measure_apart(**what: Any) -> dict[str, Any]:
-    """Call `measure` in a separate process, so that its memory does not affect other measurements."""
+    """Call `measure` with these arguments in a separate process, so that its memory is freed afterwards."""
     words = json.dumps(what, default=str)
     done = subprocess.run([sys.executable, __file__, words], stdout=subprocess.PIPE, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout)
@@ -46,13 +46,15 @@ def measure_apart(**what: Any) -> dict[str, Any]:
 def measure(
     scene_path: Path, *, resolution: int, samples: int, repeat: int, sky: str | None
 ) -> dict[str, Any]:
-    """Trace a scene's transport and the bare loops alternately, `repeat` times.
+    """Run a scene's light transport and the bare loops alternately, `repeat` times each.
 
     Returns
     -------
     dict
-        scene, resolution, triangles, texels; `stages` {stage: {seconds, rays, rate}} and
-        `bare` {kind: {ready, made}}: Mrays/s, the best of all turns; `spread` has the medians.
+        scene, resolution, triangles, texels, width (of a packet);
+        `stages` {stage: {seconds, median, rays, rate, beside}}: shortest and median time in seconds, number
+        of rays, rate in Mrays/s for the shortest time, and the kind of bare rays to compare with;
+        `bare` and `bare_median` {kind: {ready, made}}: largest and median rate of the loops, Mrays/s.
     """
     values: dict[str, Any] = {
         "resolution": resolution,
@@ -121,11 +123,11 @@ def _kinds(world: PreparedScene, settings: BakeSettings) -> dict[str, BareRays]:
 
 
 def _turn(world: PreparedScene) -> dict[str, tuple[float, int]]:
-    """Cast all rays of a bake once; return seconds and rays of each stage."""
+    """Cast all rays of a bake once; return {stage: (seconds, number of rays)}."""
     record = Record(silent)
     trace_transport(world, {"irradiance": CHANNELS.get("irradiance")}, record)
     trace_transport(world, {"ao": CHANNELS.get("ao")}, record)
-    # `prepare_scene` finds points inside geometry once, outside these turns; cast its rays again.
+    # Measure the search for points inside geometry as well, which otherwise runs only in `prepare_scene`.
     start = perf_counter()
     _, cast = find_inside_geometry(world.texels, world.job, world.hit_kind)
     record.timings[Stage.INSIDE_GEOMETRY] = perf_counter() - start

@@ -1,4 +1,4 @@
-"""Turns measurements (the JSON of `run.py`) into tables, for a terminal or as Markdown."""
+"""Formats measurements of the benchmarks as tables, as plain text or Markdown."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ STAGES = (
     Stage.LOAD, Stage.UNWRAP, Stage.TEXELS, Stage.RAY_TREE, Stage.INSIDE_GEOMETRY, Stage.DIRECT_LIGHT,
     Stage.FORM_FACTORS, Stage.SOLVE, Stage.FINAL_GATHER, Stage.FINISH, Stage.WRITE,
 )  # fmt: skip
-# The stages from texels to gather.
+# The stages from `texels` to `final gather`.
 TRANSPORT = STAGES[2:9]
 Row = Sequence[str | float | int]
 
 
 def table(head: Sequence[str], rows: Sequence[Row], *, markdown: bool) -> str:
-    """Return a table; numbers are aligned right."""
+    """Return a table as text; columns of numbers are aligned right."""
     cells = [[_text(cell) for cell in row] for row in rows]
     right = [all(isinstance(row[k], int | float) for row in rows) for k in range(len(head))] if rows else []
     if markdown:
@@ -35,7 +35,7 @@ def table(head: Sequence[str], rows: Sequence[Row], *, markdown: bool) -> str:
 
 
 def report(result: dict[str, Any], *, markdown: bool) -> str:
-    """Return all tables that the measurements fill."""
+    """Return the tables of all measurements in the JSON of `run.py`."""
     parts = [("Machine", _machine)]
     if result.get("bakes"):
         parts += [("Whole process and stages, seconds", _stages), ("Rays of the bakes", _rays)]
@@ -50,7 +50,7 @@ def report(result: dict[str, Any], *, markdown: bool) -> str:
 
 
 def put_into(path: Path, script: str, tables: str) -> None:
-    """Replace the text between the two marks of a script in a document."""
+    """Replace the text between the two marker lines of `script` in a document by `tables`."""
     begin, end = f"<!-- tables by benchmarks/{script} -->", "<!-- end of tables -->"
     before, found, rest = path.read_text(encoding="utf-8").partition(begin)
     _, closed, after = rest.partition(end)
@@ -71,7 +71,7 @@ def _machine(result: dict[str, Any], markdown: bool) -> str:
 
 
 def _stages(result: dict[str, Any], markdown: bool) -> str:
-    """Show first run, second run (least of n, median), processor time, each stage, memory."""
+    """Return a table of the bakes: first run, shortest and median later run, CPU time, stages, memory."""
     head = (
         "scene", "page", "first run", "second run", "median", "cpu",
         *STAGES[:-1], "texels..gather", "peak MiB",

@@ -1,12 +1,12 @@
-"""Measures `baker`: seconds of each stage, rays a second beside bare Embree, memory, growth with triangles.
+"""Measures `baker`: time of each stage, ray rates compared with bare Embree, memory, growth with triangles.
 
-    python benchmarks/run.py                     everything, about 20 minutes on 2 cores
+    python benchmarks/run.py                     all measurements, about 20 minutes on 2 cores
     python benchmarks/run.py --quick             Cornell at 256 and 10 k triangles, under 3 minutes
     python benchmarks/run.py --json out.json --markdown
     python benchmarks/run.py --from out.json --into docs/PERFORMANCE.md
 
-Repetitions go round: every scene once, then every scene again, so that a machine that is busy for a
-while slows all alike. Tables show the least of n and the median.
+Each round bakes every scene once, so that temporary load on the machine affects all scenes. Tables show the
+shortest and the median time of all rounds.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from report import put_into, report
 from scenes import write_blobs
 
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
-# The hall is lit by the sky as well.
+# Sky radiance of these scenes, cd/m2; the other scenes have no sky.
 SKY = {"hall": "2000,2600,3400", "interior": "2000,2600,3400"}
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Measure what was asked for and show it."""
+    """Measure as the flags request and print the tables."""
     options = _options(argv)
     if options.source:
         result = json.loads(options.source.read_text(encoding="utf-8"))
@@ -49,23 +49,31 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="few, small, once")
-    parser.add_argument("--scenes", default=None, help="names or files, with commas; `none` for no bakes")
-    parser.add_argument("--sizes", default=None, help="page sizes, with commas")
-    parser.add_argument("--samples", type=int, default=64, help="gather rays and shadow rays per texel")
-    parser.add_argument("--repeat", type=int, default=None, help="rounds; default 3, with --quick 1")
+    parser.add_argument("--quick", action="store_true", help="one small scene, one round")
     parser.add_argument(
-        "--triangles", default=None, help="triangle series, with commas; `none` for no series"
+        "--scenes", default=None, help="names or files, separated by commas; `none`: no bakes"
     )
-    parser.add_argument("--no-large", action="store_true", help="leave out the memory runs (4096 page)")
-    parser.add_argument("--no-rates", action="store_true", help="leave out the bare loops")
-    parser.add_argument("--unwrap-large", action="store_true", help="also unwrap the largest of the series")
+    parser.add_argument("--sizes", default=None, help="page sizes, separated by commas")
+    parser.add_argument("--samples", type=int, default=64, help="gather rays and shadow rays per texel")
+    parser.add_argument(
+        "--repeat", type=int, default=None, help="number of rounds; default 3, with --quick 1"
+    )
+    parser.add_argument(
+        "--triangles",
+        default=None,
+        help="triangle numbers of the series, separated by commas; `none`: no series",
+    )
+    parser.add_argument("--no-large", action="store_true", help="do not measure memory with a page of 4096")
+    parser.add_argument("--no-rates", action="store_true", help="do not measure the bare loops")
+    parser.add_argument("--unwrap-large", action="store_true", help="also unwrap the series' largest scene")
     parser.add_argument("--json", type=Path, help="write all numbers to this file")
     parser.add_argument(
         "--from", dest="source", type=Path, help="show an earlier --json file; measure nothing"
     )
     parser.add_argument("--markdown", action="store_true", help="tables as Markdown")
-    parser.add_argument("--into", type=Path, help="put the Markdown tables between the marks in this file")
+    parser.add_argument(
+        "--into", type=Path, help="insert the tables between the marker lines of this document"
+    )
     options = parser.parse_args(argv)
     quick = options.quick
     options.repeat = options.repeat or (1 if quick else 3)
@@ -88,16 +96,16 @@ def _measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     firsts: dict[tuple[Path, int], Run] = {}
     jobs = [(path, size) for path in scenes for size in options.sizes]
     if jobs:
-        # One first run, with nothing compiled, for the middle size of the first scene: what a new user meets.
+        # Measure one first run without compiled kernels, with the first scene and the middle page size.
         first = (scenes[0], options.sizes[len(options.sizes) // 2])
         _say(f"first run: {first[0].stem} at {first[1]}")
         firsts[first] = _bake(options, first[0], first[1], folder, cache)
     else:
-        # Kernels compile here, so that nothing measured later is a first run.
+        # Compile the kernels, so that no later measurement includes compilation.
         _bake(options, ASSETS / "cornell.glb", 64, folder, cache, samples=1)
     bakes: dict[tuple[Path, int], list[Run]] = {job: [] for job in jobs}
     for path in scenes:
-        # Scenes with other kinds of light compile a few kernels more.
+        # Bake each scene once, because scenes with other kinds of light compile additional kernels.
         _bake(options, path, 64, folder, cache, samples=1)
     for turn in range(options.repeat):
         for path, size in jobs:
@@ -137,7 +145,7 @@ def _bake(
 
 
 def _rates(options: argparse.Namespace, scenes: list[Path]) -> list[dict[str, Any]]:
-    # Imported here: the tables of an earlier file need no Embree.
+    # Import here, so that `--from` works without Embree.
     from rates import measure_apart
 
     size = options.sizes[len(options.sizes) // 2]
@@ -189,7 +197,10 @@ def _series(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict
 
 
 def _large(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict[str, Any]]:
-    """Bake a 4096 page and, if asked, unwrap the largest scene, for their memory."""
+    """Measure the memory of bakes with a page of 4096 texels and, with --unwrap-large, of an unwrap.
+
+    The bakes are those of the interior and of the largest scene of the triangle series.
+    """
     if options.no_large:
         return []
     few = 8

@@ -1,4 +1,4 @@
-"""Measures one bake on 0, 1 and 2 single-thread cluster workers, and a batch by jobs at a time.
+"""Measures one bake on 0, 1 and 2 single-thread cluster workers, and a batch with 1 and 2 jobs at a time.
 
 python benchmarks/scaling.py bake [SCENE]
 python benchmarks/scaling.py batch FOLDER_OF_SCENES
@@ -26,12 +26,15 @@ SETTINGS: dict[str, Any] = {
     "ao_samples": 64,
     "threads": 1,
 }
-# Jobs of the batch: each scene with a few settings.
+# Number of jobs of the batch: ten scenes, each with several seeds.
 WANTED = 20
 
 
 def bake_once(scene: Path, workers: int) -> dict[str, float]:
-    """Return the seconds of each stage; 0 workers is this process, with one thread."""
+    """Bake a scene on `workers` cluster workers; return the duration of each stage, seconds.
+
+    With 0 workers, the bake runs in this process with one thread.
+    """
     from baker.core.settings import make_settings
     from baker.distributed.connection import Cluster
     from baker.distributed.tile_executor import DistributedTileExecutor
@@ -42,7 +45,7 @@ def bake_once(scene: Path, workers: int) -> dict[str, float]:
         return bake(scene, settings=settings).timings
     cluster = Cluster(f"local:{workers}", threads=workers)
     try:
-        # Workers load libraries and kernels once in their life.
+        # Bake a small scene first, so that the workers have loaded libraries and kernels.
         bake(ROOT / "assets" / "cornell.glb", settings=make_settings({**SETTINGS, "resolution": 64}),
              executor=DistributedTileExecutor(cluster))  # fmt: skip
         return bake(scene, settings=settings, executor=DistributedTileExecutor(cluster)).timings
@@ -51,7 +54,7 @@ def bake_once(scene: Path, workers: int) -> dict[str, float]:
 
 
 def sizes(scene: Path) -> tuple[int, int]:
-    """Return the bytes that go to each worker at the start, and texels of the page."""
+    """Return the number of bytes sent to each worker at the start, and the number of texels of all pages."""
     from baker.core.settings import make_settings
     from baker.io.load import load_scene
     from baker.uv.unwrap import unwrap_scene
@@ -64,7 +67,7 @@ def sizes(scene: Path) -> tuple[int, int]:
 
 
 def measure_bake(scene: Path) -> None:
-    """Print the table of docs/SCALING.md."""
+    """Print the sizes and durations in docs/SCALING.md."""
     payload, pixels = sizes(scene)
     print(f"{scene.name}: {payload / 1e6:.2f} MB to each worker, {pixels} pixels")
     for workers in (0, 1, 2):
@@ -76,9 +79,13 @@ def measure_bake(scene: Path) -> None:
 
 
 def measure_batch(folder: Path) -> None:
-    """Print the seconds of a batch of twenty small scenes by `--jobs`, and of one with one change."""
+    """Print the duration of a batch of small scenes.
+
+    Measured are the whole batch with `--jobs` 1 and 2, an unchanged batch, and a batch with one changed
+    output.
+    """
     scenes = sorted(path for path in folder.rglob("*") if path.suffix in (".glb", ".obj"))
-    # Kit pieces: neither whole levels nor broken meshes of two triangles.
+    # Choose kit pieces by file size, which excludes whole levels and meshes of two triangles.
     small = [path for path in scenes if 4_000 < path.stat().st_size < 300_000][:10]
     with tempfile.TemporaryDirectory() as name:
         jobs = [

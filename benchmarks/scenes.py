@@ -1,7 +1,7 @@
-"""A closed room full of bumpy blobs with any number of triangles: what changes is the triangles alone.
+"""Writes a closed room with bumpy blobs, which has the same shape for any number of triangles.
 
-All sizes show the same picture: the bumps are far larger than the triangles of even the coarsest one.
-The scene brings its own lightmap uv, so that a bake of it measures rays, not the unwrap.
+The bumps are much larger than the triangles of the coarsest version, so all versions look alike. The scene
+has lightmap uv, so that a bake measures rays and not the unwrap.
 
     python benchmarks/scenes.py 100000 blobs.glb
 """
@@ -17,20 +17,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-# Blobs form a square grid of this many on a side; each is a cube whose six faces are projected onto a ball.
+# Number of blobs along a side of their square grid. A blob is a cube whose faces are projected onto a sphere.
 ROWS = 3
+# Half side and height of the room, metres.
 HALF, HEIGHT = 5.0, 5.0
-# Lightmap cells on a side: 54 blob faces, 6 walls, 1 ceiling light.
+# Number of lightmap cells along a side of the page, for 54 blob faces, 6 walls and 1 ceiling light.
 CELLS = 8
+# Empty border of a cell, as a share of its side.
 GUTTER = 0.06
-# Height of the bumps, metres on a ball of 0.9.
+# Height of the bumps, metres, on a sphere of radius 0.9.
 BUMP = 0.08
+# Radiance of the ceiling light, cd/m2.
 EMISSION = (60.0, 55.0, 48.0)
+# Position, normal, uv and triangles of a part of the mesh.
 Patch = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]
 
 
 def write_blobs(triangles: int, path: Path) -> int:
-    """Write the room to a GLB and return how many triangles it has (near the number asked for)."""
+    """Write the room to a GLB file with about `triangles` triangles; return the actual number."""
     side = max(2, round(math.sqrt(triangles / (ROWS * ROWS * 6 * 2))))
     cell = iter(range(CELLS * CELLS))
     blobs = [
@@ -47,7 +51,10 @@ def write_blobs(triangles: int, path: Path) -> int:
 
 
 def _sheet(position: NDArray[np.float64], normal: NDArray[np.float64], cell: int, *, flip: bool) -> Patch:
-    """Return an (n, n) grid of points as triangles whose uv fill one cell of the page."""
+    """Return the triangles of a grid of points (n, n, 3), with uv that fill one cell of the page.
+
+    flip : bool, whether to reverse the winding of the triangles
+    """
     n = len(position)
     ticks = np.linspace(GUTTER, 1.0 - GUTTER, n)
     u, v = np.meshgrid(ticks, ticks, indexing="ij")
@@ -61,7 +68,7 @@ def _sheet(position: NDArray[np.float64], normal: NDArray[np.float64], cell: int
 
 
 def _grid(axis: int, sign: float, n: int) -> NDArray[np.float64]:
-    # Equal angles rather than equal lengths: triangles of a ball's face are then of nearly one size.
+    # Divide a face of the cube in equal angles, so that its triangles on the sphere have similar sizes.
     ticks = np.tan(np.linspace(-math.pi / 4, math.pi / 4, n))
     ticks[0], ticks[-1] = -1.0, 1.0
     u, v = np.meshgrid(ticks, ticks, indexing="ij")
@@ -78,7 +85,8 @@ def _face(axis: int, sign: float, side: int, centre: tuple[float, float, float],
     bump = np.sin(5 * x + phase) * np.sin(4 * y - phase) + 0.5 * np.sin(7 * z + 2 * x + phase)
     radius = 0.9 + BUMP * bump
     position = direction * radius[..., None]
-    # The surface is r = R(d): its normal is d - grad R / R, the gradient along the ball.
+    # Compute the normal of the surface r = R(d), which is d - grad R / R with the gradient on the unit
+    # sphere.
     gradient = np.stack(
         [
             5 * np.cos(5 * x + phase) * np.sin(4 * y - phase) + np.cos(7 * z + 2 * x + phase),
@@ -98,7 +106,7 @@ def _wall(axis: int, sign: float, cell: int) -> Patch:
     point = _grid(axis, sign, 2)
     normal = np.zeros_like(point)
     normal[..., axis] = -sign
-    # Faces look inwards: the other way round than those of a ball.
+    # Reverse the winding, because walls face inwards.
     return _sheet(point * scale + [0.0, HEIGHT / 2, 0.0], normal, cell, flip=sign > 0)
 
 
@@ -110,7 +118,7 @@ def _ceiling_light(cell: int) -> Patch:
 
 
 def _write(path: Path, parts: dict[str, list[Patch]]) -> None:
-    """Write one mesh and node for each part."""
+    """Write a GLB file with one mesh, material and node for each part."""
     body = bytearray()
     views: list[dict[str, int]] = []
     accessors: list[dict[str, object]] = []

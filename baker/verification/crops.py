@@ -1,4 +1,4 @@
-"""Crops of the map around its worst texels beside path-traced values of the same texels, with FLIP errors."""
+"""Path-traces small windows of the map around its worst texels, and computes their FLIP error."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from baker.pathtracer.scene import Reference
 
 # Width and height of a crop, texels.
 SIZE = 24
+# Largest number of crops.
 _MAX_CROPS = 3
-# Passes of the path tracer, and points in each texel.
+# Number of passes of the path tracer, and number of points in each texel.
 _PASSES, _POINTS = 16, 16
 
 
@@ -35,12 +36,13 @@ class Crop:
     Attributes
     ----------
     channel : str
+        Name of the channel.
     page, row, column : int
-        First texel of the window.
+        Page, and first row and column of the window.
     stored, reference : (h, w, C) float32
-        0 on texels without surface.
+        Values of the bake and of the path tracer; 0 at texels without a measured value.
     error : (h, w) float32
-        FLIP error map.
+        FLIP error of each texel.
     flip : float
         Mean of `error`.
     """
@@ -65,31 +67,32 @@ def trace_crops(
     seconds: float | None,
     progress: Progress,
 ) -> list[Crop]:
-    """Path-trace all texels around the worst ones.
+    """Path-trace windows around the texels with the largest errors.
 
     Parameters
     ----------
     bake : StoredBake
         The verified bake.
     geometry : Geometry
-        Its triangles.
+        Triangles of the bake.
     reference : Reference
         The scene of the path tracer.
     worst : list of dict
-        Worst texels, worst first; windows that overlap an earlier one of the same channel are left out.
+        Texels in order of decreasing error. Windows that overlap an earlier window of the same channel are
+        left out.
     bounces : int or None
-        Reflections, as of `irradiance_pass`.
+        Largest number of reflections; None for no limit.
     seed : int
         Seed of the random numbers.
     seconds : float or None
-        Time after which no further pass starts; each crop gets at least one.
+        Time after which no further pass starts, seconds. Each crop gets at least one pass.
     progress : Progress
         Receives reports, and may cancel.
 
     Returns
     -------
     list of Crop
-        At most three.
+        At most `_MAX_CROPS` crops.
     """
     crops: list[Crop] = []
     end = np.inf if seconds is None else time.monotonic() + seconds

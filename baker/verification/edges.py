@@ -1,10 +1,10 @@
-"""Points at chart borders, next to walls and between texels, for comparison with bilinear lookups.
+"""Chooses points at chart borders, next to walls and between texels, where bilinear lookups are compared.
 
-An engine looks the map up bilinearly at any point of the surface. The four texels around it contribute,
-whether they are covered, filled or dilated. The reference of such a lookup is the mean light at points inside
-these four texels, with the weights of the lookup. Only points of the same surface that are visible from the
-looked-up point are used; otherwise a lookup next to a wall would be compared with light on the other side of
-the wall.
+An engine looks up the map bilinearly at arbitrary points of the surface. The lookup reads four texels, which
+may be covered, filled or dilated; they are called the footprint. The reference of a lookup is the mean light
+at points inside these four texels, weighted like the texels in the lookup. Only points of the same surface
+that are visible from the looked-up point are used. Otherwise, a lookup next to a wall would be compared with
+light on the other side of the wall.
 """
 
 from __future__ import annotations
@@ -21,29 +21,30 @@ from baker.metrics.texel_area import SurfacePoints, one_surface_point, square_me
 from baker.pathtracer.scene import Reference
 from baker.verification.surroundings import in_contact, inside_points, lifted, seen_along
 
-# Shares of the points at the borders of charts and near other surfaces; the others are random.
+# Share of points at the borders of charts, and share of points near other surfaces. The remaining points are
+# random.
 _BORDER, _CONTACT = 0.4, 0.5
-# Texels tested for each wanted point near another surface.
+# Number of random texels tested for each point near another surface.
 _POOL = 16
-# Points in each texel of a footprint, and in each tested texel.
+# Number of points in each texel of a footprint, and in each tested texel.
 _POINTS_PER_TEXEL, _POOL_POINTS = 16, 8
-# Points belong to the same surface if they are nearer than this, texels, and the cosine of their face normals
-# is larger than this.
+# Largest distance between two points of the same surface, texels, and smallest cosine of the angle between
+# their face normals.
 _MAX_TEXELS, _MIN_COSINE = 4.0, 0.5
 
 
 @dataclass(frozen=True)
 class EdgePoints:
-    """n points of the surface, with k points each whose mean light is the reference of the lookup.
+    """n looked-up points. The mean light at k points around each of them is the reference of its lookup.
 
     Attributes
     ----------
     pixel : (n,) int64
-        Texel of each point.
+        Texel that contains each looked-up point, (page * H + row) * W + column.
     owner : (n,) int32
-        Object of each point.
+        Object of each looked-up point.
     surface : SurfacePoints
-        The k points; `offset` is the looked-up point relative to the texel's centre.
+        The k points; `offset` is the position of the looked-up point relative to the texel's centre.
     """
 
     pixel: NDArray[np.int64]
@@ -52,9 +53,10 @@ class EdgePoints:
 
 
 def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return (P, H, W): the outermost covered texels of charts, and adjoining uncovered texels with surface.
+    """Return (P, H, W) bool: the border texels of charts.
 
-    A covered texel is outermost if a neighbour is not covered or belongs to another object.
+    These are covered texels with a neighbour that is not covered or lies on another object, and uncovered
+    texels with surface that have a covered neighbour of the same object.
 
     Parameters
     ----------
@@ -83,7 +85,7 @@ def edge_points(
     n_points: int,
     seed: int,
 ) -> EdgePoints:
-    """Choose about n points, and the points whose mean light is the reference of their lookups.
+    """Choose about n looked-up points, and the points whose mean light is the reference of each lookup.
 
     Parameters
     ----------
@@ -96,16 +98,16 @@ def edge_points(
     covered : (P, H, W) bool
         Texels with a measured value.
     n : int
-        Number of points, approximately.
+        Approximate number of looked-up points.
     n_points : int
-        Points of each footprint, k.
+        Number k of points of each footprint.
     seed : int
         Seed of the random choice.
 
     Returns
     -------
     EdgePoints
-        Points inside geometry are left out.
+        The looked-up points that are not inside geometry.
     """
     size = owner.shape[1]
     flat, usable = owner.reshape(-1), covered.reshape(-1)
@@ -131,11 +133,12 @@ def edge_points(
 
 @dataclass(frozen=True)
 class _Points:
-    """Points of the surface.
+    """n points of the surface.
 
     Attributes
     ----------
-    position, normal, face_normal : (n, 3) float64
+    position : (n, 3) float64, metres, relative to the geometry's origin
+    normal, face_normal : (n, 3) float64, unit shading and face normals
     at : (n, 2) float64, column and row in the page, texels, not rounded
     page : (n,) int64
     square : (n,) float64, m2, world area of a texel's square
@@ -153,7 +156,7 @@ class _Points:
 
 
 def _points(geometry: Geometry, pixel: NDArray[np.int64], size: int, seed: int) -> _Points:
-    """Return one random point inside each texel (n,)."""
+    """Return one random point of the surface inside each texel `pixel` (n,)."""
     triangle, weight = one_surface_point(geometry, pixel, size, seed)
     corner = geometry.triangle[triangle]
     position, normal, uv = (
@@ -176,9 +179,10 @@ def _footprints(
     n_points: int,
     seed: int,
 ) -> SurfacePoints:
-    """Return for each point n_points points in the four texels of its lookup, drawn by the lookup's weights.
+    """Return `n_points` points in the footprint of each point.
 
-    If none of them is visible from a point, the point itself is used.
+    The points are drawn from candidates in the four texels, with the weights of the lookup. If no candidate
+    is visible from the looked-up point, that point itself is used.
     """
     size, n = owner.shape[1], len(point.at)
     tap, share = _taps(point, size)
@@ -187,7 +191,8 @@ def _footprints(
     pixel, number = np.unique(tap[usable], return_inverse=True)
     spread = surface_points(geometry, pixel, size, _POINTS_PER_TEXEL, seed)
     row, column = np.nonzero(usable)
-    # Candidates (m, _POINTS_PER_TEXEL) of point `row`.
+    # Make _POINTS_PER_TEXEL candidates for each of the m pairs of a point `row` and a texel `column` of its
+    # four.
     position, normal, face = (array[number] for array in (spread.position, spread.normal, spread.face_normal))
     # Keep candidates on the same surface that are visible from the point.
     off = position - point.position[row][:, None]
@@ -197,7 +202,7 @@ def _footprints(
     ends = lifted(reference, position[i, j], face[i, j])
     origin = lifted(reference, point.position[row[i]], point.face_normal[row[i]])
     good[i, j] = seen_along(reference, origin, ends - origin)
-    # Distribute the weight of each texel over its candidates, and draw from them.
+    # Distribute the weight of each texel evenly over its remaining candidates, and draw from all candidates.
     weight = np.zeros((n, 4, _POINTS_PER_TEXEL))
     weight[row, column] = good * (share[row, column] / np.maximum(good.sum(axis=1), 1))[:, None]
     candidate = np.zeros((n, 4, _POINTS_PER_TEXEL), np.int64)
@@ -214,7 +219,7 @@ def _footprints(
 
 
 def _taps(point: _Points, size: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the four texels of each point's lookup, (n, 4), and their weights."""
+    """Return (n, 4) int64, the four texels of each point's lookup, and (n, 4) float64, their weights."""
     first = np.floor(point.at - 0.5)
     part = point.at - 0.5 - first
     corner = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
@@ -224,10 +229,15 @@ def _taps(point: _Points, size: int) -> tuple[NDArray[np.int64], NDArray[np.floa
 
 
 def _draw(weight: NDArray[np.float64], n: int, seed: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Draw n columns of each row of `weight` (m, k) in proportion to it; return also which rows are 0."""
+    """Draw n columns of each row of `weight` with probabilities proportional to it.
+
+    weight : (m, k) float64
+
+    Returns (m, n) int64, the columns, and (m,) bool, the rows whose weights are all 0.
+    """
     total = weight.sum(axis=1)
     random = np.random.Generator(np.random.PCG64([seed, 12]))
-    # Stratify, in random order, so that few passes already sample all parts of a footprint.
+    # Use stratified samples in random order, so that the first few passes cover the whole footprint.
     at = random.permuted((np.arange(n) + random.random((len(weight), 1))) / n, axis=1)
     edge = np.cumsum(weight, axis=1) / np.maximum(total, 1e-30)[:, None]
     drawn = (at[:, :, None] > edge[:, None, :]).sum(axis=2)

@@ -1,4 +1,4 @@
-"""A verification as a JUnit report: one test case for each limit."""
+"""Writes a verification as a JUnit report with one test case for each limit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def write_junit(path: Path, found: VerifyReport) -> None:
     Raises
     ------
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     scene = found.bake.folder.name
     cases = []

@@ -1,5 +1,7 @@
-"""The points at which a bake is compared: random texels, outliers, steep texels, points at edges, and
-further texels of light levels that have few.
+"""Chooses the points at which a bake is compared.
+
+These are random texels, outliers, texels with the largest gradients of light, points at edges, and additional
+texels of light levels with few random texels.
 """
 
 from __future__ import annotations
@@ -23,12 +25,16 @@ from baker.verification.edges import edge_points
 from baker.verification.settings import VerifySettings
 from baker.verification.surroundings import look_around
 
+# Kinds of points, see `Points.kind`.
 TEXEL, OUTLIER, STEEP, EDGE, SCARCE = 0, 1, 2, 3, 4
+# Number of surface points at which the light of a texel is measured.
 POINTS_PER_TEXEL = 64
-# Points at edges, outliers and steep texels for each random texel, the latter two in each channel.
+# Numbers of points divided by the number of random texels: points at edges; outliers of each channel; steep
+# texels of each channel.
 _EDGES, _OUTLIERS, _STEEP = 0.35, 0.05, 0.1
+# Smallest number of points at edges.
 _MIN_EDGES = 500
-# Texels that each light level should have, for each random texel.
+# Smallest number of texels in each light level, divided by the number of random texels.
 _SCARCE = 0.1
 
 
@@ -39,21 +45,22 @@ class Points:
     Attributes
     ----------
     kind : (n,) int8
-        TEXEL (random texel), OUTLIER (differs from its neighbours), STEEP (light changes there), EDGE or
-        SCARCE (its light level has few texels); random texels first.
+        TEXEL: random texel. OUTLIER: texel that differs from all its neighbours. STEEP: texel with a large
+        gradient of light. EDGE: point at an edge. SCARCE: additional texel of a light level with few texels.
+        Random texels come first.
     pixel : (n,) int64
-        (page * H + row) * W + column.
+        Texel of each point, (page * H + row) * W + column.
     owner, chart, room : (n,) int32
-        Object; chart; room, -1 for none, see `surroundings`.
+        Indices of object, chart and room. Rooms are defined in `surroundings`; -1 for none.
     gap : (n,) bool
-        In a narrow gap, or inside geometry.
+        Whether the point is in a narrow gap or inside geometry.
     valid_share : (n,) float64
         Share of the surface points that are valid.
     texel_area : (n,) float64, m2
-        Surface of its object that a random texel represents; 0 for other kinds.
+        Area of the object's surface that a random texel represents; 0 for other kinds of points.
     surface : SurfacePoints
-        The surface points at which light is measured; the map is looked up at `surface.offset` from the
-        texel's centre.
+        The surface points at which the light of each point is path-traced. The map is looked up at
+        `surface.offset` from the texel's centre.
     """
 
     kind: NDArray[np.int8]
@@ -68,7 +75,7 @@ class Points:
 
     @property
     def position(self) -> NDArray[np.float64]:
-        """Return the mean of each point's surface points (n, 3), relative to the geometry's origin."""
+        """Return (n, 3) float64, metres: the mean of each point's surface points, relative to the origin."""
         middle: NDArray[np.float64] = self.surface.position.mean(axis=1)
         return middle
 
@@ -90,12 +97,12 @@ class Pages:
 
 
 def read_pages(bake: StoredBake, geometry: Geometry, names: list[str]) -> Pages:
-    """Find the object on each texel, and which texels have a measured value.
+    """Return the object on each texel, and the texels with a measured value.
 
     Raises
     ------
     InputError
-        If a channel lacks pages, or no texel lies on a surface.
+        If pages of a channel are missing, or no texel lies on a surface.
     """
     owner = instance_map(geometry, bake.atlas.n_pages, bake.atlas.resolution)
     if any(bake.maps[name].shape[:3] != owner.shape for name in names):
@@ -116,7 +123,10 @@ def choose_points(
     names: list[str],
     settings: VerifySettings,
 ) -> tuple[Points, NDArray[np.float64]]:
-    """Choose the points to compare and find their surroundings; return also points (m, 3) in the air."""
+    """Choose the n points to compare and find their rooms and gaps.
+
+    Returns the points, and (m, 3) float64, metres: points in the air, see `surroundings`.
+    """
     size, seed = bake.atlas.resolution, settings.seed
     owner, covered = pages.owner.reshape(-1), pages.covered.reshape(-1)
     brightness = bake.maps[names[0]].mean(axis=3, dtype=np.float64).reshape(-1)
@@ -155,7 +165,10 @@ def choose_points(
 def _special_texels(
     bake: StoredBake, pages: Pages, names: list[str], texels: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the outliers of all channels, and the texels where light changes most."""
+    """Return the outliers of all channels, and the texels with the largest gradients of light.
+
+    texels : int, number of random texels
+    """
     on = pages.covered & (pages.owner >= 0)
     found = [
         np.unique(np.concatenate([choose(bake.maps[name], on, int(share * texels)) for name in names]))
@@ -165,13 +178,16 @@ def _special_texels(
 
 
 def joined(parts: list[SurfacePoints]) -> SurfacePoints:
-    """Concatenate surface points."""
+    """Return the concatenation of several sets of surface points."""
     columns = (np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(SurfacePoints))
     return SurfacePoints(*columns)
 
 
 def chart_numbers(geometry: Geometry) -> NDArray[np.int32]:
-    """Return the chart (T,) of each triangle: a connected set of triangles of an object in lightmap uv."""
+    """Return (T,) int32: the chart of each triangle.
+
+    A chart is a set of triangles of one object that are connected in lightmap uv.
+    """
     corner_instance = np.zeros(len(geometry.uv), np.int32)
     corner_instance[geometry.triangle] = geometry.instance[:, None]
     key = np.column_stack([corner_instance, geometry.uv.view(np.int32)])

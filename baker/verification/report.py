@@ -1,6 +1,7 @@
-"""A verification as one HTML page with embedded images and without external resources.
+"""Writes a verification as one HTML page with embedded images and without external resources.
 
-Maps are shown with the tone curve value / (value + middle), sRGB-encoded; middle is the median of lit texels.
+Maps are shown as value / (value + middle), sRGB-encoded, where middle is the median of the reference over lit
+texels.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from baker.metrics.error_metrics import dark_floor, relative_error
 from baker.verification.criteria.registry import METRIC_NAMES
 from baker.verification.verify import ChannelCheck, VerifyReport
 
-# Largest side of the image of a page, texels, and largest number of regions listed.
+# Side of the image of a page, texels: larger pages are subsampled. Largest number of regions listed.
 _SHOWN, _REGIONS = 512, 40
-# Relative error at the end of the colour scale, yellow.
+# Relative error at the yellow end of the colour scale.
 _HOT = 0.10
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem}
 .wide{overflow-x:auto}table{border-collapse:collapse;margin:1rem 0}
@@ -33,7 +34,7 @@ figure{display:inline-block;margin:.5rem 1rem .5rem 0}figcaption{font-size:13px;
 
 
 def write_report(path: Path, found: VerifyReport) -> None:
-    """Write the page.
+    """Write the HTML page.
 
     Parameters
     ----------
@@ -45,13 +46,13 @@ def write_report(path: Path, found: VerifyReport) -> None:
     Raises
     ------
     ResourceError
-        If it cannot be written.
+        If the file cannot be written.
     """
     write_text(path, report_html(found))
 
 
 def report_html(found: VerifyReport) -> str:
-    """Return the page as text."""
+    """Return the HTML page as text."""
     summary = found.to_dict()
     verdict = '<span class="good">passed</span>' if found.passed else '<span class="bad">failed</span>'
     scene = html.escape(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
@@ -122,7 +123,7 @@ def _regions_table(found: VerifyReport) -> str:
 
 
 def _metrics_table(found: VerifyReport) -> str:
-    # One row for each metric: columns would be wider than a page.
+    # Write one row for each metric, because a column for each metric would be too wide.
     head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
     rows = ""
     for key in METRIC_NAMES:
@@ -146,7 +147,7 @@ def _number(value: Any) -> str:
 
 
 def _pages(found: VerifyReport, name: str, check: ChannelCheck) -> str:
-    """Return an image of each page, and a map of the errors of the compared texels."""
+    """Return, for each page, an image of the map and an image of the errors of the compared texels."""
     size = found.bake.atlas.resolution
     step = max(size // _SHOWN, 1)
     usual = _usual(check.reference)
@@ -158,7 +159,7 @@ def _pages(found: VerifyReport, name: str, check: ChannelCheck) -> str:
         heat = np.full((*stored.shape[:2], 3), 24, np.uint8)
         mine = found.pixel // (size * size) == page
         row, column = np.divmod(found.pixel[mine] % (size * size), size)
-        # Draw dots of three pixels, the worst last.
+        # Draw a square of 3 x 3 pixels for each texel, in order of increasing error.
         for i in np.argsort(error[mine], kind="stable"):
             y, x = row[i] // step, column[i] // step
             heat[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2] = _heat(float(error[mine][i]))
@@ -172,7 +173,7 @@ def _heat(error: float) -> tuple[int, int, int]:
 
 
 def _usual(value: NDArray[np.float64]) -> float:
-    """Return the median of the colour means of (n, C) above 0; 1 if there are none."""
+    """Return the median over n of the positive colour means of `value` (n, C); 1 if there are none."""
     mean = value.mean(axis=1)
     return float(np.median(mean[mean > 0])) if (mean > 0).any() else 1.0
 
@@ -191,7 +192,7 @@ def _figure(pixels: NDArray[np.uint8], caption: str, zoom: int) -> str:
 
 
 def _histogram(histogram: dict[str, list[float]]) -> str:
-    """Return a histogram of the z-scores, with the normal distribution of a bake without errors."""
+    """Return an image of the histogram of z-scores, with the normal distribution of a bake without errors."""
     counts, edges = np.array(histogram["counts"]), np.array(histogram["edges"])
     if not counts.sum():
         return ""

@@ -1,4 +1,4 @@
-"""Settings of `verify`: how much is path-traced, and the limits."""
+"""The settings of `verify`: number of points, effort of path tracing, and limits."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from typing import ClassVar
 
 from baker.core.settings_model import Settings, seed_setting, setting, threads_setting
 
-# Time limit of path tracing where neither samples nor a time are given, seconds.
+# Time limit of path tracing if neither `spp` nor `time_limit` is set, seconds.
 DEFAULT_TIME = 40.0
 
 
 class VerifySettings(Settings):
-    """Holds the settings of a verification, checked."""
+    """The settings of a verification."""
 
     table: ClassVar[str] = "verify"
     what: ClassVar[str] = "verify setting"
 
     texels: int = setting(
-        2000, "Texels compared at their centres; points at edges and outliers are added.", ge=1
+        2000, "Number of random texels to compare; points at edges and outliers are added.", ge=1
     )
     spp: int | None = setting(None, "Fixed number of paths for each texel.", ge=1)
-    target_se: float = setting(0.005, "Relative standard error at which a texel is good enough.", gt=0)
+    target_se: float = setting(0.005, "Relative standard error at which path tracing of a texel stops.", gt=0)
     time_limit: float | None = setting(
         None,
-        "Time for path tracing; default: 40 without `spp`, else none. `inf` is none.",
+        "Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.",
         unit="s",
         metavar="SECONDS",
         gt=0,
@@ -34,7 +34,7 @@ class VerifySettings(Settings):
 
     @property
     def seconds(self) -> float | None:
-        """Return the time limit of path tracing in seconds, None without one."""
+        """Return the time limit of path tracing in seconds, None for no limit."""
         if self.time_limit is None:
             return DEFAULT_TIME if self.spp is None else None
         return None if self.time_limit == float("inf") else self.time_limit

@@ -1,13 +1,13 @@
-"""The surroundings of compared points: inside geometry, narrow gaps, and rooms.
+"""Finds which compared points are inside geometry or in narrow gaps, and groups the others in rooms.
 
-`pathtracer.inside_geometry` finds the points inside geometry. A point is in a narrow gap if more than half of
-its rays end within two texels: texels cannot resolve the light there, so gaps are only part of the metrics
-over all texels.
+`pathtracer.inside_geometry` finds the points inside geometry. A texel is in a narrow gap if more than half of
+the rays from its points end within two texels. Texels cannot resolve the light there, so texels in gaps are
+only used for the metrics over all texels.
 
-A room is the set of points that are visible from one point in the air. Points in the air are the midpoints of
-rays between surfaces. The one from which most points are visible defines the first room, the one from which
-most of the remaining points are visible the second, and so on. This separates closed rooms, and rooms with
-open doors except for the part that is visible through the door.
+A room is a set of points that are visible from one point in the air. Points in the air are midpoints of rays
+between surfaces. The point in the air from which most points are visible defines the first room. The point
+from which most of the remaining points are visible defines the second room, and so on. This separates closed
+rooms. It also separates rooms with open doors, except for the surface that is visible through the door.
 """
 
 from __future__ import annotations
@@ -25,17 +25,18 @@ from baker.pathtracer.inside_geometry import RAYS, is_inside_geometry
 from baker.pathtracer.inside_geometry import look_around as cast_around
 from baker.pathtracer.scene import Reference
 
-# Distance within which rays count as near, texels.
+# Length of a ray below which it counts as near, texels.
 _NEAR = 2.0
-# Share of near rays above which a point is in a gap, and above which it is in contact with other surface.
+# Share of near rays above which a texel is in a gap, and share above which it is in contact with other
+# surface.
 _GAP, _CONTACT = 0.5, 0.1
-# Points in the air from which rooms are found, and fewest points of a room.
+# Number of points in the air from which rooms are found, and smallest number of texels in a room.
 _AIR, _MIN_ROOM = 160, 8
-# Rays that test whether a point in the air is inside geometry.
+# Number of rays that test whether a point in the air is inside geometry.
 _AROUND = 32
-# Length of a ray without a hit, as a share of the scene's radius.
+# Largest ray length that is used to find points in the air, as a share of the scene's radius.
 _MISS_LENGTH = 0.25
-# Share of a segment's length within which a hit counts as its end.
+# Distance from the end of a segment within which a hit does not block the segment, as a share of its length.
 _TOUCH = 1.0e-3
 
 
@@ -46,15 +47,15 @@ class Surroundings:
     Attributes
     ----------
     points : SurfacePoints
-        The points; those inside geometry are replaced by valid points of the same texel if there are any.
+        The points. If a texel has valid points, its points inside geometry are replaced by them.
     inside : (n,) bool
-        Whether all points of a texel are inside geometry.
+        Whether all points of the texel are inside geometry.
     valid_share : (n,) float64
-        Share of a texel's points that are valid.
+        Share of the texel's points that are valid.
     gap : (n,) bool
-        In a narrow gap, or inside geometry.
+        Whether the texel is in a narrow gap or inside geometry.
     room : (n,) int32
-        Number of the room; -1 in gaps, and where the texel is visible from no point in the air.
+        Index of the room; -1 in gaps, and if the texel is in no room.
     air : (m, 3) float64, metres, world, relative to the geometry's origin
         Points in the air from which rooms were found.
     """
@@ -68,10 +69,10 @@ class Surroundings:
 
 
 def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surroundings:
-    """Find points inside geometry, points in narrow gaps, and rooms."""
+    """Find the points inside geometry, and the narrow gaps and rooms of n texels with k points each."""
     random = np.random.Generator(np.random.PCG64([seed, 9]))
     black, near, air = _first_look(reference, points, random)
-    # Test all points of the texels of which one ray hits a back or the inside of a solid.
+    # Test all points of a texel if one of its rays hits a black back or the inside of a solid.
     tested = np.flatnonzero(black.any(axis=1))
     valid_share = np.ones(len(points.position))
     if len(tested):
@@ -80,7 +81,7 @@ def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surro
     gap = (near.mean(axis=1) > _GAP) | inside
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
-    # The second round finds small rooms: its points in the air are those of texels without a room.
+    # Run a second round from the points in the air of texels without a room, which finds small rooms.
     for _ in range(2):
         left = np.flatnonzero((room < 0) & ~gap)
         some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)
@@ -90,19 +91,18 @@ def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surro
 
 
 def _outside(reference: Reference, air: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    """Return the points (m, 3) in the air that are not inside geometry.
+    """Return (m, 3) float64: the points `air` that are not inside geometry.
 
-    A ray that starts at an invalid point of a partly valid texel and hits the front of another solid has its
-    middle inside a solid.
+    Midpoints of rays can be inside a solid if the ray starts at a point inside geometry.
     """
     random = np.random.Generator(np.random.PCG64([seed, 14]))
-    # A normal of 0 gives uniform directions.
+    # Pass normals of 0, which give uniformly distributed directions.
     views = cast_around(reference, air, np.zeros_like(air), _AROUND, random)
     return air[~is_inside_geometry(views)]
 
 
 def in_contact(reference: Reference, points: SurfacePoints, seed: int) -> NDArray[np.bool_]:
-    """Return of which texels (n,) more than a tenth of the rays from their points end within two texels."""
+    """Return (n,) bool: the texels for which more than a tenth of the rays end within two texels."""
     _, near, _ = _first_look(reference, points, np.random.Generator(np.random.PCG64([seed, 9])))
     touching: NDArray[np.bool_] = near.mean(axis=1) > _CONTACT
     return touching
@@ -111,11 +111,16 @@ def in_contact(reference: Reference, points: SurfacePoints, seed: int) -> NDArra
 def _valid_points(
     reference: Reference, points: SurfacePoints, tested: NDArray[np.int64], random: np.random.Generator
 ) -> tuple[SurfacePoints, NDArray[np.float64]]:
-    """Replace invalid points of the tested texels (m,) by valid ones; return all points, and valid shares."""
+    """Replace invalid points of the tested texels by valid points of the same texel.
+
+    tested : (m,) int64, indices of texels
+
+    Returns the points of all texels, and (m,) float64, the shares of valid points of the tested texels.
+    """
     position, normal = points.position[tested], points.normal[tested]
     valid = ~inside_points(reference, position, normal, points.face_normal[tested], random)
     count = valid.sum(axis=1, keepdims=True)
-    # Sort valid points first, and take them in turn.
+    # Replace invalid points by the valid points of the texel in turn.
     order = np.argsort(~valid, axis=1, kind="stable")
     turn = np.arange(valid.shape[1]) % np.maximum(count, 1)
     pick = np.where(valid | (count == 0), np.arange(valid.shape[1]), np.take_along_axis(order, turn, axis=1))
@@ -133,7 +138,10 @@ def inside_points(
     face_normal: NDArray[np.float64],
     random: np.random.Generator,
 ) -> NDArray[np.bool_]:
-    """Return (n, k): which of the points (n, k, 3) are inside geometry."""
+    """Return (n, k) bool: the points inside geometry.
+
+    position, face_normal : (n, k, 3) float64; normal : (n, k, 3) float64, shading normals
+    """
     origin = lifted(reference, position, face_normal)
     found = is_inside_geometry(cast_around(reference, origin, normal.reshape(-1, 3), RAYS, random))
     return found.reshape(position.shape[:2])
@@ -142,10 +150,10 @@ def inside_points(
 def _first_look(
     reference: Reference, points: SurfacePoints, random: np.random.Generator
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
-    """Cast a ray from each point (n, k).
+    """Cast one ray from each of k points of n texels.
 
-    Returns whether it hits a back or the inside of a solid (n, k), whether the hit is near (n, k), and the
-    middle of the longest ray of each texel that does not (n, 3).
+    Returns (n, k) bool, whether the ray hits a black back or the inside of a solid; (n, k) bool, whether the
+    hit is near; and (n, 3) float64, for each texel the midpoint of its longest ray that hits neither.
     """
     n, k = points.position.shape[:2]
     origin = lifted(reference, points.position, points.face_normal)
@@ -158,7 +166,7 @@ def _first_look(
     near = hits.depth.reshape(n, k) < _NEAR * width[:, None]
     length = np.minimum(hits.depth, _MISS_LENGTH * reference.sphere[3])
     middle = origin + 0.5 * length[:, None] * direction
-    # The longest ray of a texel ends at the far side of its room.
+    # Choose the longest ray, which usually ends at the far side of the room.
     longest = np.argmax(np.where(black, 0.0, length.reshape(n, k)), axis=1)
     return black, near, middle.reshape(n, k, 3)[np.arange(n), longest]
 
@@ -170,7 +178,11 @@ def _add_rooms(
     left: NDArray[np.int64],
     room: NDArray[np.int32],
 ) -> None:
-    """Write the rooms `room` (n,) of texels `left` (p,), by visibility from points in the air (m, 3)."""
+    """Assign texels to new rooms by visibility from points in the air.
+
+    air : (m, 3) float64, metres; left : (p,) int64, indices of texels without a room
+    room : (n,) int32, changed at texels that get a room
+    """
     seen = visible(reference, air, points.position[left, 0], points.face_normal[left, 0])
     alone = np.ones(len(left), bool)
     while len(air):
@@ -185,7 +197,10 @@ def _add_rooms(
 def visible(
     reference: Reference, eye: NDArray[np.float64], point: NDArray[np.float64], face: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return visibility (m, n) of the fronts of points (n, 3), normals `face` (n, 3), from `eye` (m, 3)."""
+    """Return (m, n) bool: whether the front of each point is visible from each eye.
+
+    eye : (m, 3) float64, metres; point : (n, 3) float64, metres; face : (n, 3) float64, face normals
+    """
     m, n = len(eye), len(point)
     target = lifted(reference, point[:, None], face[:, None])
     segment = target[None] - eye[:, None]
@@ -199,7 +214,7 @@ def visible(
 def seen_along(
     reference: Reference, origin: NDArray[np.float64], segment: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (n,): whether nothing lies between each origin (n, 3) and origin + segment (n, 3)."""
+    """Return (n,) bool: whether nothing blocks the ray from `origin` (n, 3) to `origin` + `segment` (n, 3)."""
     length = np.linalg.norm(segment, axis=1)
     hits = first_hits(reference, origin, segment / np.maximum(length, 1e-30)[:, None])
     seen: NDArray[np.bool_] = hits.depth > length * (1 - _TOUCH)
@@ -207,7 +222,10 @@ def seen_along(
 
 
 def _cosine(normal: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Return cosine-weighted directions (n, 3): sums of the normal and a point on the unit sphere."""
+    """Return (n, 3) float64: cosine-weighted random directions around normals (n, 3).
+
+    Each direction is the normalised sum of the normal and a random point on the unit sphere.
+    """
     sphere = random.standard_normal(normal.shape)
     total = normal + sphere / np.linalg.norm(sphere, axis=1, keepdims=True)
     result: NDArray[np.float64] = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
@@ -217,7 +235,10 @@ def _cosine(normal: NDArray[np.float64], random: np.random.Generator) -> NDArray
 def lifted(
     reference: Reference, position: NDArray[np.float64], face: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points (n, k, 3) as (n k, 3), moved along their face normals against rounding errors."""
+    """Return (n k, 3) float64: points (n, k, 3) after an offset along their face normals.
+
+    The offset keeps rays from hitting their own surface because of rounding errors.
+    """
     position, face = position.reshape(-1, 3), face.reshape(-1, 3)
     far, sizes = np.abs(position).max(axis=1, keepdims=True), reference.surfaces
     step = OFFSET * np.minimum(np.maximum(far, sizes.min_offset_scale), sizes.default_size)

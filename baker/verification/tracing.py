@@ -1,10 +1,11 @@
-"""Path tracing of the chosen points, until their standard errors reach a target or the time limit.
+"""Path-traces the chosen points until their standard errors reach a target or the time limit ends.
 
-At a dark point that only rare paths connect to a light, the first samples are all black, so their variance is
-0. With the standard error of these samples only, the point would get no further samples and a reference of 0.
-Therefore the standard error of n samples includes the mean light of the room divided by n, as if one further
-sample had that value. Errors are relative to the light of the point, or to a tenth of the median of its room:
-a dim room is traced as long as a bright one.
+If only rare paths connect a dark point to a light, its first samples are all black and their variance is 0.
+Such a point would get no further samples, and its reference would be 0. The standard error of n samples
+therefore includes the mean light of the room divided by n, as if one further sample had that value.
+
+Errors are relative to the light of the point, or to `dark_floor` of its room if that is larger. Dim rooms
+therefore reach the same relative error as bright rooms.
 """
 
 from __future__ import annotations
@@ -26,27 +27,29 @@ from baker.pathtracer.irradiance import ambient_occlusion_pass, irradiance_pass
 from baker.pathtracer.point_estimate import PointEstimate, new_estimate
 from baker.pathtracer.scene import Reference
 
-# Passes over all points before any may be finished; largest number of passes of AO.
+# Number of passes over all points before a point can be finished, and largest number of passes of AO.
 _FIRST, _MAX_AO_PASSES = 8, 1024
-# Share of the time limit in which all unfinished points get passes; then only the half nearest to the target.
+# Share of the time limit during which all unfinished points are traced. After that, only the half of them
+# that needs the fewest samples is traced.
 _ALL_POINTS_TIME = 0.4
-# Target standard error of AO, and the largest share of the time limit that AO takes.
+# Target standard error of AO (absolute), and largest share of the time limit that AO may take.
 AO_ERROR, _AO_TIME = 0.004, 0.25
 
 
 @dataclass(frozen=True)
 class Effort:
-    """When to stop tracing.
+    """Conditions that end tracing, with the seed and the rooms of the points.
 
     Attributes
     ----------
     spp : int or None
-        Samples of each point, regardless of its error.
+        Fixed number of samples of each point; None to trace until `target` or `deadline`.
     target : float
         Relative standard error at which a point is finished.
     deadline : float or None
-        Time of `time.monotonic` at which tracing ends.
+        Time at which tracing ends, on the clock of `time.monotonic`; None for no limit.
     seed : int
+        Seed of the random numbers.
     room : (n,) int32
         Room of each point, -1 for none.
     """
@@ -58,12 +61,12 @@ class Effort:
     room: NDArray[np.int32]
 
     def passes(self, estimate: PointEstimate) -> int | None:
-        """Return the number of passes for `spp`, at least two: one pass has no standard error."""
+        """Return the number of passes for `spp` samples, at least 2, since one pass has no standard error."""
         return None if self.spp is None else max(-(-self.spp // estimate.samples), 2)
 
 
 def standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the standard error (n, C), inf before two passes; see the head of this file."""
+    """Return (n, C) float64: the standard error as defined in the module docstring; inf before two passes."""
     samples = np.maximum(estimate.count.sum(axis=0), 1)[:, None] * estimate.samples
     mean = estimate.mean
     light = np.broadcast_to(mean.mean(axis=0), mean.shape).copy()
@@ -73,7 +76,10 @@ def standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[
 
 
 def room_floor(mean: NDArray[np.float64], room: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the `dark_floor` (n,) of each point's room, from the light (n, C) and rooms (n,) of points."""
+    """Return (n,) float64: for each point, the `dark_floor` of its room.
+
+    mean : (n, C) float64, light of the points; room : (n,) int32, -1 uses the `dark_floor` of all points
+    """
     floor = np.full(len(mean), dark_floor(mean))
     for number in np.unique(room[room >= 0]):
         floor[room == number] = dark_floor(mean[room == number])
@@ -83,13 +89,19 @@ def room_floor(mean: NDArray[np.float64], room: NDArray[np.int32]) -> NDArray[np
 def _nearest_to_done(
     estimate: PointEstimate, error: NDArray[np.float64], chosen: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the half of the chosen points (m,) that needs the fewest samples to reach the target."""
+    """Return the half of the points `chosen` (m,) that needs the fewest samples to reach the target.
+
+    error : (n,) float64, relative standard error of all points
+    """
     need = estimate.count.sum(axis=0)[chosen] * error[chosen] ** 2
     return np.sort(chosen[np.argsort(need, kind="stable")[: -(-len(chosen) // 2)]])
 
 
 def relative_standard_error(estimate: PointEstimate, room: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Return the standard error (n,), mean over colours, relative to the light or the floor of the room."""
+    """Return (n,) float64: the mean standard error of the colours divided by the light of each point.
+
+    If the light is below `room_floor`, the divisor is `room_floor`.
+    """
     mean = estimate.mean
     error = standard_error(estimate, room).mean(axis=1)
     scale = np.maximum(mean.mean(axis=1), np.maximum(room_floor(mean, room), 1e-12))
@@ -97,10 +109,10 @@ def relative_standard_error(estimate: PointEstimate, room: NDArray[np.int32]) ->
 
 
 def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) -> float:
-    """Cast a few rays of each kind from a triangle, and return the seconds that this took.
+    """Cast a few rays of each kind from one triangle; return the time that this took, seconds.
 
-    The first run on a machine compiles the kernels here, before the time limit starts. Compilation may take
-    as long as the limit; few paths would be left, and a correct bake would fail.
+    On the first run, this compiles the kernels before the time limit starts. Otherwise compilation could use
+    up the time limit, and a correct bake would fail because too few paths are traced.
     """
     started = time.monotonic()
     middle = geometry.position[geometry.triangle[:1]].astype(np.float64).mean(axis=1)
@@ -117,7 +129,7 @@ def first_rays(reference: Reference, geometry: Geometry, channels: list[str]) ->
 def trace_ambient_occlusion(
     reference: Reference, points: SurfacePoints, distance: float, effort: Effort, progress: Progress
 ) -> PointEstimate:
-    """Estimate ambient occlusion within `distance` metres at points (n, k)."""
+    """Estimate the ambient occlusion within `distance`, metres, of n points with k surface points each."""
     estimate = new_estimate(len(points.position), 1)
     goal = effort.passes(estimate)
     started = time.monotonic()
@@ -140,7 +152,7 @@ def trace_ambient_occlusion(
 def trace_irradiance(
     reference: Reference, points: SurfacePoints, bounces: int | None, effort: Effort, progress: Progress
 ) -> PointEstimate:
-    """Estimate irradiance at points (n, k); finished points get no further passes."""
+    """Estimate the irradiance of n points with k surface points each; finished points get no more passes."""
     estimate = new_estimate(len(points.position), 3)
     chosen = np.arange(len(points.position))
     goal = effort.passes(estimate)

@@ -1,4 +1,4 @@
-"""The area of surface that is not compared: without measured texels, or on invalid texels."""
+"""Measures the area of the surface that is not compared, because no texel or an invalid texel stores it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.pathtracer.scene import Reference
 from baker.verification.points import Pages
 from baker.verification.surroundings import visible
 
-# Number of invalid texels whose visibility is tested, and number of points that measure the area of a texel.
+# Largest number of invalid texels whose visibility is tested, and number of points for the area of a texel.
 _TESTED, _POINTS = 400, 4
 
 
@@ -26,14 +26,13 @@ class UnverifiedArea:
     Attributes
     ----------
     total : float
-        All surface, fronts only.
+        Area of all triangles, front sides only.
     invalid : float
-        Surface on invalid texels, which the bake filled from their neighbours.
+        Area on invalid texels, which the bake filled from their neighbours.
     visible : float
-        The part of `invalid` that is visible from points in the air. Since it can be seen, the bake should
-        have computed its light.
+        Part of `invalid` that is visible from points in the air. The bake should have computed its light.
     uncovered : float
-        Surface on all other texels without a measured value.
+        Area on all other texels without a measured value.
     """
 
     total: float
@@ -50,7 +49,7 @@ def measure_unverified_area(
     air: NDArray[np.float64],
     seed: int,
 ) -> UnverifiedArea:
-    """Measure the surface that no compared texel represents.
+    """Measure the areas of `UnverifiedArea`.
 
     Parameters
     ----------
@@ -59,11 +58,11 @@ def measure_unverified_area(
     bake : StoredBake
         The verified bake.
     geometry : Geometry
-        Its triangles.
+        Triangles of the bake.
     pages : Pages
         The texels of all pages.
-    air : (m, 3) float64, metres, world axes, relative to the geometry's origin
-        Points in the air between surfaces.
+    air : (m, 3) float64, metres, relative to the geometry's origin
+        Points in the air between surfaces, see `surroundings`.
     seed : int
         Seed of the random choice.
 

@@ -1,8 +1,8 @@
 """Compares the stored maps of a finished bake with path-traced values at chosen points.
 
-The reference (`baker.pathtracer`) is computed from scene and lights only. The maps are read from the files:
-they include the effects of half floats, the denoiser and filled texels. `criteria` computes metrics, most of
-them beside the part that the noise of the reference adds, and their limits.
+The reference (`baker.pathtracer`) is computed only from the scene and its lights. The maps are read from the
+files of the bake, so errors of half floats, the denoiser and filled texels are included. The modules of
+`criteria` compute metrics and define default limits. Most metrics exclude the noise of the reference.
 """
 
 from __future__ import annotations
@@ -49,25 +49,26 @@ from baker.verification.tracing import (
 from baker.verification.unverified_area import UnverifiedArea, measure_unverified_area
 
 CHANNELS = ("irradiance", "ao")
-# Additional time for crops around the worst texels, as a share of the time limit.
+# Time for path-tracing crops, in addition to the time limit and as a share of it.
 _CROP_TIME = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class ChannelCheck(Metrics):
-    """Stored and path-traced values of a channel's n texels, with metrics.
+    """Stored and path-traced values of a channel at n random texels, with metrics.
 
     Attributes
     ----------
     value, reference, standard_error : (n, C) float64
+        Stored value, path-traced value, and standard error of the path-traced value.
     halves : two (n, C) float64
-        Independent halves of the reference.
+        Estimates of the reference from two independent halves of the samples.
     metrics : dict of str to number or None
         Metrics of all criteria, see `criteria.registry`.
     remarks : dict of str to str
-        By name of a metric, a sentence about the fault that it indicates.
+        Sentences by metric, each about the fault that the metric indicates.
     unresolved : int
-        Texels whose standard error stayed above the target.
+        Number of texels whose reference did not reach the target standard error.
     """
 
     value: NDArray[np.float64]
@@ -80,13 +81,13 @@ class ChannelCheck(Metrics):
 
     @property
     def shift(self) -> tuple[int, int]:
-        """Return the shift (rows, columns) by which the map would fit better."""
+        """Return the shift (rows, columns) at which the map fits the reference best; (0, 0) if unshifted."""
         down, right = self.metrics["shift"]
         return down, right
 
     @property
     def exponent(self) -> float | None:
-        """Return the exponent of the reference that the values follow, see `metrics.misalignment`."""
+        """Return the exponent p of the fit value = c * reference^p, see `metrics.misalignment`."""
         power: float | None = self.metrics["exponent"]
         return power
 
@@ -98,29 +99,31 @@ class VerifyReport(Result):
     Attributes
     ----------
     bake : StoredBake
+        The verified bake.
     pixel : (n,) int64
-        Compared texels, (page * H + row) * W + column.
+        Compared random texels, (page * H + row) * W + column.
     owner : (n,) int32
-        Their objects.
+        Object of each texel.
     position : (n, 3) float64, metres, world
-        Their positions.
+        Position of each texel.
     channels : dict of str to ChannelCheck
-        By name of channel.
+        Comparisons by channel.
     objects, levels, regions, worst : list of dict
-        As in the JSON.
+        Tables of objects, light levels, regions and texels with the largest errors.
     verdicts : list of Verdict
         One for each limit.
     problems : list of str
         Remarks on the limits that failed.
     invalid : int
-        Invalid texels, which the bake filled from neighbours; they are not compared.
+        Number of invalid texels, which the bake filled from neighbours. They are not compared.
     rays : int
+        Number of rays of the path tracer.
     seconds : float
-        Without the compilation of kernels.
+        Duration of the verification, without compilation of kernels.
     compile_seconds : float
-        Compilation of kernels, on the first run on a machine.
+        Duration of compilation, which the first run on a machine needs.
     crops : list of Crop
-        The surroundings of the worst texels.
+        Path-traced windows around the texels with the largest errors.
     warnings : list of SceneWarning
     """
 
@@ -148,12 +151,12 @@ class VerifyReport(Result):
         return not any(verdict.failed for verdict in self.verdicts)
 
     def flip(self, channel: str) -> float | None:
-        """Return the mean FLIP of a channel's crops, None without any."""
+        """Return the mean FLIP error of a channel's crops, None if there are no crops."""
         values = [crop.flip for crop in self.crops if crop.channel == channel]
         return float(np.mean(values)) if values else None
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that `repr` and notebooks show."""
         rows: dict[str, Any] = {"passed": self.passed}
         for name, channel in self.channels.items():
             for figure in ("bias", "median", "p95"):
@@ -161,11 +164,11 @@ class VerifyReport(Result):
         return rows | {"texels": len(self.pixel), "failed": ", ".join(self.problems) or "nothing"}
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return the first page of the bake."""
+        """Return the first page of the bake's first channel."""
         return next((pages[0] for pages in self.bake.maps.values()), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the verification as plain values, the object of `baker verify` as JSON."""
+        """Return the verification as values that JSON can hold; `baker verify --json` prints them."""
         return {
             "passed": self.passed,
             "channels": {
@@ -192,7 +195,7 @@ class VerifyReport(Result):
 
 
 def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
-    """Return counts of z-scores between -6 and 6; values beyond are in the outer bins."""
+    """Return the histogram of z-scores from -6 to 6; scores outside are counted in the outer bins."""
     z = np.clip(z_scores(check.value, check.reference, check.standard_error), -5.99, 5.99)
     count, edge = np.histogram(z, bins=24, range=(-6.0, 6.0))
     return {"edges": edge.tolist(), "counts": count.tolist()}
@@ -200,7 +203,7 @@ def _histogram(check: ChannelCheck) -> dict[str, list[float]]:
 
 @dataclass(frozen=True)
 class _Traced:
-    """The points, their estimates by channel, the area that was not compared, and the compilation time."""
+    """The points, their path-traced values by channel, the unverified area, and the compilation time."""
 
     points: Points
     estimates: dict[str, PointEstimate]
@@ -218,7 +221,7 @@ def verify(
     out : Path or str
         Output folder of a bake.
     settings : VerifySettings, optional
-        How much is traced, and the limits.
+        Number of points, effort of path tracing, and limits.
     progress : Progress
         Receives reports, and may cancel.
 
@@ -230,7 +233,7 @@ def verify(
     Raises
     ------
     InputError
-        If the folder holds no bake, or none with a channel that can be verified.
+        If the folder contains no bake, or the bake has no channel that can be verified.
     SettingsError
         If a limit of `settings` is malformed or names an unknown channel or metric.
     ResourceError
@@ -272,7 +275,7 @@ def verify(
 
 @dataclass(frozen=True)
 class _Comparison:
-    """The comparison of all channels: the texels, metrics, tables by channel and criterion, worst texels."""
+    """The comparison of all channels; `rows` contains the tables by channel and name of the criterion."""
 
     traced: _Traced
     pixel: NDArray[np.int64]
@@ -285,7 +288,7 @@ class _Comparison:
 
 
 def _compare(bake: StoredBake, names: list[str], settings: VerifySettings, progress: Progress) -> _Comparison:
-    """Path-trace the points and evaluate the criteria of all channels."""
+    """Path-trace the points, and evaluate all criteria for each channel."""
     geometry = world_geometry(bake.scene, bake.atlas)
     pages = read_pages(bake, geometry, names)
     with build_reference(
@@ -340,9 +343,10 @@ def _trace(
 def _channel_data(
     name: str, bake: StoredBake, geometry: Geometry, pages: Pages, traced: _Traced, settings: VerifySettings
 ) -> ChannelData:
-    """Combine a channel's stored values and its estimate."""
+    """Return the stored and path-traced values of a channel at all points."""
     estimate, points = traced.estimates[name], traced.points
-    # Look up beside the centres of border texels: they hold the value at their centre, off their surface.
+    # Look up at the position of the surface points: the stored value applies to the texel's centre, which may
+    # lie outside the surface.
     value = look_up(bake.maps[name], points.pixel, points.surface.offset)[:, : estimate.mean.shape[1]]
     error = standard_error(estimate, points.room)
     samples = estimate.count.sum(axis=0) * estimate.samples
@@ -358,7 +362,7 @@ def _channel_data(
 def _evaluate(
     data: ChannelData, target: float, estimate: PointEstimate
 ) -> tuple[ChannelCheck, dict[str, list[dict[str, Any]]]]:
-    """Return a channel's metrics of all criteria, and their tables by name."""
+    """Evaluate all criteria; return the metrics of the channel, and the tables by name of the criterion."""
     found: dict[str, CriterionResult] = {criterion.name: criterion.evaluate(data) for criterion in CRITERIA}
     mine = data.texels
     compared = data.compared.of(mine)
@@ -383,7 +387,10 @@ def _badness(row: dict[str, Any]) -> float:
 
 
 def _objects(rows: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Return one row for each object with the metrics of all channels."""
+    """Return one row for each object, with the metrics of all channels.
+
+    rows : {channel: rows of the criterion "objects"}
+    """
     found: dict[int, dict[str, Any]] = {}
     for name, table in rows.items():
         for row in table:

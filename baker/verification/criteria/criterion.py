@@ -1,4 +1,4 @@
-"""The interface of a criterion: the data of a channel in, metrics, a table and remarks out."""
+"""The interface of a criterion: it takes the data of a channel and returns metrics, a table and remarks."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from baker.metrics.groups import ComparedPoints
 from baker.verification.points import EDGE, OUTLIER, SCARCE, STEEP, TEXEL, Pages, Points
 from baker.verification.unverified_area import UnverifiedArea
 
-# Smallest share of a texel's square, covered by surface with valid points, of a texel that is no border.
+# Share of a texel's square, covered by surface with valid points, below which a texel is not interior.
 _MIN_COVERED = 0.75
-# Largest share of the light around a point that may come from below its facet.
+# Share of a cosine-weighted hemisphere around the shading normal that lies below the facet: above it, a point
+# counts as tilted.
 _MAX_BELOW = 0.005
 
 
@@ -28,21 +29,21 @@ class ChannelData:
     Attributes
     ----------
     channel : str
-        Its name.
+        Name of the channel.
     bake : StoredBake
         The verified bake.
     geometry : Geometry
-        Its triangles.
+        Triangles of the bake.
     pages : Pages
         The texels of all pages.
     points : Points
-        The compared points.
+        The n points.
     compared : ComparedPoints
-        Stored and path-traced values at all points.
+        Stored and path-traced values at the points.
     unverified : UnverifiedArea
-        Surface without compared texels.
+        Area of the surface without compared texels.
     noisy : (n,) bool
-        Points whose reference did not reach the target standard error.
+        Points whose reference is too noisy for a comparison.
     """
 
     channel: str
@@ -56,14 +57,14 @@ class ChannelData:
 
     @property
     def texels(self) -> NDArray[np.bool_]:
-        """Return which points (n,) are randomly chosen texels."""
+        """Return (n,) bool: the points that are randomly chosen texels."""
         return np.asarray(self.points.kind == TEXEL)
 
     @property
     def interior(self) -> NDArray[np.bool_]:
-        """Return which points (n,) are not in gaps, not tilted, and mostly covered by valid surface.
+        """Return (n,) bool: the points that are mostly covered by valid surface, not in gaps and not tilted.
 
-        All others are compared as edges.
+        All other points are compared only as points at edges.
         """
         points = self.points
         covered = points.surface.area * points.valid_share >= _MIN_COVERED
@@ -71,10 +72,11 @@ class ChannelData:
 
     @property
     def tilted(self) -> NDArray[np.bool_]:
-        """Return where (n,) shading and face normal differ so much that their irradiance differs.
+        """Return (n,) bool: the points whose shading normal differs considerably from the face normal.
 
-        The reference has no light from below a facet; the bake has, as a curved surface would. Of a
-        cosine-weighted hemisphere around a normal that is tilted by t this share is (1 - cos t) / 2.
+        There, bake and reference differ: the bake includes light from below the facet, as on a curved
+        surface, and the reference does not. If the shading normal is tilted by an angle t, the share (1 - cos
+        t) / 2 of the cosine-weighted hemisphere around it lies below the facet.
         """
         surface = self.points.surface
         cosine = (surface.normal * surface.face_normal).sum(axis=2).mean(axis=1)
@@ -82,27 +84,27 @@ class ChannelData:
 
     @property
     def edges(self) -> NDArray[np.bool_]:
-        """Return which points (n,) lie at edges."""
+        """Return (n,) bool: the points at edges."""
         return np.asarray(self.points.kind == EDGE)
 
     @property
     def outliers(self) -> NDArray[np.bool_]:
-        """Return which points (n,) are texels that differ from all their neighbours."""
+        """Return (n,) bool: the points that are texels which differ from all their neighbours."""
         return np.asarray(self.points.kind == OUTLIER)
 
     @property
     def steep(self) -> NDArray[np.bool_]:
-        """Return which points (n,) are texels where light changes most."""
+        """Return (n,) bool: the points that are texels with the largest gradients of light."""
         return np.asarray(self.points.kind == STEEP)
 
     @property
     def scarce(self) -> NDArray[np.bool_]:
-        """Return which points (n,) are additional texels of light levels with few texels."""
+        """Return (n,) bool: the points that are additional texels of light levels with few random texels."""
         return np.asarray(self.points.kind == SCARCE)
 
     @property
     def stored(self) -> NDArray[np.float32]:
-        """Return the channel's pages (P, H, W, C)."""
+        """Return the channel's stored pages (P, H, W, C)."""
         return self.bake.maps[self.channel]
 
 
@@ -113,11 +115,11 @@ class CriterionResult:
     Attributes
     ----------
     metrics : dict of str to number or None
-        By the names in `Criterion.metrics`.
+        Values by metric; the names are those in `Criterion.metrics`, and may be more.
     remarks : dict of str to str
-        By name of a metric, a sentence about the fault that it indicates.
+        Sentences by metric, each about the fault that the metric indicates.
     rows : list of dict
-        A table, worst first.
+        Rows of a table, if the criterion has a table.
     """
 
     metrics: dict[str, Any]
@@ -131,13 +133,13 @@ class Criterion(NamedTuple):
     Attributes
     ----------
     name : str
-        Name of its table.
+        Name of the criterion and of its table.
     metrics : tuple of str
-        Names of the metrics that `evaluate` returns, always all.
+        Names of the metrics that `evaluate` always returns.
     limits : dict of str to str
         Default limits on these metrics, by channel.
     evaluate : callable
-        Computes the result of a channel.
+        evaluate(data) returns the CriterionResult of a channel.
     """
 
     name: str

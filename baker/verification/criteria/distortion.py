@@ -1,4 +1,4 @@
-"""Maps or charts that were shifted; maps that were blurred, gamma-encoded, quantised or clamped."""
+"""Detects shifted maps and charts, and maps that were blurred, gamma-encoded, quantised or clamped."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from baker.metrics.levels import cut_off, few_levels
 from baker.metrics.misalignment import best_shift, exponent, is_blurred
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# Largest ratio of the misfits with and without a shift that indicates a shifted chart. It is smaller than for
-# a whole map, since there are many charts with few texels each.
+# Ratio of the squared errors with and without a shift, below which a chart counts as shifted. It is smaller
+# than for a whole map, because charts have few texels and there are many of them.
 _CHART_BETTER = 0.5
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute the metrics of distortions of the map as an image."""
+    """Compute the metrics of distortions that affect the map as an image."""
     mine = data.texels
     chosen = (mine | data.steep) & ~data.points.gap
     compared = data.compared.of(mine)
@@ -58,7 +58,7 @@ def evaluate(data: ChannelData) -> CriterionResult:
 
 
 def _shifted_charts(data: ChannelData) -> list[str]:
-    """Return a sentence for each chart that fits better one texel further."""
+    """Return a phrase for each chart that fits the reference better if it is shifted."""
     points, size = data.points, data.bake.atlas.resolution
     chosen = np.flatnonzero((data.texels | data.steep | data.scarce) & ~points.gap)
     page = data.stored.mean(axis=3, dtype="float64")

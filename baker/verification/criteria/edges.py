@@ -1,4 +1,4 @@
-"""Bilinear lookups at edges, as engines do them: at chart borders, next to walls, between texels."""
+"""Compares bilinear lookups of the map, as in an engine, at chart borders, next to walls, between texels."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from baker.metrics.texel_area import look_up
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 from baker.verification.criteria.groups import make_groups, worst_metrics
 
-# A point is wrong if its error exceeds this share of the brighter of both values and this many standard
-# errors.
+# Limits above which a point is wrong: error divided by the larger of value and reference, and error divided
+# by the standard error. Both must be exceeded.
 _WRONG, _Z = 0.5, 4.0
-# Fewest points for which metrics are computed.
+# Number of points below which no metrics are computed.
 _MIN_POINTS = 8
-# Weight of filled texels above which a lookup counts as one beside filled texels.
+# Weight of filled texels in a lookup, above which its point belongs to the group beside filled texels.
 _FILLED = 0.1
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute metrics over the points at edges that are not in gaps."""
+    """Compute metrics over all points at edges that are not in gaps."""
     points = data.points
     mine = data.edges & ~points.gap
     metrics: dict[str, Any] = dict.fromkeys(EDGES.metrics)
@@ -63,7 +63,7 @@ def evaluate(data: ChannelData) -> CriterionResult:
 
 
 def filled_share(data: ChannelData) -> NDArray[np.float64]:
-    """Return the weight (n,) of texels without a measured value in each point's lookup."""
+    """Return (n,) float64: the weight of texels without a measured value in each point's lookup."""
     covered = data.pages.covered[..., None].astype(np.float32)
     measured = look_up(covered, data.points.pixel, data.points.surface.offset)
     return np.asarray(1.0 - measured[:, 0], np.float64)

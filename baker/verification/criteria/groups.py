@@ -1,4 +1,4 @@
-"""Shared by criteria of groups: the comparison of groups, and the largest significant deviations."""
+"""Compares groups of points and finds their largest significant deviations; used by several criteria."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from baker.metrics.groups import MIN_POINTS, GroupMetrics, bright_light, compare_group
 from baker.verification.criteria.criterion import ChannelData
 
-# Smallest light that differences are relative to, by channel: one percent of the AO in a corner is invisible.
+# Smallest denominator of relative differences, by channel. In corners with little AO, a difference of 1 % of
+# the AO is invisible.
 MIN_LIGHT = {"irradiance": 0.0, "ao": 0.2}
-# Fewest points of a group whose own error is significant.
+# Number of points below which a group's own error counts as 0. (The own error is the relative spread of the
+# values about the reference, without the reference's noise; see `metrics.groups`.)
 MIN_NOISE_POINTS = 40
 
 
@@ -23,11 +25,11 @@ class Group:
     Attributes
     ----------
     name : str
-        Name in a sentence.
+        Description of the group for messages.
     member : (m,) int64
         Indices of its points.
     found : GroupMetrics
-        Its deviations.
+        Deviations of the group.
     """
 
     name: str
@@ -36,17 +38,20 @@ class Group:
 
     @property
     def badness(self) -> float:
-        """Return the largest significant deviation, by which groups are sorted."""
+        """Return the largest significant deviation in bias, colour or own error."""
         return max(abs(self.found.sure_bias), abs(self.found.sure_colour), self.noise)
 
     @property
     def noise(self) -> float:
-        """Return the significant part of the own error, 0 for a group that is too small."""
+        """Return the significant part of the own error, 0 below `MIN_NOISE_POINTS` points."""
         return self.found.sure_noise if self.found.texels >= MIN_NOISE_POINTS else 0.0
 
 
 def make_groups(data: ChannelData, members: list[tuple[str, NDArray[np.int64]]]) -> list[Group]:
-    """Compare the groups of at least `MIN_POINTS` points, given by name and indices (m,); worst first."""
+    """Return the groups of at least `MIN_POINTS` points with their deviations, largest deviation first.
+
+    members : list of (description, (m,) int64 indices of points)
+    """
     mine = data.texels
     bright = bright_light(data.compared.reference[mine])
     groups = [
@@ -58,7 +63,10 @@ def make_groups(data: ChannelData, members: list[tuple[str, NDArray[np.int64]]])
 
 
 def worst_metrics(prefix: str, groups: list[Group], channel: str) -> tuple[dict[str, float], dict[str, str]]:
-    """Return the largest significant PREFIX_bias, PREFIX_colour and PREFIX_noise, and remarks on them."""
+    """Return {metric: value} and {metric: remark} of the largest significant deviations of all groups.
+
+    The metrics are `prefix` + "_bias", "_colour" and "_noise"; noise is the own error.
+    """
     metrics = {f"{prefix}_{kind}": 0.0 for kind in ("bias", "colour", "noise")}
     remarks = {}
     for group in groups:

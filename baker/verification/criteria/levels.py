@@ -1,8 +1,9 @@
-"""Own errors by light level, in dark as in bright areas.
+"""Computes the own error of each light level, in dark as well as in bright areas.
 
-Groups are the texels of all rooms by half powers of ten of their light, and the darkest 5, 10 and 20 % of
-them, so that a fault of the darkest texels is not hidden among brighter ones. Narrower levels would not
-detect more: texels are sorted by values that include the error, so texels with equal errors share a level.
+The own error is defined in `metrics.groups`. A light level contains the texels of all rooms whose light is
+within half a power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so that a fault of
+the darkest texels is not hidden among brighter texels. Narrower levels would not detect more faults, because
+texels are assigned to levels by values that include the error.
 """
 
 from __future__ import annotations
@@ -17,17 +18,19 @@ from baker.metrics.sample_texels import light_level
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 from baker.verification.criteria.groups import make_groups, worst_metrics
 
+# Shares of all texels in the groups of the darkest texels.
 _DARKEST = (0.05, 0.1, 0.2)
-# Relative standard error of the reference at which reference and map determine the level alike.
+# `equal_weight` of `level_light`: relative standard error of the reference at which reference and map have
+# the same weight.
 EQUAL_WEIGHT = 0.15
 
 
 def level_light(compared: ComparedPoints, equal_weight: float) -> NDArray[np.float64]:
-    """Return the light (n,) by which points are sorted into levels: a mean of reference and map.
+    """Return (n,) float64: the light by which points are assigned to levels, a mean of reference and map.
 
-    The reference dominates where it has little noise, the map elsewhere: points that an error of the sorting
-    value moves across the end of a level are biased to one side. Both have the same weight where the relative
-    standard error of the reference is `equal_weight`, about the error of the map that is to be detected.
+    An error of this light moves points to the next level, which biases the errors in both levels. So the
+    reference has more weight where its noise is low, and the map elsewhere. Both have the same weight if the
+    relative standard error of the reference is `equal_weight`, which is about the error to be detected.
     """
     value, reference = compared.value.mean(axis=1), compared.reference.mean(axis=1)
     noise = np.where(np.isfinite(compared.spread), compared.spread, 0.0).mean(axis=1)
@@ -41,7 +44,7 @@ def _span(light: NDArray[np.float64]) -> str:
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute the own error of the worst level, and a table of all levels, brightest last."""
+    """Compute the largest own error of all levels, and a table of the levels in order of increasing light."""
     points = data.points
     mine = np.flatnonzero((data.texels | data.scarce) & data.interior & (points.room >= 0))
     light = level_light(data.compared.of(mine), EQUAL_WEIGHT)

@@ -1,4 +1,4 @@
-"""Deviations of objects and of charts as a whole, and the metrics of each object."""
+"""Computes the deviations of whole objects and whole charts, and the error metrics of each object."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.verification.criteria.groups import make_groups, worst_metrics
 
 
 def evaluate_objects(data: ChannelData) -> CriterionResult:
-    """Compute the metrics of each object with compared texels, in the order of the scene, and the worst."""
+    """Compute the largest deviations of objects, and a table of error metrics in the order of the scene."""
     points, instances = data.points, data.bake.scene.instances
     mine = data.texels
     floor = dark_floor(data.compared.reference[mine])
@@ -38,7 +38,7 @@ def evaluate_objects(data: ChannelData) -> CriterionResult:
 
 
 def evaluate_charts(data: ChannelData) -> CriterionResult:
-    """Compute the largest deviations of charts."""
+    """Compute the largest deviations of all charts."""
     points, instances = data.points, data.bake.scene.instances
     size = data.bake.atlas.resolution
     mine = data.texels & data.interior

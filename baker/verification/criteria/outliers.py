@@ -1,4 +1,4 @@
-"""Texels that differ from all their neighbours, and the number of wrong ones among them."""
+"""Counts the texels that differ from all their neighbours, and those of them whose value is wrong."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from baker.metrics.error_metrics import dark_floor
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# A texel is wrong if its error exceeds this share of the brighter of both values and this many standard
-# errors.
+# Limits above which a texel is wrong: error divided by the larger of value and reference, and error divided
+# by the standard error. Both must be exceeded.
 _WRONG, _Z = 0.3, 4.0
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Count the outliers, and those that are wrong."""
+    """Count the outliers that are not in gaps, and those with a wrong value."""
     points = data.points
     mine = data.outliers & ~points.gap
     metrics: dict[str, Any] = {"suspects": int(mine.sum()), "wrong_suspects": 0}

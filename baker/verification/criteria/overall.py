@@ -1,4 +1,4 @@
-"""Error metrics over all compared texels, and the deviations of all texels as one group."""
+"""Computes error metrics over all compared texels, and the deviations of all texels as one group."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baker.verification.criteria.groups import make_groups, worst_metrics
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute `error_metrics`, and the median error without the noise of the reference."""
+    """Compute `error_metrics`, the median error beyond the reference's noise, and the group's deviations."""
     mine = data.texels
     compared = data.compared.of(mine)
     found = error_metrics(

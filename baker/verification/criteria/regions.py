@@ -1,4 +1,7 @@
-"""Regions: the texels of a room, and its light levels; deviations are relative to their own light."""
+"""Computes the deviations of regions, relative to the mean light of each region.
+
+A region is a whole room, or the texels of a room in one light level.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,14 @@ from baker.verification.criteria.criterion import ChannelData, Criterion, Criter
 from baker.verification.criteria.groups import make_groups, worst_metrics
 from baker.verification.criteria.levels import level_light
 
-# `equal_weight` of `level_light`: the error of single texels of a correct map, since bias is measured here.
+# `equal_weight` of `level_light`, about the relative error of single texels in a correct map.
 _EQUAL_WEIGHT = 0.03
-# Largest number of objects listed for a region.
+# Largest number of objects that are listed for a region.
 _LISTED = 3
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute the largest deviations of regions, and a table of all regions."""
+    """Compute the largest deviations of regions in rooms, and a table of all regions."""
     points, compared = data.points, data.compared
     mine = data.texels & data.interior
     level = light_level(level_light(compared, _EQUAL_WEIGHT))
@@ -35,7 +38,7 @@ def evaluate(data: ChannelData) -> CriterionResult:
             members.append((name, np.flatnonzero(inside & (level == number))))
             keys[name] = int(room), [low, high]
     groups = make_groups(data, members)
-    # Hidden surface is reported, but not compared with limits.
+    # Exclude surface outside rooms (hidden) from the metrics; the table includes it.
     in_rooms = [group for group in groups if keys[group.name][0] >= 0]
     worst, remarks = worst_metrics("region", in_rooms, data.channel)
     position = points.position + data.geometry.origin

@@ -1,4 +1,4 @@
-"""All criteria, in the order of reports, with their default limits."""
+"""Lists all criteria in the order of reports, with their default limits."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ METRIC_NAMES = tuple(name for criterion in CRITERIA for name in criterion.metric
 
 
 def default_limits(channels: Iterable[str]) -> str:
-    """Return the default limits of channels, as `fail_if` takes them."""
+    """Return the default limits of channels as one text, in the format of the setting `fail_if`."""
     texts = [criterion.limits.get(name, "") for name in channels for criterion in CRITERIA]
     return ", ".join(text for text in texts if text)

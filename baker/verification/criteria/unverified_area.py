@@ -1,4 +1,4 @@
-"""The area of surface that was not compared, or compared with a noisy reference."""
+"""Computes the area of the surface that was not compared, or whose reference is too noisy."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# Relative standard error of the reference, or the target if that is larger, above which a texel counts as
-# unresolved.
+# Standard error of the reference above which a texel counts as unresolved: relative to its light for
+# irradiance (where a larger setting `target_se` replaces it), absolute for AO.
 NOISY = 0.1
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute areas in m2 and their shares of the surface."""
+    """Compute areas in m2, and their shares of the whole or of the compared surface."""
     points, area = data.points, data.unverified
     mine = data.texels
     total = max(area.total, 1e-30)
