@@ -302,16 +302,16 @@ class UnwrapKeywords(TypedDict, total=False):
 class VerifyKeywords(TypedDict, total=False):
     """Keywords of `VerifySettings`."""
 
-    # Texels compared at their centres; points at edges and outliers are added.
+    # Number of random texels to compare; points at edges and outliers are added.
     texels: int
 
     # Fixed number of paths for each texel.
     spp: int | None
 
-    # Relative standard error at which a texel is good enough.
+    # Relative standard error at which path tracing of a texel stops.
     target_se: float
 
-    # Time for path tracing; default: 40 without `spp`, else none. `inf` is none.
+    # Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
     time_limit: float | None
 
     # Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".

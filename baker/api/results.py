@@ -45,13 +45,13 @@ def verify(
         Settings by name, which replace those in `settings`:
 
         texels : int, from 1, default 2000
-            Texels compared at their centres; points at edges and outliers are added.
+            Number of random texels to compare; points at edges and outliers are added.
         spp : int | None, from 1, default None
             Fixed number of paths for each texel.
         target_se : float, above 0, default 0.005
-            Relative standard error at which a texel is good enough.
+            Relative standard error at which path tracing of a texel stops.
         time_limit : float | None, s, above 0, default None
-            Time for path tracing; default: 40 without `spp`, else none. `inf` is none.
+            Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
         fail_if : str | None, default None
             Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".
         seed : int, 0 to 2147483647, default 0
