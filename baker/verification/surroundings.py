@@ -214,7 +214,7 @@ def visible(
 def seen_along(
     reference: Reference, origin: NDArray[np.float64], segment: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (n,) bool: whether nothing blocks the ray from `origin` (n, 3) to `origin` + `segment` (n, 3)."""
+    """Return (n,) bool: whether nothing blocks the way from `origin` to `origin + segment`, both (n, 3)."""
     length = np.linalg.norm(segment, axis=1)
     hits = first_hits(reference, origin, segment / np.maximum(length, 1e-30)[:, None])
     seen: NDArray[np.bool_] = hits.depth > length * (1 - _TOUCH)
