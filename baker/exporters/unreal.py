@@ -28,7 +28,7 @@ class UnrealExport:
             steps=(
                 "Enable the plugin Python Editor Script, and run import_lightmaps.py (Tools > Execute Python",
                 "Script). It imports pages and scene to /Game/Baker, and creates the material function",
-                "MF_BakerLightmap, the unlit material M_BakerLightmap and one instance for each object.",
+                "MF_BakerLightmap, the unlit material M_BakerLightmap and its instances for the objects.",
                 "The parameter `Exposure` scales the light; the level's auto exposure is applied after it.",
             ),
             scale="The pages contain irradiance E in lx; the material shows base colour x E / pi, in cd/m2.",

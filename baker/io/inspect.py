@@ -27,7 +27,7 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
     path : Path or str
         A file or a folder.
     allow_outside : bool
-        As of `load_scene`.
+        As in `load_scene`.
 
     Returns
     -------

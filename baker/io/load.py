@@ -43,9 +43,9 @@ class SceneFile:
         Do not raise for the defects that `load_scene` lists, and store all triangles of the file in
         `Scene.source_scene`.
     allow_outside : bool
-        Files that the scene names may be outside its folder.
+        Whether files outside the folder of the scene may be read.
     self_contained : bool
-        No file that the scene names is read.
+        Whether no other file is read, because the scene contains all its data.
     """
 
     path: Path
@@ -60,7 +60,7 @@ class SceneFile:
 
     @property
     def folder(self) -> SceneFolder:
-        """Return the folder that names in the scene refer to."""
+        """Return the folder that the file names in the scene are relative to."""
         return SceneFolder(self.path.parent, self.allow_outside, self.self_contained)
 
 
@@ -98,9 +98,9 @@ def load_scene(
         strong lights, and a scene without a valid triangle. `Scene.source_scene` then contains the triangles
         of the file, including invalid ones.
     allow_outside : bool
-        Also read files that the scene names outside its folder. Without it, such a name is an error.
+        Also read files outside the folder of the scene. If False, a reference to such a file is an error.
     self_contained : bool
-        Read no other file. Used for the `scene.glb` of a bake, which contains all the data that is needed.
+        Read no file other than `path`. Used for the `scene.glb` of a bake, which contains all needed data.
 
     Returns
     -------
@@ -110,8 +110,8 @@ def load_scene(
     Raises
     ------
     InputError
-        If the file or a file that it refers to is missing, unreadable, malformed or outside of its folder, if
-        it requires an unknown extension, or if it contains nothing to bake.
+        If the file or a file that it refers to is missing, unreadable, malformed or outside the folder of the
+        scene, if it requires an unknown extension, or if it contains nothing to bake.
     SettingsError
         If `up` is neither "y" nor "z", or `scale` is not a positive number.
     ResourceError

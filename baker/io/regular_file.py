@@ -1,4 +1,4 @@
-"""Reads whole files, but no devices, pipes, sockets or Git LFS pointers."""
+"""Reads whole regular files; devices, pipes, sockets and Git LFS pointers are refused."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import os
 import stat
 from pathlib import Path
 
-# The largest scene, buffer or image, bytes: the length in a GLB header has 32 bits.
+# Size above which a scene, buffer or image file is not read, bytes. The length in a GLB header has 32 bits.
 LARGEST = 1 << 32
-# The largest text of settings or jobs, bytes.
+# Size above which a text file with settings or jobs is not read, bytes.
 LARGEST_TEXT = 1 << 24
 _LFS = b"version https://git-lfs.github.com/spec/"
 _KINDS = (
@@ -27,9 +27,9 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
     Parameters
     ----------
     path : Path or str
-        The file. A link to a regular file is read, too.
+        The file, or a symbolic link to it.
     most : int
-        A longer file is refused before it is read, bytes.
+        Largest accepted size, bytes; a larger file is refused before it is read.
 
     Returns
     -------
@@ -39,12 +39,12 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
     Raises
     ------
     OSError
-        If the file is missing, unreadable, not a regular file, longer than `most`, or a Git LFS pointer. Its
-        `strerror` is the reason in words.
+        If the file is missing, unreadable, not a regular file, longer than `most`, or a Git LFS pointer. The
+        `strerror` of the exception describes the reason.
     ValueError
-        If no file can have this name, such as one with a NUL character.
+        If no file can have this name, for example because it contains a NUL character.
     """
-    # Look before opening: opening a pipe waits for a writer, and opening a device may have effects.
+    # Check the type first: opening a pipe waits for a writer, and opening a device may have side effects.
     path = Path(path)
     _check(path, path.stat().st_mode)
     file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -54,7 +54,7 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
         if found.st_size > most:
             why = f"it has {found.st_size} bytes; at most {most} are read"
             raise OSError(errno.EFBIG, why, str(path))
-        # A file of /proc may hold more than its size says.
+        # Files in /proc report size 0, although they have content.
         data = stream.read(most + 1) if found.st_size == 0 else stream.read(found.st_size)
     if data.startswith(_LFS):
         raise OSError(errno.EINVAL, "it is a Git LFS pointer; run `git lfs pull`", str(path))
@@ -62,7 +62,7 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
 
 
 def _check(path: Path, mode: int) -> None:
-    """Raise `OSError` for anything but a regular file."""
+    """Raise `OSError` if `mode` is that of a folder, pipe, socket or device."""
     for is_kind, number, why in _KINDS:
         if is_kind(mode):
             raise OSError(number, why, str(path))

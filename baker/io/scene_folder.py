@@ -1,7 +1,7 @@
-"""The folder of a scene file, and which of the files that the scene names are read.
+"""Reads the files that a scene refers to, and refuses files outside the folder of the scene.
 
-A scene may come from anywhere, and what it names is copied into `scene.glb`. So a name must not lead out of
-the folder, unless the user allows it.
+A scene may come from an untrusted source, and the files that it refers to are copied into `scene.glb`.
+Therefore a file outside the folder of the scene is read only if the user allows it.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from baker.io.regular_file import LARGEST, read_regular
 
 
 class OutsideError(InputError):
-    """A scene names a file outside its folder; it is refused even if a bake does not need that file."""
+    """A scene refers to a file outside its folder; this is an error even if a bake does not need the file."""
 
 
 class OutsideName(Exception):  # noqa: N818 - a reason, which becomes an OutsideError with file and object
-    """A name leads out of the folder of the scene; the message is the reason."""
+    """A file name refers to a file outside the folder of the scene; the message is the reason."""
 
 
 @dataclass(frozen=True)
 class SceneFolder:
-    """The folder that names in a scene refer to.
+    """The folder that the file names in a scene are relative to.
 
     Attributes
     ----------
     path : Path
         The folder.
     allow_outside : bool
-        Names may lead out of the folder.
+        Whether files outside the folder may be read.
     self_contained : bool
-        The scene holds all its data, as `scene.glb` of a bake does: no file that it names is read.
+        Whether the scene contains all its data, like `scene.glb` of a bake; then no other file is read.
     """
 
     path: Path
@@ -41,16 +41,16 @@ class SceneFolder:
     self_contained: bool = False
 
     def read(self, name: str, *, base: Path | None = None, most: int = LARGEST) -> bytes:
-        """Return the content of a file that the scene names.
+        """Return the content of a file that the scene refers to.
 
         Parameters
         ----------
         name : str
-            The name as a path, relative to `base`.
+            Path of the file, relative to `base`.
         base : Path, optional
-            Folder of the file in which the name stands; default: the folder of the scene.
+            Folder of the file that contains the name; by default the folder of the scene.
         most : int
-            A longer file is refused, bytes.
+            Largest accepted size, bytes.
 
         Returns
         -------
@@ -60,8 +60,8 @@ class SceneFolder:
         Raises
         ------
         OutsideName
-            If the file, with all links followed, is not below the folder of the scene. Nothing is read, and
-            the error does not depend on whether the file exists.
+            If the file, after resolving symbolic links, is not inside the folder of the scene. The error is
+            the same whether the file exists or not.
         OSError
             If the file is missing, unreadable, not a regular file, longer than `most`, or a Git LFS pointer.
         ValueError

@@ -21,7 +21,7 @@ def scene_sha256(path: Path, *, allow_outside: bool = False) -> str:
     path : Path
         A file of any format that `load_scene` reads.
     allow_outside : bool
-        As of `load_scene`.
+        As in `load_scene`.
 
     Returns
     -------
@@ -31,7 +31,8 @@ def scene_sha256(path: Path, *, allow_outside: bool = False) -> str:
     Raises
     ------
     InputError
-        If the file or a file that it refers to is missing, unreadable, malformed or outside of its folder.
+        If the file or a file that it refers to is missing, unreadable, malformed or outside the folder of the
+        scene.
     """
     folder = SceneFolder(path.parent, allow_outside)
     suffix = path.suffix.lower()

@@ -124,7 +124,8 @@ def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) ->
     data : bytes
         The file's content.
     folder : SceneFolder, optional
-        Folder that relative URIs refer to; default: that of the file, which URIs must not leave.
+        Folder that relative URIs refer to. By default, it is the folder of `path`, and files outside it are
+        refused.
 
     Returns
     -------

@@ -99,7 +99,7 @@ class Poser:
         return np.asarray(world @ inverse.astype(np.float64), np.float64)
 
     def _world(self, node: int) -> NDArray[np.float64]:
-        """Return the world matrix of a node, which may be outside of the scene."""
+        """Return the world matrix of a node, which need not be part of the scene."""
         if self._parent is None:
             self._parent = {}
             for k, above in enumerate(self._nodes):

@@ -46,7 +46,7 @@ def read_uri(uri: str, folder: SceneFolder) -> bytes:
     UriError
         If there is no such file, it cannot be read, or the data URI is malformed.
     OutsideName
-        If the only file that the URI can refer to is outside of the scene's folder.
+        If a file name that the URI may stand for is outside the scene's folder, and no other one exists.
     """
     if is_data(uri):
         return _decode_data(uri)

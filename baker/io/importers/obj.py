@@ -83,7 +83,7 @@ def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
     data : bytes
         Its content.
     folder : SceneFolder
-        Folder that names in the file refer to.
+        Folder that the file names in the OBJ file are relative to.
 
     Returns
     -------

@@ -56,8 +56,8 @@ def read_mtl(
     folder : Path
         Folder that image names are relative to.
     read_file : callable
-        Returns the content of a file, named relative to a folder; raises OSError, ValueError or OutsideName
-        if the file cannot be read.
+        Returns the content of the file with a given name in a given folder. Raises OSError, ValueError or
+        OutsideName if the file cannot be read.
     used : container of str
         Names of the materials that faces use. Errors in other materials are ignored.
     decode : callable
@@ -71,8 +71,8 @@ def read_mtl(
     Raises
     ------
     InputError
-        For a value that is not a number, or an image that is missing, cannot be decoded, or is outside of the
-        scene's folder.
+        For a value that is not a number, or an image that is missing, cannot be decoded, or is outside the
+        folder of the scene.
     """
     images = _Images(file, folder, read_file, decode)
 
