@@ -1,4 +1,4 @@
-"""Welds equal vertices, and finds connected triangles."""
+"""Welds vertices that are equal, and finds connected components of triangles."""
 
 from __future__ import annotations
 
@@ -9,24 +9,26 @@ from baker.topology.unique_rows import unique_rows
 
 
 def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
-    """Number equal rows alike, by first occurrence.
+    """Return a number for each row, which is the same for equal rows. Numbers follow the first occurrence.
 
     Parameters
     ----------
     *key : (V, K) float arrays
-        Rows are equal if they are so in all arrays; -0 equals 0.
+        Two rows are equal if they are equal in all arrays; -0 equals 0.
 
     Returns
     -------
     (V,) int32
-        Number of each row's value.
+        Number of each row's value, from 0.
     """
     # + 0 makes -0 equal to 0.
     return unique_rows([array + 0.0 for array in key], len(key[0]))[1].astype(np.int32)
 
 
 def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Number equal rows alike; -0 equals 0, and NaN equals the same NaN.
+    """Return a number for each row, which is the same for equal rows. Numbers follow a hash.
+
+    -0 equals 0, and NaN equals NaN with the same bits.
 
     Parameters
     ----------
@@ -40,9 +42,8 @@ def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
 
     Notes
     -----
-    `unique_rows` does the same as fast, but numbers rows by first occurrence; here the numbers follow a hash.
-    `closed_parts` keeps this function because it adds areas in the order of the numbers: other numbers would
-    change the last digits of bakes.
+    `unique_rows` is as fast, but numbers rows by first occurrence. `closed_parts` adds areas in the order of
+    the numbers, so with `unique_rows` the last digits of bakes would change.
     """
     if not len(row):
         return np.zeros(0, np.int64)
@@ -63,12 +64,12 @@ def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
 
 
 def connected_vertices(triangle: NDArray[np.integer], n_vertices: int) -> NDArray[np.int32]:
-    """Return the piece of each triangle: triangles of a piece are connected by shared vertices.
+    """Return the piece of each triangle. The triangles of a piece are connected by shared vertices.
 
     Parameters
     ----------
     triangle : (T, 3) int
-        Vertices.
+        Vertex indices of each triangle.
     n_vertices : int
         Number of vertices.
 
@@ -89,18 +90,19 @@ def connected_faces(
     normal: NDArray[np.float64] | None = None,
     min_dot: float = -1.0,
 ) -> NDArray[np.int32]:
-    """Return the piece of each triangle: triangles of one kind, connected by shared edges.
+    """Return the piece of each triangle. The triangles of a piece have one kind and are connected by edges.
 
     Parameters
     ----------
     triangle : (T, 3) int
-        Vertices.
+        Vertex indices of each triangle.
     kind : (T,) int
-        At least 0; edges do not connect triangles of different kinds.
+        Kind of each triangle, at least 0. Edges do not connect triangles of different kinds.
     normal : (T, 3) float64, optional
-        Unit normals.
+        Unit normal of each triangle.
     min_dot : float
-        With normals, an edge connects triangles only if the dot product of their normals is above this.
+        If `normal` is given, an edge connects two triangles only if the dot product of their normals is above
+        `min_dot`.
 
     Returns
     -------
@@ -126,23 +128,23 @@ def connected_faces(
 
 
 def connected(a: NDArray[np.integer], b: NDArray[np.integer], n: int) -> NDArray[np.int64]:
-    """Return the smallest node that each node is connected to by edges.
+    """Return the connected component of each node of a graph, named by its smallest node.
 
     Parameters
     ----------
     a, b : (m,) int
-        Nodes of each edge.
+        The two nodes of each edge.
     n : int
         Number of nodes.
 
     Returns
     -------
     (n,) int64
-        Smallest node of each one's component.
+        Smallest node in the component of each node.
 
     Notes
     -----
-    `scipy.sparse.csgraph` does the same, but importing it takes 0.1 s, more than unwrapping a small scene.
+    `scipy.sparse.csgraph` has this function, but importing it takes 0.1 s.
     Based on: Zhang, Azad and Buluc, Parallel algorithms for finding connected components, 2020 (FastSV).
     """
     parent = np.arange(n)
@@ -165,12 +167,12 @@ def number_by_first(label: NDArray[np.integer]) -> NDArray[np.int32]:
     Parameters
     ----------
     label : (N,) int
-        Labels; negative for none.
+        Labels. A negative label means that the item has none.
 
     Returns
     -------
     (N,) int32
-        New labels, -1 for negative ones.
+        New labels; -1 for negative labels.
     """
     known, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")

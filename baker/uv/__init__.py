@@ -1,1 +1,1 @@
-"""Lightmap uv: cut with xatlas or kept from the input, packed into pages, checked."""
+"""Lightmap uv: made with xatlas or kept from the input, packed into pages, and checked."""

@@ -1,4 +1,4 @@
-"""Cuts meshes into charts without overlap, of every triangle, at the scale of the mesh."""
+"""Cuts meshes into charts. Each triangle gets a chart, and no chart overlaps itself."""
 
 from __future__ import annotations
 
@@ -19,19 +19,24 @@ from baker.uv.xatlas_charts import ChartJob, FlatCharts
 
 @dataclass(frozen=True)
 class MeshCharts:
-    """Charts of one mesh.
+    """Charts of a mesh.
+
+    A lightmap vertex is a mesh vertex with a uv. A mesh vertex on a seam has several of them.
 
     Attributes
     ----------
     vertex : (V',) int32
         Mesh vertex of each lightmap vertex.
     uv : (V', 2) float64, unit of the positions
-        The lower corner of each chart is at 0.
-    triangle : (T, 3) int32, into the lightmap vertices
-    chart : (T,) int32, from 0
+        Uv of each lightmap vertex. The lower corner of each chart's bounding box is at 0.
+    triangle : (T, 3) int32
+        Lightmap vertices of each triangle.
+    chart : (T,) int32
+        Chart of each triangle, from 0.
     vertex_chart : (V',) int32
+        Chart of each lightmap vertex.
     n_repaired : int
-        Triangles that xatlas left out or overlapped, in charts of their own.
+        Number of triangles, with area, that were laid out by `planar_charts`.
     """
 
     vertex: NDArray[np.int32]
@@ -49,7 +54,17 @@ class MeshCharts:
 
 @dataclass(frozen=True)
 class _Welded:
-    """A mesh with one vertex per position: positions (P, 3), triangles (T, 3) and the part of each (T,)."""
+    """A mesh of which vertices with equal position are one vertex.
+
+    Attributes
+    ----------
+    position : (P, 3) float64
+        Vertices.
+    triangle : (T, 3) int32
+        Vertex indices of each triangle.
+    part : (T,) int32
+        Part of each triangle, see `cut_parts`.
+    """
 
     position: NDArray[np.float64]
     triangle: NDArray[np.int32]
@@ -67,16 +82,18 @@ def chart_meshes(
     Parameters
     ----------
     meshes : sequence of (position (V, 3) float64, triangle (T, 3) int32)
+        Vertices and vertex indices of the triangles of each mesh.
     threads : int
-        Largest number of worker processes; the result does not depend on it.
+        Largest number of worker processes. The result does not depend on it.
     progress : Progress
         Called with fractions of the stage from 0 to `until`.
     until : float
+        Fraction of the stage at which all meshes are cut.
 
     Returns
     -------
     list of MeshCharts
-        One for each mesh.
+        Charts of each mesh.
     """
     welded = [_weld_mesh(position, triangle) for position, triangle in meshes]
     jobs, origin = _make_jobs(welded)
@@ -101,7 +118,7 @@ def chart_meshes(
 
 
 def _weld_mesh(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> _Welded:
-    """Weld vertices at equal positions, so that split normals do not separate charts."""
+    """Weld vertices with equal positions, so that vertices split for normals do not separate charts."""
     label = weld(position)
     welded = np.zeros((int(label.max(initial=-1)) + 1, 3))
     welded[label] = position
@@ -110,9 +127,10 @@ def _weld_mesh(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> _W
 
 
 def _make_jobs(welded: Sequence[_Welded]) -> tuple[list[ChartJob], list[list[tuple[int, NDArray[np.int64]]]]]:
-    """Bundle parts into jobs of about `JOB_TRIANGLES`, and return the jobs and the (mesh, faces) of each.
+    """Bundle parts into jobs of at most `JOB_TRIANGLES` triangles, unless a single part has more.
 
-    The jobs depend on the meshes alone, not on the number of threads.
+    Also return, for each job, its parts as pairs of mesh index and face indices. The jobs do not depend on
+    the number of threads.
     """
     jobs: list[ChartJob] = []
     origin: list[list[tuple[int, NDArray[np.int64]]]] = []
@@ -152,7 +170,10 @@ def _bundle_job(welded: Sequence[_Welded], bundle: Sequence[tuple[int, NDArray[n
 
 
 def _finish(triangle: NDArray[np.int32], welded: _Welded, flat: FlatCharts) -> MeshCharts:
-    """Replace missing and overlapping charts by planar ones, and merge equal corners to lightmap vertices."""
+    """Lay out triangles without a valid chart by `planar_charts`, and merge corners to lightmap vertices.
+
+    triangle : (T, 3) int32, vertices of the original mesh; flat : charts of the welded mesh
+    """
     uv, chart = flat.uv.copy(), flat.chart.astype(np.int64)
     good = np.flatnonzero(chart >= 0)
     if len(good):
@@ -169,7 +190,7 @@ def _finish(triangle: NDArray[np.int32], welded: _Welded, flat: FlatCharts) -> M
     low = np.full((n_charts, 2), np.inf)
     np.minimum.at(low, corner_chart, flat_uv)
     flat_uv = flat_uv - low[corner_chart]
-    # Merge corners of equal mesh vertex, chart and uv to one lightmap vertex.
+    # Merge corners with equal mesh vertex, chart and uv to one lightmap vertex.
     key = np.stack([triangle.reshape(-1).astype(np.float64), corner_chart.astype(np.float64)], axis=1)
     label = weld(key, flat_uv)
     _, first = np.unique(label, return_index=True)

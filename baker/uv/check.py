@@ -1,4 +1,4 @@
-"""Overlap and area of uv layouts, and the tolerances by which they are valid."""
+"""Overlap and area of uv layouts, and the tolerances of a valid lightmap uv."""
 
 from __future__ import annotations
 
@@ -7,49 +7,61 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Largest distance by which a valid lightmap uv may leave 0..1: exporters round.
+# Distance, in uv, by which a valid lightmap uv may leave the range 0 to 1, because exporters round.
 RANGE_SLACK = 1e-4
-# Largest share of the surface without uv area of a valid lightmap uv.
+# Share of a mesh's surface that may have no area in a valid lightmap uv.
 MOST_LOST = 0.01
-# Largest share of samples covered twice in a valid page and in a valid chart: rounded borders may cross.
+# Share of samples that may be covered twice, of an object in a page and of a chart. It is not 0, because
+# rounded borders may cross.
 PAGE_TOLERANCE = 1e-3
 CHART_TOLERANCE = 0.01
-# Samples closer to an edge than this share of their spacing lie inside neither of its triangles.
+# Distance of a sample from an edge, in units of the sample spacing, below which the sample is inside neither
+# triangle of that edge.
 EDGE_SLACK = 0.05
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """Multiple coverage of a layout, by groups of triangles.
+    """Multiple coverage of a uv layout by G groups of triangles.
 
     Attributes
     ----------
-    covered, doubled : (G,) int64
-        Samples inside each group's triangles, and those already covered by an earlier triangle.
+    covered : (G,) int64
+        Number of samples inside the triangles of each group.
+    doubled : (G,) int64
+        Number of those samples that an earlier triangle had covered already.
     """
 
     covered: NDArray[np.int64]
     doubled: NDArray[np.int64]
 
     def overlaps(self, tolerance: float) -> NDArray[np.bool_]:
-        """Return which groups share more than `tolerance` of their samples with earlier triangles, (G,)."""
+        """Return (G,) bool: whether more than the share `tolerance` of a group's samples is covered twice.
+
+        At most two such samples are ignored.
+        """
         return (self.doubled > tolerance * self.covered) & (self.doubled > 2)
 
 
 def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolution: int) -> Overlap:
-    """Count the samples of one page that are covered twice; 2 x 2 samples per texel up to 4096 texels.
+    """Count the samples of one page that triangles cover more than once.
+
+    There are 2 x 2 samples per texel, or one if the page is more than 4096 texels wide.
 
     Parameters
     ----------
-    uv : (T, 3, 2) float, page uv
+    uv : (T, 3, 2) float
+        Page uv of the triangles' corners.
     group : (T,) int
-        Group of each triangle, in ascending order; overlap counts for the later group.
+        Group of each triangle, ascending. If triangles of two groups overlap, the later group has the
+        overlap.
     resolution : int
-        Page width in texels.
+        Page width, texels.
 
     Returns
     -------
     Overlap
+        The counts of each group.
     """
     from baker.uv.kernels.uv_overlap import count_overlap
 
@@ -64,17 +76,21 @@ def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolutio
 
 
 def chart_overlap(uv: NDArray[np.float64], chart: NDArray[np.int32]) -> Overlap:
-    """Count the samples of each chart that are covered twice, on a grid of about 16 samples per triangle.
+    """Count the samples of each chart that its triangles cover more than once.
+
+    Each chart has its own grid of samples, about 16 per triangle.
 
     Parameters
     ----------
     uv : (T, 3, 2) float64, any unit
-    chart : (T,) int32, all at least 0
+        Uv of the triangles' corners.
+    chart : (T,) int32
+        Chart of each triangle, at least 0.
 
     Returns
     -------
     Overlap
-        A group for each chart.
+        The counts of each chart.
     """
     from baker.uv.kernels.uv_overlap import count_overlap
 
@@ -107,7 +123,10 @@ def chart_overlap(uv: NDArray[np.float64], chart: NDArray[np.int32]) -> Overlap:
 def chart_bounds(
     uv: NDArray[np.float64], chart: NDArray[np.int32], n: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return lower and upper corner, (n, 2) float64 each, of the charts of (T, 3, 2) uv."""
+    """Return the lower and the upper corner (n, 2) float64 of the bounding box of each of n charts.
+
+    uv : (T, 3, 2) float64, corners of the triangles; chart : (T,) int32, chart of each triangle
+    """
     low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
     for axis in range(2):
         np.minimum.at(low[:, axis], chart, uv[..., axis].min(axis=1))
@@ -116,7 +135,7 @@ def chart_bounds(
 
 
 def uv_area(uv: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return the (T,) float64 unsigned areas of (T, 3, 2) uv triangles."""
+    """Return the unsigned areas (T,) float64 of uv triangles (T, 3, 2)."""
     wide = np.asarray(uv, dtype=np.float64)
     e1, e2 = wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0]
     return np.asarray(0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]))

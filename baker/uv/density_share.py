@@ -1,8 +1,8 @@
-"""Lower density for objects whose radiance does not depend on irradiance.
+"""Lower texel density for objects on which a lightmap is invisible.
 
-The radiance of a sky dome or an emitter with a black base colour is its emission, and a hull of alpha 0 is
-invisible. A dome around a level may have a thousand times the area of the level and would fill the whole page
-at equal density.
+An emitter with a black base colour, such as a sky dome, reflects nothing. A surface of alpha 0 is invisible.
+At equal density, a sky dome would fill almost the whole page, because its area is much larger than that of
+the scene inside.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Material, Scene
 
-# Largest share of the page area of all such objects together.
+# Largest share of the page's used area that all such objects get together.
 _MOST = 0.05
 
 
 def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float64]:
-    """Return the factor on the density of each instance where one page is filled, (N,) float64: mostly 1."""
+    """Return (N,) float64: the factor by which the density of each instance is multiplied on a filled page.
+
+    It is below 1 only for instances on which a lightmap is invisible.
+    """
     share = np.ones(len(instances))
     blank = np.array([_shows_nothing(m) for m in scene.materials], bool)
     hidden = np.array([bool(blank[scene.meshes[i.mesh].material].all()) for i in instances], bool)
@@ -30,13 +33,13 @@ def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float6
 
 
 def _shows_nothing(material: Material) -> bool:
-    """Return whether a lightmap is invisible on a material: a black emitter, or alpha 0."""
+    """Return whether a lightmap is invisible on a material: a black one that emits, or one of alpha 0."""
     black = max(material.base_colour[:3]) <= 0.0 and max(material.emission) > 0.0
     return black or (material.alpha_mode != "OPAQUE" and material.base_colour[3] <= 0.0)
 
 
 def _area(scene: Scene, instance: Instance) -> float:
-    """Return the area of an instance in the world, square metres."""
+    """Return the world-space area of an instance, m2."""
     mesh = scene.meshes[instance.mesh]
     position = mesh.position.astype(np.float64) @ instance.world_from_object[:3, :3].T
     corner = position[mesh.triangle]

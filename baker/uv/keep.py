@@ -1,4 +1,4 @@
-"""Tests the lightmap uv of a scene, TEXCOORD_1, and finds its charts."""
+"""Tests whether the TEXCOORD_1 of meshes are valid lightmap uv, and finds their charts."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ from baker.uv.check import MOST_LOST, PAGE_TOLERANCE, RANGE_SLACK, page_overlap,
 
 @dataclass(frozen=True)
 class KeptUv:
-    """The instances that keep their TEXCOORD_1.
+    """Which of I instances keep their TEXCOORD_1.
 
     Attributes
     ----------
     usable : (I,) bool
-        Whether the instance's own TEXCOORD_1 is valid, without regard to other instances.
+        Whether the TEXCOORD_1 of the instance is a valid lightmap uv by itself. It may overlap that of other
+        instances.
     together : bool
-        The uv of all instances share one page without overlap: they stay exactly as they are.
+        Whether the TEXCOORD_1 of all instances fit one page without overlap. They are then kept unchanged.
     warnings : tuple of SceneWarning
+        Warnings about TEXCOORD_1 that are not valid.
     """
 
     usable: NDArray[np.bool_]
@@ -33,24 +35,25 @@ class KeptUv:
 
 
 def lightmap_uv(mesh: Mesh) -> NDArray[np.float32] | None:
-    """Return a mesh's TEXCOORD_1, (V, 2) float32, or None."""
+    """Return the TEXCOORD_1 (V, 2) float32 of a mesh, or None if it has none."""
     return mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
 
 
 def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
-    """Return the fault of a mesh's TEXCOORD_1 that keeps it from holding a lightmap.
+    """Return the reason why the TEXCOORD_1 of a mesh is not a valid lightmap uv.
 
     Parameters
     ----------
     mesh : Mesh
-        With or without the set.
+        The mesh, which need not have TEXCOORD_1.
     resolution : int
         Page width in texels, at which overlap and area are measured.
 
     Returns
     -------
     (str, str) or None
-        Warning code and a clause that starts with "its" or "it"; None if the uv is valid.
+        Code of a warning, and the reason as a clause that starts with "it", "its" or a percentage. None if
+        TEXCOORD_1 is valid.
     """
     uv = lightmap_uv(mesh)
     if uv is None:
@@ -77,19 +80,21 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
 
 
 def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
-    """Find the instances whose TEXCOORD_1 is used.
+    """Find the instances whose TEXCOORD_1 is kept.
 
     Parameters
     ----------
     scene : Scene
+        The scene.
     resolution : int
         Page width in texels.
     mode : str
-        "auto", "keep" or "unwrap".
+        The setting `uv`: "auto", "keep" or "unwrap".
 
     Returns
     -------
     KeptUv
+        The instances, and warnings.
 
     Raises
     ------
@@ -125,7 +130,7 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
 
 
 def _disjoint(scene: Scene, resolution: int) -> bool:
-    """Return whether the uv of all instances share one page without overlap."""
+    """Return whether the TEXCOORD_1 of all instances fit one page without overlap."""
     if len({i.mesh for i in scene.instances}) < len(scene.instances):
         return False
     uv, group = [], []
@@ -139,7 +144,10 @@ def _disjoint(scene: Scene, resolution: int) -> bool:
 
 
 def kept_charts(mesh: Mesh) -> NDArray[np.int32]:
-    """Return the chart of each triangle of a kept uv, (T,) int32: pieces connected in space and in uv."""
+    """Return the chart (T,) int32 of each triangle of a mesh with kept uv.
+
+    The triangles of a chart are connected by vertices with equal position and equal uv.
+    """
     uv = lightmap_uv(mesh)
     assert uv is not None
     label = weld(mesh.position, uv)
@@ -149,22 +157,23 @@ def kept_charts(mesh: Mesh) -> NDArray[np.int32]:
 def close_charts(
     uv: Sequence[NDArray[np.floating]], chart: Sequence[NDArray[np.int32]], resolution: int, gap: int
 ) -> int:
-    """Count the texels of one page that have another chart's texel within `gap` texels.
+    """Count the texels of one page that have a texel of another chart within `gap` texels.
 
     Parameters
     ----------
     uv : sequence of (T, 3, 2) float
-        Page uv of each instance's triangles.
+        For each instance, page uv of its triangles' corners.
     chart : sequence of (T,) int32
-        Their charts, numbered over all instances.
+        For each instance, charts of its triangles, numbered over all instances.
     resolution : int
         Page width in texels.
     gap : int
-        Texels.
+        Largest distance of the other chart's texel, in rows and in columns.
 
     Returns
     -------
     int
+        Number of texels.
     """
     from baker.uv.kernels.uv_overlap import count_close, mark_charts
 

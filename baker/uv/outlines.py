@@ -1,4 +1,4 @@
-"""Makes the outlines of instances that are packed, and the uv of instances from packed outlines."""
+"""Makes the outlines that are packed, and computes the uv of instances from packed outlines."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class CutInstance:
     Attributes
     ----------
     charts : int
-        Index into the list of `MeshCharts`.
+        Index of the mesh's charts in the list of `MeshCharts`.
     factor : float
-        Metres per unit of the charts' uv.
+        Metres per unit of the charts' uv, multiplied by the instance's factor on density (`density_shares`).
     """
 
     charts: int
@@ -31,15 +31,16 @@ class CutInstance:
 
 @dataclass(frozen=True)
 class RigidInstance:
-    """An instance whose own uv is moved and scaled as a whole.
+    """An instance that keeps its uv, which are moved and scaled as a whole.
 
     Attributes
     ----------
     uv : (V, 2) float64
+        Uv of each vertex.
     low, high : (2,) float64
-        Bounds of the uv in use.
+        Lower and upper bounds of the uv of vertices that triangles use.
     factor : float
-        Metres per unit of uv.
+        Metres per unit of uv, multiplied by the instance's factor on density (`density_shares`).
     """
 
     uv: NDArray[np.float64]
@@ -50,18 +51,20 @@ class RigidInstance:
 
 @dataclass(frozen=True)
 class Outlines:
-    """All outlines of a scene.
+    """All outlines of a scene of N instances, as items to pack.
+
+    An item is one chart of a `CutInstance`, or a whole `RigidInstance`. Items are sorted by instance.
 
     Attributes
     ----------
     shapes : Shapes
+        The S different outlines.
     turned : (S,) bool
-        u and v are exchanged in the shape, so that it is at least as wide as high.
+        Whether u and v are exchanged in the shape, so that its width is not less than its height.
     item_shape : (I,) int64
-        Shape of each item. There is one item per instance and chart, or one for a rigid instance, sorted by
-        instance.
+        Shape of each item.
     first_item : (N + 1,) int64
-        Items `first_item[i]` to `first_item[i + 1]` belong to instance i.
+        Items of instance i: `first_item[i]` to `first_item[i + 1]` - 1.
     """
 
     shapes: Shapes
@@ -73,17 +76,19 @@ class Outlines:
 def make_outlines(
     placements: Sequence[CutInstance | RigidInstance], meshes: Sequence[MeshCharts]
 ) -> Outlines:
-    """Make one shape per distinct chart and size, and one item per chart of each instance.
+    """Make the items of all instances, and one shape for all items with the same chart and size.
 
     Parameters
     ----------
     placements : sequence of CutInstance or RigidInstance
+        Placement of each instance.
     meshes : sequence of MeshCharts
-        Indexed by `CutInstance.charts`.
+        Charts of each mesh, indexed by `CutInstance.charts`.
 
     Returns
     -------
     Outlines
+        Shapes and items.
     """
     corner: list[NDArray[np.float64]] = []
     count: list[NDArray[np.int64]] = []
@@ -141,26 +146,29 @@ def place_uv(
     position: NDArray[np.int32],
     resolution: int,
 ) -> NDArray[np.float32]:
-    """Return the instance's final page uv, (V', 2) float32.
+    """Return the page uv of an instance whose items have been packed.
 
     Parameters
     ----------
     outlines : Outlines
+        Outlines of all instances.
     instance : int
+        Index of the instance in `outlines`.
     placement : CutInstance or RigidInstance
-        Of the instance.
+        Placement of the instance.
     meshes : sequence of MeshCharts
-        Indexed by `CutInstance.charts`.
+        Charts of each mesh, indexed by `CutInstance.charts`.
     packing : Packing
-        Of its page.
+        Packing of the page of the instance.
     position : (n, 2) int32
-        Lower corners of the instance's items, texels.
+        Column and row of the lower corners of the instance's n items.
     resolution : int
         Page width in texels.
 
     Returns
     -------
     (V', 2) float32
+        Page uv of each lightmap vertex.
     """
     first = int(outlines.first_item[instance])
     if isinstance(placement, RigidInstance):

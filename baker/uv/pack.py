@@ -1,7 +1,7 @@
-"""Packs outlines into one square page, and finds the largest density that fits.
+"""Packs outlines into one square page, and finds the largest density at which they fit.
 
-In this file texel centres have integer coordinates. The lower corner of an outline is a texel centre, so that
-lookups at straight borders read texels without interpolation.
+In this file, texel centres have integer coordinates. The lower corner of an outline is at a texel centre, so
+that lookups at straight borders read texels without interpolation.
 """
 
 from __future__ import annotations
@@ -14,23 +14,27 @@ from numpy.typing import NDArray
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 
-# Items times texels of the page to place between two calls of `progress`: well under a second.
+# Number of items times number of texels of the page, after which `progress` is called again.
 _CHUNK_WORK = 1 << 29
 
 
 @dataclass(frozen=True)
 class Shapes:
-    """Outlines to pack; several items may have the same one.
+    """S outlines to pack, as triangles. Several items may have the same outline.
 
     Attributes
     ----------
-    corner : (T, 3, 2) float64, metres, each shape's lower corner at 0
+    corner : (T, 3, 2) float64, metres
+        Corners of the triangles of all shapes. The lower corner of each shape's bounding box is at 0.
     first_triangle : (S + 1,) int64
-        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]`.
+        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]` - 1.
     extent : (S, 2) float64, metres
+        Width and height of each shape's bounding box.
     area : (S,) float64, square metres
+        Area of each shape's triangles.
     rigid : (S,) bool
-        True: scaled uniformly. False: stretched so that both extents are whole numbers of texels.
+        Whether the shape is scaled uniformly. Other shapes are stretched so that width and height are whole
+        numbers of texels.
     """
 
     corner: NDArray[np.float64]
@@ -40,7 +44,10 @@ class Shapes:
     rigid: NDArray[np.bool_]
 
     def scale(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return texels per metre along u and v, (S, 2) float64, for (S,) target densities."""
+        """Return the scale (S, 2) float64 of each shape along u and v, texels per metre.
+
+        density : (S,) float64, texels per metre, target density of each shape
+        """
         wanted = self.extent * density[:, None]
         whole = np.maximum(np.round(wanted), 1.0)
         snapped = np.divide(whole, self.extent, out=np.ones_like(whole), where=self.extent > 1e-12)
@@ -49,19 +56,20 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Packing:
-    """Positions of items in a page.
+    """Positions of I items in a page.
 
     Attributes
     ----------
     position : (I, 2) int32
         Column and row of each item's lower corner.
     scale : (S, 2) float64, texels per metre
+        Scale of each shape along u and v.
     height : int
-        Rows in use, with the page border.
+        Number of rows in use, including the page border.
     placed : int
-        Number of items that were placed; the packing is complete if it is all of them.
+        Number of items that were placed. The packing is complete if all of them were.
     placed_area : float
-        Their share of the area of all items, gaps included, 0 to 1.
+        Area of the placed items divided by the area of all items, gaps included.
     """
 
     position: NDArray[np.int32]
@@ -72,12 +80,15 @@ class Packing:
 
 
 def border(gap: int) -> int:
-    """Return the width of the empty page border in texels: half a gap, for pages that repeat."""
+    """Return the width of a page's empty border, texels: half a gap, so that repeated pages keep the gap."""
     return max(1, (gap + 1) // 2)
 
 
 def texel_gap(padding: int) -> int:
-    """Return the number of empty texels between outlines: at least 2, one texel of lookup beyond each."""
+    """Return the number of empty texels between outlines: `padding`, but at least 2.
+
+    Bilinear lookup reads one texel beyond each outline.
+    """
     return max(2, padding)
 
 
@@ -94,17 +105,22 @@ def pack(
     Parameters
     ----------
     shapes : Shapes
+        The S outlines.
     item_shape : (I,) int64
+        Shape of each item.
     density : (S,) float64, texels per metre
+        Density of each shape.
     page : (resolution, gap)
-        Width and height in texels; empty texels between items.
+        Width and height of the page, and number of empty texels between items.
     progress : Progress
+        Called with `fraction`.
     fraction : float
-        Fraction of the stage to report.
+        Fraction of the stage.
 
     Returns
     -------
     Packing
+        Incomplete if not all items fit.
     """
     from baker.uv.kernels.uv_pack import place_items
 
@@ -145,9 +161,11 @@ def pack(
 def _spans(
     shapes: Shapes, scale: NDArray[np.float64], n_rows: NDArray[np.int64], used: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
-    """Return the spans of texels of the `used` shapes: first row of each shape (S + 1,), low and high (R,).
+    """Return the span of texels, first to last column, in each row of the shapes `used`.
 
-    scale : (S, 2) texels per metre, n_rows : (S,) rows of each shape.
+    scale : (S, 2), texels per metre; n_rows : (S,), number of rows of each shape; used : indices of shapes
+    Returns (S + 1,) index of each shape's first row in the next two arrays; (R,) first column; (R,) last
+    column.
     """
     from baker.uv.kernels.uv_pack import outline_spans
 
@@ -168,24 +186,27 @@ def fit_page(
     span: tuple[float, float],
     most: float = np.inf,
 ) -> tuple[float, Packing] | None:
-    """Find the largest density at which everything fits into one page.
+    """Find the largest density at which all items fit into one page.
 
     Parameters
     ----------
     shapes : Shapes
+        The outlines.
     item_shape : (I,) int64
+        Shape of each item.
     page : (resolution, gap)
-        Width and height in texels; empty texels between items.
+        Width and height of the page, and number of empty texels between items.
     progress : Progress
+        Called with fractions of the stage.
     span : (float, float)
-        First and last fraction of the stage to report.
+        First and last fraction of the stage.
     most : float
-        Largest density, texels per metre.
+        Upper limit of the density, texels per metre.
 
     Returns
     -------
     (density, Packing) or None
-        None if the items do not fit even at one texel each.
+        The density, texels per metre, and the packing. None if no tested density fits.
     """
     resolution, gap = page
     inner = resolution - 2 * border(gap)
@@ -201,7 +222,7 @@ def fit_page(
         result = pack(shapes, item_shape, np.full(n, guess), page, progress, fraction)
         if result.placed == len(item_shape):
             low, best = guess, result
-            # Extrapolate from the unused height: the area grows with the square of the density.
+            # Extrapolate from the unused height, because the area grows with the square of the density.
             step = guess * float(np.sqrt(resolution / max(1, result.height))) * 1.003
         else:
             high = guess
@@ -209,7 +230,8 @@ def fit_page(
         if best is not None and (low >= ceiling or high <= low * (1 + tolerance)):
             break
         if best is None and k >= n_tries - 3:
-            # Outlines have a minimum size of one texel, so their area shrinks slowly: go down in large steps.
+            # Outlines are at least one texel in size, so their area shrinks slowly. Reduce the density in
+            # large steps.
             step = guess / 30.0
         margin = 0.25 * (high - low)
         guess = min(max(step, low + margin), high - margin) if best is not None and high < ceiling else step
@@ -218,10 +240,10 @@ def fit_page(
 
 
 def _estimate(shapes: Shapes, item_shape: NDArray[np.int64], inner: int, gap: int) -> float:
-    """Return the density d at which outlines and gaps fill 85 % of the page.
+    """Return the density d, texels per metre, at which outlines and gaps fill 85 % of the page.
 
-    Solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2 for items of w x h metres and a gap of g texels,
-    with their area in place of w h.
+    Solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2, where the sum is over all items, w and h are their
+    extents, metres, and g is the gap, texels. The area of the item replaces the product w h.
     """
     area = float(shapes.area[item_shape].sum())
     half = float(shapes.extent[item_shape].sum()) * (1 + gap)

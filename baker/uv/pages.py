@@ -1,4 +1,4 @@
-"""Distributes instances over pages: one page as dense as fits, or the pages that a density needs."""
+"""Distributes instances over pages: on one page at the largest density, or on several at a given density."""
 
 from __future__ import annotations
 
@@ -14,22 +14,25 @@ from baker.core.settings import BakeSettings
 from baker.uv.outlines import Outlines
 from baker.uv.pack import Packing, border, fit_page, pack, texel_gap
 
-# Share of a page's area that the first attempt fills, and the largest number of attempts.
+# Share of a page's area that the first attempt to fill it uses, and largest number of attempts.
 _FIRST_FILL = 0.92
 _PAGE_TRIES = 8
 
 
 @dataclass(frozen=True)
 class Page:
-    """One page: its instances, and the positions of their items.
+    """A page: its N instances, and the positions of their items, see `Outlines`.
 
     Attributes
     ----------
     instance : (N,) int64
+        Indices of the instances.
     position : tuple of (n, 2) int32
-        Lower corners of each instance's items, in the order of `instance`.
+        For each instance, column and row of the lower corners of its n items.
     density : (N,) float64, texels per metre
+        Density of each instance.
     packing : Packing
+        Packing of all items of the page.
     """
 
     instance: NDArray[np.int64]
@@ -39,7 +42,7 @@ class Page:
 
 
 class _Packer:
-    """Packs subsets of instances into pages of one size and gap."""
+    """Packs sets of instances into pages of a given resolution and gap."""
 
     def __init__(self, outlines: Outlines, resolution: int, gap: int, progress: Progress) -> None:
         self.outlines = outlines
@@ -70,7 +73,7 @@ class _Packer:
         return packing if packing.placed == len(items) else None
 
     def need(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return an estimate of the share of a page's area that each instance needs, (I,) float64."""
+        """Return (I,) float64: an estimate of the share of a page's area that each instance needs."""
         gap = self.page[1]
         shapes, item = self.outlines.shapes, self.outlines.item_shape
         per_item = np.repeat(density, np.diff(self.outlines.first_item))
@@ -83,23 +86,29 @@ class _Packer:
 def fill_pages(
     outlines: Outlines, names: list[str], settings: BakeSettings, progress: Progress
 ) -> tuple[list[Page], list[SceneWarning]]:
-    """Pack all instances into pages of exactly `settings.resolution`.
+    """Pack all instances into pages of exactly `settings.resolution` texels.
 
-    Without `settings.density`: one page, at the largest density that fits. With it: instances at that density
-    on up to `max_pages` pages, at a lower one where these are not enough.
+    Without `settings.density`, all instances are packed into one page, at the largest density that fits. With
+    it, they are packed at that density into up to `max_pages` pages. If these are not enough, the density is
+    lowered.
 
     Parameters
     ----------
     outlines : Outlines
+        Outlines of all instances.
     names : list of str
-        Of the instances, for messages.
+        Names of the instances, for messages.
     settings : BakeSettings
+        `resolution`, `density`, `max_pages` and `padding` are read.
     progress : Progress
+        Called with fractions of the stage.
 
     Returns
     -------
     pages : list of Page
+        The pages.
     warnings : list of SceneWarning
+        Warnings about lowered density, reduced padding and additional pages.
 
     Raises
     ------
@@ -132,7 +141,8 @@ def fill_pages(
                 )
                 warnings.append(SceneWarning("uv.padding_reduced", message))
             return pages, warnings
-    # More charts than fit one page: distribute them at the density that fills a quarter of all pages.
+    # The charts do not fit one page at any density. Distribute them over several pages, at first at the
+    # density at which their area is a quarter of all pages.
     packer = _Packer(outlines, settings.resolution, gaps[-1], progress)
     area = float(outlines.shapes.area[outlines.item_shape].sum())
     start = settings.resolution * float(np.sqrt(0.25 * settings.max_pages / max(area, 1e-12)))
@@ -145,7 +155,11 @@ def fill_pages(
 def _fill_at(
     packer: _Packer, wanted: float, names: list[str], max_pages: int, warnings: list[SceneWarning]
 ) -> list[Page]:
-    """Pack at a density, or a lower one: for objects that exceed a page, and for all if pages run out."""
+    """Pack all instances at the density `wanted`, texels per metre, into up to `max_pages` pages.
+
+    Instances that exceed an empty page get a lower density. If the pages are not enough, all instances do.
+    Warnings are appended to `warnings`.
+    """
     n = len(packer.outlines.first_item) - 1
     everything = np.arange(n)
     if max_pages == 1:
@@ -173,7 +187,10 @@ def _fill_at(
 
 
 def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return the density (I,) at which each instance fits an empty page, and the instances below `target`."""
+    """Return the density (I,), at most `target`, at which each instance fits an empty page.
+
+    Also return the indices of the instances whose density is below `target`.
+    """
     outlines = packer.outlines
     n = len(outlines.first_item) - 1
     density = np.full(n, target)
@@ -198,7 +215,10 @@ def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np
 
 
 def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -> list[Page] | None:
-    """Fill page after page, largest instances first; return None if `max_pages` are not enough."""
+    """Fill one page after the other, with the largest instances first; return None if the pages run out.
+
+    density : (I,) float64, texels per metre
+    """
     need = packer.need(density)
     if need.sum() > 1.3 * max_pages:
         return None
@@ -237,7 +257,12 @@ def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -
 
 
 def _take(need: NDArray[np.float64], fill: float) -> NDArray[np.bool_]:
-    """Return the (N,) mask of the first instance and, in order, those that fit the share `fill` of a page."""
+    """Return (N,) bool: the instances to put on a page up to the share `fill` of its area.
+
+    The first instance is always taken. Each other one is taken, in order, if it does not exceed `fill`.
+
+    need : (N,) float64, share of a page's area that each instance needs
+    """
     taken = np.zeros(len(need), bool)
     total = 0.0
     for k, value in enumerate(need):

@@ -1,4 +1,4 @@
-"""Cuts a mesh into parts that xatlas handles well: connected, not too large, of similar normals."""
+"""Cuts a mesh into parts that xatlas cuts well: connected, not too large, with similar normals."""
 
 from __future__ import annotations
 
@@ -7,34 +7,36 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_faces, connected_vertices
 
-# Largest number of triangles of a part that had to be cut; smaller parts are bundled to jobs of about this
-# size.
+# Number of triangles of a block above which it is halved, and number of triangles of a job of several parts.
 JOB_TRIANGLES = 20_000
-# Connected parts with more triangles are cut into blocks in space: xatlas's time grows faster than linearly
-# with the part, and it crashed on one of 328 k triangles.
+# Number of triangles of a connected part above which it is cut into blocks. The time of xatlas grows faster
+# than linearly with the size of a part, and it crashed on a part of 328,000 triangles.
 SPLIT_TRIANGLES = 40_000
-# xatlas joins neighbours whose normals differ by less than about 2.5 degrees to one plane, transitively, so
-# that a finely tessellated sphere becomes one "planar" chart (stretch 0.37). These are the cosine of such an
-# angle, and the smallest region of such neighbours that is cut.
+# xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. It joins them
+# transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is about the cosine
+# of that angle. A region of triangles joined in this way is cut if it has more than SMOOTH_TRIANGLES
+# triangles and is not flat, see MIN_FACING.
 SMOOTH_DOT = 0.9985
 SMOOTH_TRIANGLES = 500
-# Such a region is cut until the cosine between its normals and their mean is at min_facing this: about 40
-# degrees.
+# Smallest cosine between the normals of a region and their mean, about 40 degrees. A region with a smaller
+# cosine is cut until each block reaches it.
 MIN_FACING = 0.77
 
 
 def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the part of each triangle; parts are connected.
+    """Cut a mesh into connected parts.
 
     Parameters
     ----------
     position : (V, 3) float64
+        Vertices, in any unit, welded by position.
     triangle : (T, 3) int32
-        Over vertices welded by position.
+        Vertex indices of each triangle.
 
     Returns
     -------
     (T,) int32
+        Part of each triangle.
     """
     part = connected_vertices(triangle, len(position))
     if len(triangle) <= SMOOTH_TRIANGLES:
@@ -63,12 +65,12 @@ def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDA
         n = _cut_blocks(block, n, np.flatnonzero((part == k) & ~curled[region]), centre, None, None)
     if n == 1:
         return part
-    # Split blocks into parts connected by edges: parts that touch in a vertex make no good chart.
+    # Split blocks into parts connected by edges. Triangles that touch in a vertex only get separate parts.
     return connected_faces(triangle, part.astype(np.int64) * n + block)
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return vectors (..., 3) at unit length; zero ones stay zero."""
+    """Return vectors (..., 3), scaled to unit length; zero vectors stay zero."""
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     return np.asarray(vector / np.where(length > 0, length, 1.0))
 
@@ -81,10 +83,13 @@ def _cut_blocks(
     normal: NDArray[np.float64] | None,
     cross: NDArray[np.float64] | None,
 ) -> int:
-    """Halve the (N,) faces until each block is small and, with normals given, of similar normals.
+    """Halve the faces until each block has at most `JOB_TRIANGLES` and, with `normal`, similar normals.
 
-    Writes numbers from `n` on to the faces' rows of `block` (T,), and returns the next number. `centre`,
-    `normal` and `cross` are the (T, 3) centroids, unit normals and area vectors.
+    Write the blocks' numbers, from `n` on, to `block`, and return the next free number.
+
+    block : (T,) int64, in and out; face : (N,) int64, indices of the faces to cut
+    centre, normal, cross : (T, 3) float64, centroids, unit normals, and normals whose length is twice the
+    area
     """
     todo = [face]
     while todo:

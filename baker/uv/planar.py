@@ -1,7 +1,7 @@
-"""Planar charts for triangles that xatlas left out or overlapped.
+"""Planar charts for triangles that xatlas left out, or whose chart overlapped itself.
 
-Connected faces whose normals have the same largest component are projected to a plane. Triangles that this
-distorts or overlaps become charts of their own.
+Connected faces whose normals have the same largest component, with the same sign, are projected to a plane.
+Triangles that the projection distorts or makes overlap become single charts.
 """
 
 from __future__ import annotations
@@ -21,18 +21,20 @@ def planar_charts(
     Parameters
     ----------
     position : (V, 3) float64
+        Vertices, in any unit, welded by position.
     triangle : (T, 3) int32
-        Over vertices welded by position.
+        Vertex indices of each triangle.
 
     Returns
     -------
     uv : (T, 3, 2) float64
-        In the unit of `position`.
+        Uv of the triangles' corners, in the unit of `position`.
     chart : (T,) int32
+        Chart of each triangle, from 0.
     """
     corner = position[triangle]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    # Join faces that share an edge and whose normal is closest to the same of six axes.
+    # Join faces that share an edge and whose normals are closest to the same one of the six axis directions.
     axis = np.abs(cross).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(cross, axis[:, None], axis=1)[:, 0] < 0)
     chart = connected_faces(triangle, side)
@@ -47,8 +49,8 @@ def planar_charts(
         [np.einsum("tkx,tx->tk", corner, tangent[chart]), np.einsum("tkx,tx->tk", corner, bitangent[chart])],
         axis=2,
     )
-    # Separate faces more than 75 degrees off their chart's normal, and those of charts that overlap
-    # themselves.
+    # Make single charts of faces whose normal deviates more than 75 degrees from that of their chart, and of
+    # all faces of charts that overlap themselves.
     area = np.linalg.norm(cross, axis=1)
     facing = np.einsum("tx,tx->t", cross, normal[chart])
     alone = (
@@ -61,7 +63,7 @@ def planar_charts(
 
 
 def lay_flat(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (T, 3, 3) triangles as congruent ones in the plane, longest edge along u, (T, 3, 2) float64."""
+    """Lay triangles (T, 3, 3) in the plane, congruent and with the longest edge along u; return (T, 3, 2)."""
     edge = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(edge, axis=2)
     first = length.argmax(axis=1)

@@ -1,4 +1,4 @@
-"""Runs chart jobs in this process, or in worker processes that end with the call."""
+"""Runs chart jobs in this process, or in worker processes that end before the call returns."""
 
 from __future__ import annotations
 
@@ -15,26 +15,30 @@ from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
-# Fewer triangles than this are cut in less time than a process takes to start (0.2 s).
+# Number of triangles of all jobs below which they run in this process. Starting a worker process takes 0.2 s,
+# longer than cutting so few triangles.
 IN_PROCESS_TRIANGLES = 3000
 
 
 def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: float) -> list[FlatCharts]:
-    """Cut all jobs into charts; the result does not depend on `threads`.
+    """Cut the parts of all jobs into charts. The result does not depend on `threads`.
 
     Parameters
     ----------
     jobs : sequence of ChartJob
+        The jobs.
     threads : int
         Largest number of worker processes.
     progress : Progress
         Called with fractions of the stage from 0 to `until`.
     until : float
+        Fraction of the stage at which all jobs are done.
 
     Returns
     -------
     list of FlatCharts
-        In the order of `jobs`. A job at which a worker died has chart -1 everywhere.
+        Charts of each job, in the order of `jobs`. If a worker process crashed on a job, all its triangles
+        have chart -1.
 
     Raises
     ------
@@ -49,7 +53,7 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
 
 
 class _Pool:
-    """Worker processes, one feeding thread each, largest jobs first."""
+    """Worker processes, each with a thread that sends it jobs. The largest jobs are started first."""
 
     def __init__(self, jobs: Sequence[ChartJob], n_workers: int, total: int) -> None:
         self.jobs = jobs
@@ -114,7 +118,8 @@ class _Pool:
                     break
                 charts = self._ask(process, self.jobs[k])
                 if charts is None:
-                    # xatlas crashed on this job: leave its triangles to `planar_charts`.
+                    # xatlas crashed on this job. Give its triangles chart -1; `planar_charts` lays them out
+                    # later.
                     self._end(process)
                     process = None
                     n = len(self.jobs[k].triangle)
@@ -148,5 +153,5 @@ class _Pool:
         try:
             process.stdin.close()
         except OSError:
-            # Closing flushes the buffer to a dead process.
+            # Closing the pipe flushes its buffer, which fails because the process has ended.
             return

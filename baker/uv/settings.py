@@ -1,4 +1,4 @@
-"""The settings of lightmap uv: those of a bake that unwrapping reads."""
+"""The settings of lightmap uv: the settings of a bake that unwrapping reads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.core.settings_model import Settings, same_setting
 
 
 class UnwrapSettings(Settings):
-    """Holds the settings of lightmap uv, checked."""
+    """Settings of lightmap uv, with validation. Each is the setting of the same name in `BakeSettings`."""
 
     what: ClassVar[str] = "unwrap setting"
 
@@ -25,31 +25,31 @@ class UnwrapSettings(Settings):
     threads: int | None = same_setting(BakeSettings, "threads")
 
     def for_bake(self) -> BakeSettings:
-        """Return settings of a bake with these values."""
+        """Return bake settings with these values, and defaults for the others."""
         return BakeSettings(**self.model_dump())
 
 
 def settings_of_atlas(scene: Scene, atlas: Atlas, settings: BakeSettings) -> BakeSettings:
-    """Return the settings of a bake with the page size and padding of an atlas.
+    """Return bake settings with the resolution and padding of an atlas.
 
     Parameters
     ----------
     scene : Scene
         The scene that is baked.
     atlas : Atlas
-        Its lightmap uv.
+        The lightmap uv of the scene.
     settings : BakeSettings
-        All other settings.
+        Settings to change.
 
     Returns
     -------
     BakeSettings
-        With `resolution` and `padding` of the atlas.
+        `settings` with `resolution` and `padding` of the atlas.
 
     Raises
     ------
     SettingsError
-        If the atlas is that of another scene.
+        If the atlas was made for another scene: its numbers of instances or triangles differ.
     """
     meshes = [scene.meshes[instance.mesh] for instance in scene.instances]
     same = len(meshes) == len(atlas.layouts) and all(

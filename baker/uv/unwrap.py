@@ -1,4 +1,4 @@
-"""Lays out all instances in lightmap pages: keeps, cuts and packs lightmap uv, and checks the result."""
+"""Lays out all instances in lightmap pages: keeps or cuts their uv, packs them, and checks the result."""
 
 from __future__ import annotations
 
@@ -21,28 +21,32 @@ from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.uv.pages import fill_pages
 
-# Largest relative difference of the scales along axes of an instance that counts as evenly scaled.
+# Relative difference between the scales of an instance along different axes, up to which its scale is treated
+# as uniform.
 _EVEN_SCALE = 1e-4
-# Fraction of the stage at which cutting ends and packing starts.
+# Fraction of the stage "unwrap" at which cutting ends and packing starts.
 _CUT_UNTIL = 0.7
 _NONE = np.zeros(0, np.int32)
 
 
 @dataclass(frozen=True)
 class _Cut:
-    """A mesh and the symmetric (3, 3) stretch with which it is cut, for all instances that share both."""
+    """A mesh to cut. Its positions are multiplied by the symmetric matrix `stretch` (3, 3) first.
+
+    All instances with the same mesh and stretch share the charts.
+    """
 
     mesh: int
     stretch: NDArray[np.float64]
 
 
 def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = silent) -> Atlas:
-    """Lay out all instances in lightmap pages of exactly `settings.resolution`.
+    """Lay out all instances in lightmap pages of exactly `settings.resolution` texels.
 
     Parameters
     ----------
     scene : Scene
-        Whether its TEXCOORD_1 are kept depends on `settings.uv`.
+        The scene. `settings.uv` determines whether its TEXCOORD_1 are kept.
     settings : BakeSettings
         `resolution`, `density`, `max_pages`, `padding`, `uv` and `threads` are read.
     progress : Progress
@@ -51,13 +55,13 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     Returns
     -------
     Atlas
-        The same for any number of threads.
+        The layout of all instances. It does not depend on the number of threads.
 
     Raises
     ------
     InputError
-        If there is nothing to lay out, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept,
-        or if there are more charts than texels.
+        If the scene has no triangles, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept, or if
+        there are more charts than texels.
     Cancelled
         If `progress` returned a truthy value.
     """
@@ -71,7 +75,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
         try:
             atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
         except InputError as error:
-            # Add the file, which the packer does not have.
+            # Add the path of the scene, which the packer cannot name.
             raise InputError(
                 error.message,
                 file=error.file or (str(scene.path) if scene.path else None),
@@ -82,7 +86,7 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
 
 
 def _keep_all(scene: Scene, settings: BakeSettings, warnings: tuple[SceneWarning, ...]) -> Atlas:
-    """Return the scene's own TEXCOORD_1 as the layout, to the byte."""
+    """Return an atlas of one page in which every instance keeps its TEXCOORD_1 unchanged."""
     layouts: list[InstanceLayout] = []
     n_charts = 0
     for k, instance in enumerate(scene.instances):
@@ -117,10 +121,10 @@ def _lay_out(
     usable: NDArray[np.bool_],
     warnings: tuple[SceneWarning, ...],
 ) -> Atlas:
-    """Cut the instances whose uv is not `usable` (I,), and pack all of them."""
-    # An instance without triangles has nothing to pack.
+    """Cut the instances whose TEXCOORD_1 is not `usable` (I,) bool, and pack all instances."""
+    # Leave out instances without triangles.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
-    # A density applies to all instances.
+    # With the setting `density`, all instances have this density.
     equal = settings.density is not None
     shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
     placements, cuts = _placements(scene, filled, shares, usable)
@@ -146,7 +150,7 @@ def _lay_out(
             vertex, triangle, chart = _structure(mesh, placements[slot], charts)
             scaled = float(density * shares[slot])
             layouts[k] = InstanceLayout(k, number, vertex, uv, triangle, chart, False, scaled)
-    # Number the charts over all instances, in their order.
+    # Number the charts over all instances, in the order of instances.
     n_charts = 0
     for k in filled:
         layouts[k] = replace(layouts[k], chart=layouts[k].chart + n_charts)
@@ -158,7 +162,10 @@ def _lay_out(
 def _placements(
     scene: Scene, filled: list[int], shares: NDArray[np.float64], usable: NDArray[np.bool_]
 ) -> tuple[list[CutInstance | RigidInstance], list[_Cut]]:
-    """Return the placement of each `filled` instance, and the meshes to cut, once for equal stretches."""
+    """Return the placement of each instance in `filled`, and the meshes to cut, each stretch of a mesh once.
+
+    filled : indices of n instances; shares : (n,), factors on their density; usable : (I,) bool, see `KeptUv`
+    """
     placements: list[CutInstance | RigidInstance] = []
     cuts: list[_Cut] = []
     index: dict[tuple[int, bytes], int] = {}
@@ -179,7 +186,7 @@ def _placements(
 def _cut(
     scene: Scene, cuts: list[_Cut], settings: BakeSettings, progress: Progress, found: list[SceneWarning]
 ) -> list[MeshCharts]:
-    """Cut meshes into charts; append warnings to `found`."""
+    """Return the charts of each mesh in `cuts`; append warnings to `found`."""
     if not cuts:
         return []
     inputs = [
@@ -198,7 +205,7 @@ def _cut(
 def _structure(
     mesh: Mesh, placement: CutInstance | RigidInstance, charts: list[MeshCharts]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Return mesh vertex (V',), triangles (T, 3) and chart (T,) of an instance's lightmap vertices, int32."""
+    """Return `vertex` (V',), `triangle` (T, 3) and `chart` (T,), int32, of an instance's `InstanceLayout`."""
     if isinstance(placement, RigidInstance):
         return np.arange(len(mesh.position), dtype=np.int32), mesh.triangle, kept_charts(mesh)
     own = charts[placement.charts]
@@ -208,7 +215,7 @@ def _structure(
 def _verify(
     layouts: list[InstanceLayout], n_pages: int, resolution: int, scene: Scene, progress: Progress
 ) -> list[SceneWarning]:
-    """Return warnings about overlap and range of the finished pages, kept and cut uv alike."""
+    """Return warnings about instances that overlap others in a page, or whose uv leave it."""
     found: list[SceneWarning] = []
     for page in range(n_pages):
         report(progress, Stage.UNWRAP, 0.95 + 0.05 * page / n_pages)
@@ -232,10 +239,11 @@ def _verify(
 
 
 def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Split a transform's effect on lengths into a factor and a symmetric (3, 3) stretch.
+    """Split the effect of a transform on lengths into a factor and a symmetric (3, 3) stretch.
 
-    The stretch is the identity for even scales, so that all such instances share their charts; otherwise it
-    is the root of M^T M, which does not depend on rotations and mirrors.
+    For a uniform scale, the factor is the scale and the stretch is the identity, so that all such instances
+    of a mesh share their charts. Otherwise the factor is 1 and the stretch is the square root of M^T M, which
+    does not depend on rotations and mirrors. M is the linear part of the transform.
     """
     linear = world_from_object[:3, :3].astype(np.float64)
     gram = linear.T @ linear
@@ -244,25 +252,28 @@ def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArr
         return float(f"{even:.6g}"), np.eye(3)
     value, vector = np.linalg.eigh(gram)
     root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
-    # Round, so that instances that differ by rounding errors share their charts.
+    # Round, so that instances share their charts if their transforms differ by rounding errors only.
     digits = 5 - int(np.floor(np.log10(np.abs(root).max())))
     return 1.0, np.round(0.5 * (root + root.T), digits) + 0.0
 
 
 def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
-    """Return an instance that keeps the shape of its TEXCOORD_1, at `share` of the density of others."""
+    """Return the placement of an instance that keeps its TEXCOORD_1 up to position and scale.
+
+    share : factor on the density of the instance
+    """
     uv = lightmap_uv(mesh)
     assert uv is not None
     wide = uv.astype(np.float64)
     used = wide[mesh.triangle].reshape(-1, 2)
-    # Move unused vertices, which may have any value, into the bounds.
+    # Move the uv of unused vertices, which may have any value, into the bounds of the others.
     wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
     factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
     return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)
 
 
 def _per_metre(mesh: Mesh, instance: Instance, uv: NDArray[np.float32]) -> float:
-    """Return units of uv per metre, by area; 1 if the surface has none."""
+    """Return the uv units per metre of an instance: sqrt(area in uv / area in the world); 1 without area."""
     corner = (mesh.position.astype(np.float64) @ instance.world_from_object[:3, :3].T)[mesh.triangle]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = 0.5 * float(np.linalg.norm(cross, axis=1).sum())

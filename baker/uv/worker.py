@@ -1,6 +1,7 @@
-"""Runs chart jobs in a separate process, which can be killed while xatlas is busy.
+"""The worker process that runs chart jobs. It can be killed while xatlas is busy.
 
-Protocol, both ways on stdin and stdout: 8 bytes of length, little-endian, then that many bytes of npz.
+It receives messages on stdin and answers on stdout. A message is a length in 8 bytes, little-endian, followed
+by an npz file of that length.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
 
 def write_message(stream: IO[bytes], **array: NDArray[Any]) -> None:
-    """Send named arrays."""
+    """Write a message with named arrays to a stream."""
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **array)
     data = buffer.getvalue()
@@ -27,7 +28,7 @@ def write_message(stream: IO[bytes], **array: NDArray[Any]) -> None:
 
 
 def read_message(stream: IO[bytes]) -> dict[str, NDArray[Any]] | None:
-    """Receive named arrays; None at the end of the stream."""
+    """Read a message from a stream and return its arrays by name; None if the stream has ended."""
     head = stream.read(8)
     if len(head) < 8:
         return None
@@ -51,14 +52,14 @@ def send_job(stream: IO[bytes], job: ChartJob) -> None:
 
 
 def receive_charts(stream: IO[bytes]) -> FlatCharts | None:
-    """Receive the charts of a job from a worker; None if it has ended."""
+    """Receive the charts of a job from a worker; None if the worker has ended."""
     answer = read_message(stream)
     return None if answer is None else FlatCharts(answer["uv"], answer["chart"])
 
 
 def main() -> None:
     """Process jobs until stdin ends."""
-    # Ctrl-C signals the whole process group; the parent ends this process.
+    # Ignore Ctrl-C, which signals the whole process group. The parent process kills this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     source, sink = sys.stdin.buffer, sys.stdout.buffer
     while (message := read_message(source)) is not None:

@@ -1,8 +1,8 @@
-"""Cuts a mesh into flat charts with xatlas; the only file that imports xatlas.
+"""Cuts a mesh into flat charts with xatlas. Only this file imports xatlas.
 
-xatlas computes and packs charts in one call, and packing stretches each chart to whole texels along u and v.
-That packing is discarded; a least-squares fit of the two axis scales to the 3-D edge lengths removes the
-stretch.
+xatlas computes and packs charts in one call. Its packing stretches each chart to whole texels along u and v.
+This module discards the positions of that packing. It removes the stretch by fitting the scales along u and v
+to the edge lengths in space, by least squares.
 """
 
 from __future__ import annotations
@@ -14,22 +14,23 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_vertices, number_by_first
 
-# Largest mean number of faces per chart: the time to grow a chart rises faster than linearly (82 k triangles:
-# 14 charts 54 s, 46 charts 3.6 s, 123 charts 1.2 s).
+# Limit of a chart's area, in areas of a mean triangle of its part. Small charts save time: cutting a mesh of
+# 82,000 triangles took 54 s with 14 charts, 3.6 s with 46, and 1.2 s with 123.
 CHART_FACES = 700
 
 
 @dataclass(frozen=True)
 class ChartJob:
-    """Parts to cut, each on its own.
+    """P parts of meshes, which xatlas cuts independently of each other.
 
     Attributes
     ----------
     position : (V, 3) float64, any unit
+        Vertices of all parts, welded by position.
     triangle : (T, 3) int32
-        Indices into the vertices of the part, which are welded by position.
+        Vertex indices of each triangle, relative to the first vertex of its part.
     first_vertex, first_triangle : (P + 1,) int64
-        First row of each part; the last entry is V or T.
+        Index of the first vertex and of the first triangle of each part. The last entries are V and T.
     """
 
     position: NDArray[np.float64]
@@ -45,14 +46,15 @@ class ChartJob:
 
 @dataclass(frozen=True)
 class FlatCharts:
-    """Charts in a plane, not packed: they may overlap each other.
+    """Charts that are flattened but not packed. Different charts may overlap each other.
 
     Attributes
     ----------
     uv : (T, 3, 2) float64
-        Corners of each triangle, in the unit of the positions. The area of each chart equals that in space.
+        Uv of each triangle's corners, in the unit of the positions. The area of each chart equals the area of
+        its triangles in space.
     chart : (T,) int32
-        Chart of each triangle, from 0; -1 where no usable chart was found.
+        Chart of each triangle, from 0; -1 for triangles without a usable chart.
     """
 
     uv: NDArray[np.float64]
@@ -65,14 +67,15 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
     Parameters
     ----------
     job : ChartJob
+        The parts.
     chart_faces : int
-        The area of charts is limited to that of this number of mean triangles of their part.
+        Limit of a chart's area, in areas of a mean triangle of its part.
 
     Returns
     -------
     FlatCharts
-        Charts are numbered over the whole job. Some triangles may have chart -1: xatlas leaves out those that
-        it considers degenerate.
+        Charts, numbered over the whole job. Triangles that xatlas considers degenerate, and those of charts
+        that fold, have chart -1.
     """
     part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
     corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]
@@ -89,9 +92,9 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
 def _run_xatlas(
     job: ChartJob, area: NDArray[np.float64], chart_faces: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Return corners in texels of xatlas's page, (T, 3, 2), and the chart of each triangle, (T,), or -1.
+    """Return the corners (T, 3, 2) of the triangles, in texels of xatlas's page, and their charts (T,) or -1.
 
-    `area` is that of the (T,) triangles, in the unit of the positions.
+    area : (T,) float64, area of each triangle in space, in the squared unit of the positions
     """
     import xatlas
 
@@ -110,7 +113,7 @@ def _run_xatlas(
         total = float(area[faces].sum())
         if not total > 0:
             continue
-        # Scale the mean triangle to an area of 1: xatlas has absolute epsilons for lengths and areas.
+        # Scale the mean triangle to an area of 1, because xatlas has absolute epsilons for lengths and areas.
         scale = float(np.sqrt((faces.stop - faces.start) / total))
         centre = 0.5 * (position.min(axis=0) + position.max(axis=0))
         atlas.add_mesh(
@@ -141,9 +144,13 @@ def _true_to_size(
     area: NDArray[np.float64],
     chart: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """Scale each chart along u and v so that edges have their 3-D lengths and areas add up.
+    """Scale each chart along u and v to the edge lengths in space, then uniformly to the area in space.
 
-    Least squares over a chart's edges of a du^2 + b dv^2 = length^2; then one factor for the area.
+    sqrt(a) and sqrt(b) are the scales along u and v. They solve a du^2 + b dv^2 = length^2 over all edges of
+    a chart by least squares. du and dv are the components of an edge in uv.
+
+    texel : (T, 3, 2), uv of the corners; corner : (T, 3, 3), positions of the corners; area : (T,), areas of
+    the triangles in space; chart : (T,), charts of the triangles. Returns (T, 3, 2).
     """
     n_charts = int(chart.max()) + 1
     edge_uv = np.roll(texel, -1, axis=1) - texel
@@ -177,19 +184,19 @@ def _true_to_size(
 def _drop_flat(
     uv: NDArray[np.float64], area: NDArray[np.float64], chart: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return renumbered charts, (T,) int32, with -1 for those that fold or lose area in the plane.
+    """Return renumbered charts (T,) int32, with -1 for triangles of charts that fold or lose area.
 
-    uv : (T, 3, 2), area : (T,) area in space, chart : (T,).
+    uv : (T, 3, 2), corners; area : (T,), areas of the triangles in space; chart : (T,)
     """
     n_charts = int(chart.max()) + 1
     e1, e2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     signed = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     total = np.bincount(chart, weights=signed, minlength=n_charts)
     real = np.bincount(chart, weights=area, minlength=n_charts)
-    # Area of faces whose sign is opposite to that of their chart: they overlap a neighbour.
+    # Area, per chart, of faces whose signed area is opposite to that of the chart. They overlap a neighbour.
     back = np.where(signed * np.sign(total)[chart] < 0, np.abs(signed), 0.0)
     fold = np.bincount(chart, weights=back, minlength=n_charts)
-    # Area of faces that have almost none in the plane: all their points would share one sample.
+    # Area in space, per chart, of faces that have almost no area in the plane.
     lost = np.bincount(chart, weights=np.where(np.abs(signed) < 1e-4 * area, area, 0.0), minlength=n_charts)
     bad = (np.abs(total) < 0.5 * real) | (fold > 1e-3 * real) | (lost > 1e-3 * real) | ~np.isfinite(total)
     return number_by_first(np.where(bad[chart], -1, chart))

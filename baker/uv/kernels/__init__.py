@@ -1,4 +1,4 @@
-"""Kernels on uv charts: overlap and packing."""
+"""Kernels for uv charts: overlap and packing."""
 
 from baker.trace.kernel_cache import keep_kernels
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Counts the samples of a uv layout that lie strictly inside more than one triangle."""
+"""Counts samples of a uv layout that are inside more than one triangle, and texels close to other charts."""
 
 from __future__ import annotations
 
@@ -10,23 +10,27 @@ from baker.trace.jit import kernel, larger, smaller
 
 @kernel
 def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubled):
-    """Mark the samples that each triangle covers, and count those that were covered before.
+    """Mark the samples that each triangle covers, and count the samples that were covered before.
 
-    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers it if it lies inside by more than `slack`, so
-    that triangles that share an edge do not overlap, even if the edge is rounded.
+    Sample (r, c) of a grid is at (c + 0.5, r + 0.5), in units of the sample spacing. A triangle covers a
+    sample that is inside it, at a distance of more than `slack` from each edge. So triangles that share an
+    edge do not overlap, even if the edge is rounded.
 
     Parameters
     ----------
-    corner : (T, 3, 2) float64, in samples
+    corner : (T, 3, 2) float64, sample spacings
+        Corners of the triangles.
     group : (T,) int64
-        Grid and counters of each triangle.
+        Group of each triangle, which determines its grid and counters.
     base, stride, rows : (G,) int64
-        First entry of each group's grid in `mark`, its columns and its rows. Groups may share a grid.
-    slack : float, in samples
+        Index in `mark` of the first sample of each group's grid, number of its columns, and number of its
+        rows. Groups may share a grid.
+    slack : float, sample spacings
+        Smallest distance of a covered sample from the edges.
     mark : (M,) uint8
-        In and out: 0 free, 1 covered once, 2 more than once.
+        In and out, for each sample: 0 free, 1 covered once, 2 covered more than once.
     covered, doubled : (G,) int64
-        Out: samples covered by the group's triangles, and those of them found covered already.
+        Out: number of samples that the group's triangles cover, and number of those that were covered before.
     """
     for t in range(len(corner)):
         g = group[t]
@@ -38,7 +42,8 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
             continue
         if turn < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
-        # Signed distance to an edge is n . (p - a), n pointing inwards: cross product over the edge length.
+        # The signed distance of a sample from an edge is a cross product divided by the length of the edge.
+        # The tests below multiply `slack` by the length instead.
         l0 = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         l1 = math.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
         l2 = math.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
@@ -69,17 +74,19 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
 
 @kernel
 def mark_charts(corner, chart, owner):
-    """Write chart + 1 into each free texel whose square a triangle enters.
+    """Write the chart of each triangle, plus 1, to each free texel whose square the triangle enters.
 
     Parameters
     ----------
-    corner : (T, 3, 2) float64, in texels; texel (r, c) spans c to c + 1 and r to r + 1
+    corner : (T, 3, 2) float64, texels
+        Corners of the triangles. Texel (r, c) spans c to c + 1 along u and r to r + 1 along v.
     chart : (T,) int32
+        Chart of each triangle.
     owner : (H, W) int32
-        In and out: chart + 1, 0 where free.
+        In and out: chart of each texel plus 1; 0 for free texels.
     """
     height, width = owner.shape
-    # A triangle that only touches the border of a texel does not enter it.
+    # Distance, texels, by which a triangle must extend into a texel to enter it.
     slack = 1e-4
     for t in range(len(corner)):
         y_low = smaller(smaller(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1])
@@ -110,9 +117,9 @@ def mark_charts(corner, chart, owner):
 
 @kernel
 def count_close(owner, gap):
-    """Return the number of texels with another owner's texel within `gap` rows and columns.
+    """Return the number of covered texels that have a texel of another chart within `gap` rows and columns.
 
-    owner : (H, W) int32, 0 where free.
+    owner : (H, W) int32, see `mark_charts`
     """
     height, width = owner.shape
     count = 0

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Places chart outlines in a page: conservative outlines, then first fit from the lowest row up.
+"""Rasterises chart outlines conservatively, and places them in a page by first fit from the lowest row up.
 
-An outline is one span of texels per row. The search for free space jumps from occupied run to occupied run,
-so its cost hardly depends on the size of the page.
+An outline is one span of texels for each row. The search for free space skips whole runs of used texels, so
+that its time hardly depends on the size of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
-Generation*, 2002 (packing along outlines); here with runs per row, so that holes are filled, too.
+Generation*, 2002 (packing along outlines). Unlike there, free space below other outlines is filled.
 """
 
 from __future__ import annotations
@@ -17,20 +17,23 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 @kernel
 def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
-    """Write the span of texels that each row of each shape touches.
+    """Write, for each row of each shape, the first and the last texel that the shape touches.
 
     Parameters
     ----------
-    corner : (T, 3, 2) float64, metres, each shape's lower corner at 0
+    corner : (T, 3, 2) float64, metres
+        Corners of the triangles of all shapes. The lower corner of each shape is at 0.
     first_triangle : (S + 1,) int64
-        Triangles `first_triangle[s]` to `first_triangle[s + 1]` belong to shape s.
-    shape : (S,) int64
-        Shapes to write.
-    scale : (S, 2) float64, texels per metre along u and v
+        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]` - 1.
+    shape : (n,) int64
+        Indices of the shapes to rasterise.
+    scale : (S, 2) float64, texels per metre
+        Scale of each shape along u and v.
     first_row : (S + 1,) int64
-        Rows of shape s in `low` and `high`.
+        Rows of shape s in `low` and `high`: `first_row[s]` to `first_row[s + 1]` - 1.
     low, high : (R,) int32
-        Out: first and last texel touched; texel k spans k - 0.5 to k + 0.5. Preset to (big, -1).
+        In: a large number and -1. Out: column of the first and of the last texel that the shape touches in
+        this row. Texel k spans k - 0.5 to k + 0.5.
     """
     for s in shape:
         row0 = first_row[s]
@@ -50,7 +53,7 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
                     bx, by = corner[t, m, 0] * su, corner[t, m, 1] * sv
                     if bottom <= ay <= top:
                         x_low, x_high = smaller(x_low, ax), larger(x_high, ax)
-                    # Where the edge crosses the two borders of the row.
+                    # Intersect the edge with the two borders of the row.
                     for border in (bottom, top):
                         if (ay < border) != (by < border):
                             x = ax + (bx - ax) * (border - ay) / (by - ay)
@@ -66,19 +69,19 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
 def _fill(next_used, next_free, y, start, end):
     """Mark texels `start` to `end` of row `y` as used.
 
-    next_used, next_free : (H, W + 1) int16, see `place_items`; in and out.
+    next_used, next_free : (H, W + 1) int16, in and out, see `place_items`
     """
     width = next_used.shape[1] - 1
     after = next_free[y, end + 1] if end + 1 < width else width
     for x in range(start, end + 1):
         next_used[y, x] = x
         next_free[y, x] = after
-    # Extend the used run to the left.
+    # Update `next_free` of the used run to the left.
     x = start - 1
     while x >= 0 and next_used[y, x] == x:
         next_free[y, x] = after
         x -= 1
-    # Point the free run to the left at the new texels.
+    # Update `next_used` of the free run to the left.
     x = start - 1
     while x >= 0 and next_used[y, x] > start:
         next_used[y, x] = start
@@ -87,10 +90,11 @@ def _fill(next_used, next_free, y, start, end):
 
 @inner
 def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
-    """Return the lowest, then leftmost position (x, y) at which an outline fits, or (-1, -1).
+    """Return the position (x, y) at which an outline fits, in the lowest row and there leftmost, or (-1, -1).
 
-    next_used, next_free : (H, W + 1) int16, see `place_items`.
-    low, high : (R,) int32, see `outline_spans`; the outline has `n_rows` rows from `row0` on.
+    next_used, next_free : (H, W + 1) int16, see `place_items`
+    low, high : (R,) int32, see `outline_spans`. The outline is rows `row0` to `row0 + n_rows` - 1
+    margin : number of empty texels along the page border; y_start : lowest row to test
     """
     height = next_used.shape[0]
     width = next_used.shape[1] - 1
@@ -101,7 +105,7 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
         x = margin
         r, checked = 0, 0
         while x + most < width - margin:
-            # If row r is blocked, move x past the used run and test all rows again.
+            # If row r overlaps a used run, move x past that run and test all rows again.
             a, b = low[row0 + r], high[row0 + r]
             if b >= a:
                 used = next_used[y + r, x + a]
@@ -118,25 +122,27 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
 
 @kernel
 def place_items(next_used, next_free, order, item_shape, first_row, low, high, gap, margin, lowest, position):
-    """Place items one after the other; stop at the first that does not fit.
+    """Place items one after the other, and stop at the first item that does not fit.
 
     Parameters
     ----------
     next_used, next_free : (H, W + 1) int16
-        The page: next used and next free column at or after each column.
-        On an empty page the first is W everywhere and the second each column itself.
+        In and out, for each texel of the page: column of the next used and of the next free texel in its row,
+        at or after it. On an empty page, `next_used` is W and `next_free` is the texel's own column.
     order : (N,) int64
-        Items to place, in this order.
+        Indices of the items to place, in this order.
     item_shape : (I,) int64
-    first_row, low, high : outlines, see `outline_spans`
+        Shape of each item.
+    first_row, low, high : arrays
+        Outlines of the shapes, see `outline_spans`.
     gap : int
-        Empty texels between outlines.
+        Number of empty texels between outlines.
     margin : int
-        Empty texels along the page border.
+        Number of empty texels along the page border.
     lowest : (S,) int64
-        Lowest row at which each shape may fit; in and out, kept between calls.
+        In and out: lowest row at which each shape may still fit.
     position : (I, 2) int32
-        Out: column and row of the outline's lower corner, in texels.
+        Out: column and row of each item's lower corner.
 
     Returns
     -------
@@ -154,7 +160,7 @@ def place_items(next_used, next_free, order, item_shape, first_row, low, high, g
             return n
         lowest[s] = y
         position[item, 0], position[item, 1] = x, y
-        # Mark the outline, dilated by `gap`, as used.
+        # Mark the outline, dilated by `gap` texels, as used.
         for r in range(-gap, n_rows + gap):
             if not 0 <= y + r < height:
                 continue
