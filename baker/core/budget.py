@@ -33,9 +33,11 @@ MIB = 1 << 20
 # All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
 # Python, libraries and compiled kernels together, and each triangle.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
-# Texels a side above which the readers of image files average blocks of 2 x 2 texels.
+# Largest side of an image in memory, texels: readers reduce larger images by averaging blocks of 2 x 2
+# texels.
 LARGEST_IMAGE_SIDE = 8192
-# Bytes for each byte of decoded image pixels: 2 as stored in the file and 1.5 for the coarser mip levels.
+# Bytes of memory for each byte of decoded image pixels: 2 for the values of the file, 1.5 for the coarser mip
+# levels.
 BYTES_PER_IMAGE_BYTE = 3.5
 # Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
 # of these points (position and normal, float32). Bakes with more texels cache no points.
@@ -127,11 +129,11 @@ def image_bytes(scene: Scene) -> tuple[int, int]:
     Returns
     -------
     decoded : int
-        Bytes of pixels of all images as decoded.
+        Size of the pixels of all decoded images, bytes.
     loading : int
-        Largest sum, bytes, while an image is read: all decoded images, and the largest one once more at the
-        resolution of its file. An image with more than half of `LARGEST_IMAGE_SIDE` texels a side may have
-        been reduced from twice its size.
+        Largest size while an image is read, bytes: all decoded images, and one image a second time with the
+        resolution of its file. If an image has more than half of `LARGEST_IMAGE_SIDE` texels a side, its file
+        is assumed to have twice that side.
     """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
     images = {id(t.image): t.image for t in textures if t is not None}.values()
@@ -155,7 +157,7 @@ class Workload:
     pages, triangles : int
         Number of pages of the atlas, and number of triangles of all instances.
     image_bytes : tuple of int
-        `decoded` and `loading` of the function `image_bytes`, bytes.
+        `decoded` and `loading`, the results of the function `image_bytes`, bytes.
     light, ambient_occlusion : bool
         Whether a channel of the bake needs light, and whether a channel needs ambient occlusion.
     """

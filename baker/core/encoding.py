@@ -88,7 +88,7 @@ class Encoding(ABC, Generic[Options]):
     when_banded: str = "use the EXR"
 
     def options_of(self, settings: Settings) -> Options:
-        """Return the options of this encoding among the settings of a bake."""
+        """Return the options of this encoding, taken from the settings of a bake."""
         return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 
     def fitted(self, options: Options, brightest: float) -> Options:
@@ -187,7 +187,7 @@ def measure_loss(
     pixels : (H, W, C) float32
         The page.
     surface : (H, W) bool
-        Texels that are shown.
+        Texels on surfaces.
     options : EncodingOptions
         Options of `encoding`.
 

@@ -25,7 +25,7 @@ class BakerError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
-        # Names of a file are in all three: one line, without control characters.
+        # Convert all three texts to one line, because they may contain names from a file.
         message = printable(message)
         super().__init__(message)
         self.message = message

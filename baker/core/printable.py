@@ -1,14 +1,16 @@
-"""Text of files, made fit for terminals, logs and reports: one line without control characters."""
+"""Converts text from files to one line without control characters, for terminals, logs and reports."""
 
 from __future__ import annotations
 
 import unicodedata
 
-# Longest value of a file that a message repeats, characters.
+# Largest length of a value from a file in a message, characters.
 LONGEST_VALUE = 80
-# Format characters that belong to words: joiners of Arabic, Indic and emoji sequences, soft hyphens.
+# Format characters that are not escaped, because words contain them: zero-width joiner and non-joiner
+# (Arabic, Indic and emoji sequences) and the soft hyphen.
 _JOINERS = "\u200c\u200d\u00ad"
-# Control characters, surrogates, separators of lines and paragraphs; format characters, which reverse text.
+# Unicode categories of escaped characters: control characters, surrogates, line separators, paragraph
+# separators, and format characters, some of which reverse the direction of text.
 _ESCAPED = frozenset({"Cc", "Cs", "Zl", "Zp", "Cf"})
 
 
@@ -18,12 +20,12 @@ def printable(text: str) -> str:
     Parameters
     ----------
     text : str
-        Any text. Line breaks and tabs become blanks.
+        Any text.
 
     Returns
     -------
     str
-        The same object if nothing had to be replaced.
+        The text after line breaks and tabs are replaced by spaces and control characters by escapes.
     """
     if text.isascii() and text.isprintable():
         return text
@@ -31,19 +33,19 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:
-    """Return a value for a message: printable, and cut to `most` characters.
+    """Return a value for a message, in the form of `printable` and with at most `most` characters.
 
     Parameters
     ----------
     text : str
-        The value, such as a name of a node.
+        The value, such as the name of a node.
     most : int
-        Most characters that are kept.
+        Largest number of characters.
 
     Returns
     -------
     str
-        With "..." in place of what was cut.
+        The value; if it is too long, its end is replaced by "...".
     """
     text = printable(text[: 2 * most])
     return text if len(text) <= most else f"{text[: most - 3]}..."

@@ -229,7 +229,7 @@ class SourceDocument:
     folder : Path or None
         Folder that relative image URIs refer to.
     allow_outside : bool
-        Image URIs may lead out of that folder.
+        Whether image URIs may refer to files outside that folder.
     missing, missing_images : frozenset of int
         Indices of buffers and images that cannot be read and that the bake does not need.
     chunks : tuple of (int, bytes)

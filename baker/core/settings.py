@@ -124,7 +124,7 @@ else:
 
 
 class InspectSettings(RunSettings):
-    """Holds the settings of `baker inspect`."""
+    """The settings of `baker inspect`."""
 
     allow_outside: bool = same_setting(BakeSettings, "allow_outside")
 

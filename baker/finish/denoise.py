@@ -66,7 +66,7 @@ REACH = 96
 MARGIN, BLOCK = 8, 16
 # Half side of the window to which planes are fitted at chart borders, texels.
 SLOPE_RADIUS = 4
-# Number of border texels that one call of the kernel fits planes for.
+# Number of border texels for which one call of the kernel fits planes.
 _BORDER_TEXELS = 4096
 # Largest ratio of an upper bound of the error to the noise estimated from the page, RMS over the page: larger
 # bounds are scaled down to it. The error of AO is 0.95 to 1.2 times that noise (Cornell, interior, hall; 16

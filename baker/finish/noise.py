@@ -29,14 +29,18 @@ def estimate_error(
     Parameters
     ----------
     luminance : (H, W) float32
+        The page.
     chart : (H, W) int32
+        Index of the chart of each covered texel.
     covered : (H, W) bool
+        Texels of charts.
     threads : int
+        Number of threads.
 
     Returns
     -------
     error : (H, W) float32
-        Constant over the texels of one chart in one block of 16 x 16; 0 where not covered.
+        Standard deviations, equal for all texels of one chart in one block of 16 x 16; 0 where not covered.
     """
     passed = np.full(luminance.shape, np.nan, np.float32)
     over_rows(

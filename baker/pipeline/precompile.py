@@ -48,7 +48,7 @@ def start() -> Process:
 
 
 def restart_for_materials(process: Process, scene: Scene) -> Process:
-    """Restart the process if a material of the scene lets light through, because other kernels are needed.
+    """Restart the process for other kernels if a material of the scene lets light through.
 
     Parameters
     ----------

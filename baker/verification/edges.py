@@ -24,7 +24,7 @@ from baker.verification.surroundings import in_contact, inside_points, lifted, s
 # Share of points at the borders of charts, and share of points near other surfaces. The remaining points are
 # random.
 _BORDER, _CONTACT = 0.4, 0.5
-# Number of random texels tested for each point near another surface.
+# Number of random texels that are tested to find one point near another surface.
 _POOL = 16
 # Number of points in each texel of a footprint, and in each tested texel.
 _POINTS_PER_TEXEL, _POOL_POINTS = 16, 8

@@ -70,8 +70,7 @@ def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
     offset : (H, W, 2) float32, column and row offset of each value's position from its texel centre, texels;
         of shape (0, 0, 2) if all offsets are zero
     sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64 output, see the column names; x and y are relative to
-    the
-        position of texel (r, c)
+        the position of texel (r, c)
     """
     height, width, channels = value.shape
     placed = offset.shape[0] > 0

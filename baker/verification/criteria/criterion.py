@@ -64,7 +64,7 @@ class ChannelData:
     def interior(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points that are mostly covered by valid surface, not in gaps and not tilted.
 
-        All other points are compared only as points at edges.
+        Light levels, regions, objects and charts are compared at these points only.
         """
         points = self.points
         covered = points.surface.area * points.valid_share >= _MIN_COVERED
@@ -75,8 +75,8 @@ class ChannelData:
         """Return (n,) bool: the points whose shading normal differs considerably from the face normal.
 
         There, bake and reference differ: the bake includes light from below the facet, as on a curved
-        surface, and the reference does not. If the shading normal is tilted by an angle t, the share (1 - cos
-        t) / 2 of the cosine-weighted hemisphere around it lies below the facet.
+        surface, and the reference does not. If the shading normal is tilted by an angle t, the share
+        (1 - cos t) / 2 of the cosine-weighted hemisphere around it lies below the facet.
         """
         surface = self.points.surface
         cosine = (surface.normal * surface.face_normal).sum(axis=2).mean(axis=1)
@@ -115,7 +115,7 @@ class CriterionResult:
     Attributes
     ----------
     metrics : dict of str to number or None
-        Values by metric; the names are those in `Criterion.metrics`, and may be more.
+        Values of the metrics in `Criterion.metrics`, and possibly of further metrics, by name.
     remarks : dict of str to str
         Sentences by metric, each about the fault that the metric indicates.
     rows : list of dict
