@@ -1,4 +1,4 @@
-"""What every channel promises: its layers, their shapes, its words."""
+"""Contract of every channel: the shapes of its layers, and its unit, quantity and definition."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def transport():
 
 
 def needed(channel, transport):
-    """Leave out what the channel does not ask for: it must not be read."""
+    """Return the `Transport` without the results that the channel does not declare as needed."""
     return Transport(
         direct=transport.direct if channel.needs_light else None,
         gathered=transport.gathered if channel.needs_light else None,
@@ -113,7 +113,7 @@ def test_ao_is_the_unoccluded_share_with_a_binomial_error(transport):
     (layer,) = CHANNELS.get("ao").layers(transport)
     np.testing.assert_array_equal(layer.value[:, 0], transport.ambient_occlusion)
     binomial = np.sqrt(transport.ambient_occlusion * (1 - transport.ambient_occlusion) / 64)
-    # Near the binomial error where that is large, and never nothing.
+    # The error is the binomial standard error where that is large, and above 0 everywhere.
     large = binomial > 0.05
     assert large.sum() > 10
     np.testing.assert_allclose(layer.error[large], binomial[large], rtol=0.05)
@@ -154,7 +154,7 @@ CHANNELS.register("toy")(
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """Add one file to the channels, for one test."""
+    """Register the channel `toy` from one file, for one test."""
     CHANNELS.names()
     monkeypatch.setattr(CHANNELS, "_plugins", dict(CHANNELS._plugins))
     (tmp_path / "toy.py").write_text(TOY)
@@ -170,8 +170,9 @@ def test_a_signed_channel_of_four_components_is_one_file(toy, denoise, tmp_path)
     value = result.lightmaps["toy"].value
     covered = np.isin(result.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     assert value.shape == (1, 48, 48, 4)
-    # Both signs survive. A component and its negative differ where texels of chart borders are moved to their
-    # centre: a window of values above 0 stays above 0, a window of values below need not stay below.
+    # Values of both signs are stored. Components 1 and 3 are the negatives of 0 and 2, except at chart
+    # borders: the extrapolation to texel centres keeps positive values positive, but not negative values
+    # negative.
     assert value[covered].min() < -0.2
     assert value[covered].max() > 0.2
     for one, other in ((0, 1), (2, 3)):

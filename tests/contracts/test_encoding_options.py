@@ -1,4 +1,4 @@
-"""An encoding with an option is one new file: flag, configuration key and settings page come from it."""
+"""One new file adds an encoding with an option; flag, configuration key and settings page follow from it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class ToyEncoding(Encoding[ToyOptions]):
 
 ENCODINGS.register("toy")(ToyEncoding())
 '''
-# Runs a program with a further folder of encodings.
+# Program that runs Python code with an additional folder of encodings, its first argument.
 START = "import sys, baker.encodings; baker.encodings.__path__.append(sys.argv.pop(1)); "
 MAIN = START + "from baker.cli.__main__ import main; main()"
 PAGE = START + "sys.path.insert(0, 'docs'); from make_settings_page import page; print(page())"
@@ -125,7 +125,7 @@ def test_an_option_is_in_help_and_docs(run):
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_the_example_keeps_the_contract(number, tmp_path, monkeypatch):
-    """The example that CONTRIBUTING.md names passes the tests that a copy of it has to pass."""
+    """The example that CONTRIBUTING.md names passes the contract tests of encodings."""
     ENCODINGS.names()
     monkeypatch.setattr(ENCODINGS, "_plugins", dict(ENCODINGS._plugins))
     (tmp_path / "toy.py").write_text(TOY)

@@ -12,7 +12,7 @@ from baker.core.encoding import ENCODINGS, encoding_of, measure_loss
 from baker.core.errors import InputError, ResourceError
 
 HEADER = {"quantity": "irradiance", "unit": "lx"}
-# Options to test with, where the defaults are not enough.
+# {encoding: option values} to test in addition to the defaults.
 OPTIONS = {
     "exr": [
         {"dtype": dtype, "exr_compression": method}
@@ -30,17 +30,17 @@ CASES = [
 
 
 def names_of(number):
-    """Return names of `n` components."""
+    """Return the names of `number` components."""
     return {1: ("Y",), 3: ("R", "G", "B")}.get(number, tuple(f"layer.{k:02}" for k in range(number)))
 
 
 def fitted(encoding, **values):
-    """Return options of an encoding for maps of values up to 1."""
+    """Return the options of an encoding, fitted to maps whose largest value is 1."""
     return encoding.fitted(encoding.options_type(**values), 1.0)
 
 
 def image(encoding, options, number, height=23, width=70, seed=5):
-    """Return pixels all over the range that a lightmap may use: zero, tiny, smooth, random, the very top."""
+    """Return pixels with zeros, tiny and random values, gradients, and the largest value of the encoding."""
     low, high = encoding.limits(options)
     high = min(high, 1e30)
     rng = np.random.default_rng(seed)
@@ -48,7 +48,7 @@ def image(encoding, options, number, height=23, width=70, seed=5):
     pixels[0] = 0.0
     pixels[1] = np.linspace(0.0, high, width)[:, None]
     pixels[2:5] = high * 10.0 ** np.linspace(-9, 0, width)[:, None]
-    # One channel alone, and flat areas that run-length coding folds up.
+    # Rows with light in one component only, and constant rows, which run-length coding compresses.
     pixels[5:9, :, 1:] = 0.0
     pixels[9:13] = 0.25 * high
     pixels[13, ::2] = high
@@ -74,7 +74,7 @@ def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, nu
     assert tolerance.shape == pixels.shape
     assert (miss <= tolerance).all(), (miss / np.maximum(tolerance, 1e-300)).max()
     assert np.array_equal(read.pixels, encoding.stored(pixels, options))
-    # The bound is no excuse: somewhere the format really is that coarse.
+    # The tolerance is not too generous: some pixel has at least 0.4 of it as error.
     if tolerance.any():
         assert (miss > 0.4 * tolerance).any()
 
@@ -197,7 +197,7 @@ def test_rgbm_by_hand(tmp_path):
 
 
 def test_radiance_hdr_by_hand(tmp_path):
-    """1.0 is mantissa 128 at exponent 129, and a line is its four planes run-length coded."""
+    """1.0 is stored as mantissa 128 and exponent 129; a row is four run-length coded planes."""
     encoding = ENCODINGS.get("hdr")
     encoding.encode(tmp_path / "a.hdr", np.ones((1, 10, 3), np.float32), options=fitted(encoding), header={})
     head, _, body = (tmp_path / "a.hdr").read_bytes().partition(b"-Y 1 +X 10\n")
@@ -210,17 +210,17 @@ def test_banding_is_where_steps_show():
     surface = np.ones((64, 64), bool)
     ramp = np.linspace(0.02, 1.0, 64 * 64, dtype=np.float32).reshape(64, 64, 1)
     eight, sixteen = ENCODINGS.get("png8"), ENCODINGS.get("png16")
-    # Half a step of 1/255 is more than 1 % of what is below 0.196.
+    # Half a step of 1/255 is more than 1 % of values below 0.196.
     loss = measure_loss(eight, ramp, surface, fitted(eight))
     wrong = np.abs(np.rint(ramp * 255) / 255 - ramp) > 0.01 * ramp
     assert loss.banded == int(wrong.sum()) > 300
     assert measure_loss(sixteen, ramp, surface, fitted(sixteen)).banded == 0
-    # A range that is far too wide for the page shows as steps; the right one does not.
+    # With an RGBM range far above the largest value, steps become visible; with range 1 they do not.
     light = np.repeat(ramp, 3, axis=2)
     rgbm = ENCODINGS.get("rgbm")
     assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1e6)).banded > 500
     assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1.0)).banded < 41
-    # What is not shown, or as good as black, does not count.
+    # Texels off the surface, and nearly black texels, are not counted.
     assert measure_loss(rgbm, light, ~surface, fitted(rgbm, rgbm_range=1e6)).banded == 0
     light[:32] *= 1e-4
     assert measure_loss(rgbm, light, surface, fitted(rgbm, rgbm_range=1.0)).banded < 41

@@ -1,4 +1,4 @@
-"""What every export promises, and the formulas of the engines that no test can run."""
+"""Contract of every export, and the formulas for engines that the tests cannot run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
 
 NAMES = EXPORTS.names()
-# Names that one or the other engine changes or reads as a hint, one of them twice.
+# Node names that some engine changes or interprets as an import hint; the first name occurs twice.
 NODES = ["a.b c", "a.b c", "wall-col", "Ünï/cødé: %@", "x" * 80, ""]
 SIZE = 16
 
@@ -37,7 +37,7 @@ def strip(number):
 
 
 def result(folder, **settings):
-    """Return a bake of six squares on two pages with made-up light."""
+    """Return a bake of six squares on two pages, whose light is made up."""
     folder.mkdir(exist_ok=True)
     builder = GltfBuilder()
     for number, name in enumerate(NODES):
@@ -55,7 +55,7 @@ def result(folder, **settings):
         builder.node(mesh=mesh, translation=[2.0 * number, 0.0, 0.0], **named)
     scene = load_scene(write(folder / "level.glb", builder))
     row = np.arange(4, dtype=np.int32)
-    # Three squares a page, each in a strip of four columns; the last strip is empty.
+    # Each page has three squares in strips of four columns; its last strip is empty.
     layouts = tuple(
         InstanceLayout(i, i % 2, row, strip(i), np.int32(QUAD_TRIANGLE), np.full(2, i, np.int32), False, 16.0)
         for i in range(len(NODES))
@@ -163,7 +163,8 @@ def test_engines_that_go_by_names_get_a_name_for_each_node(bake, name):
     names = [node["name"] for node in new["nodes"]]
     assert len(set(names)) == len(names)
     for index, node in enumerate(new["nodes"]):
-        # Letters, digits, underscores: nothing to strip, no hint like -col, and no longer than 63 bytes.
+        # Only letters, digits and underscores, so importers change nothing and find no hint like -col; at
+        # most 63 bytes, the limit of Blender.
         assert re.fullmatch(r"\w{1,63}", node["name"], re.ASCII)
         assert node["name"].endswith(f"_n{index}")
         assert node["extras"]["baker_node"] == index
@@ -181,7 +182,7 @@ def test_a_name_in_an_engine():
 
 
 def test_unity_pages_hold_what_a_white_surface_sends_out(bake):
-    """Unity shows albedo x page, without 1 / pi, so a page must be E / pi."""
+    """Unity shows albedo x page without 1 / pi, so a page must store E / pi."""
     for page in range(2):
         light = decode_exr(bake[0] / f"irradiance_{page}.exr").pixels
         image = decode_exr(bake[0] / "unity" / f"irradiance_{page}.exr")
@@ -191,7 +192,7 @@ def test_unity_pages_hold_what_a_white_surface_sends_out(bake):
 
 
 def test_unity_scale_and_offset_are_for_v_upwards():
-    """A texel looked up Unity's way, with v' = 1 - v in mesh and image, is the texel looked up glTF's way."""
+    """With v' = 1 - v in mesh and image, as in Unity, the lookup finds the same texel as in glTF."""
     rng = np.random.default_rng(3)
     for _ in range(100):
         scale, offset, uv = rng.random(2), rng.random(2), rng.random(2)
@@ -242,12 +243,12 @@ def test_godot_shaders_read_uv2_and_divide_by_pi():
         source = template("godot", name)
         assert "texture(page, UV2 * uv_scale + uv_offset).rgb" in source
         assert f"base * irradiance / {pi} + emitted" in source
-        # No hint that would decode sRGB on the page.
+        # The page has no hint that would make Godot decode it as sRGB.
         assert not re.search(r"sampler2D page\s*:.*(source_color|hint_albedo)", source)
 
 
 def test_unlit_holds_light_times_albedo(bake, tmp_path):
-    """Every texel is sRGB of albedo x E / pi x exposure, on TEXCOORD_0, and nothing else is left."""
+    """Texels are sRGB of albedo x E / pi x exposure on TEXCOORD_0; no other uv sets or textures remain."""
     from io import BytesIO
 
     from PIL import Image

@@ -1,4 +1,4 @@
-"""What every importer promises: the same square from every format, and no surprise from broken files."""
+"""Contract of every importer: every format gives the same square, and broken files give an `InputError`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PLY = (
 _STL = b"\0" * 80 + struct.pack("<I", 2)
 _STL += b"".join(struct.pack("<12fH", 0, 0, 1, *QUAD[t].reshape(-1), 0) for t in QUAD_TRIANGLE)
 
-# The unit square of the xy plane, facing +z. A new importer adds its own line.
+# {suffix: file content}: the unit square of the xy plane, facing +z. Add a line for a new importer.
 SQUARES = {
     ".glb": quad_builder().glb(),
     ".gltf": quad_builder().gltf(),
@@ -116,7 +116,7 @@ def test_the_hook_matches_what_is_registered():
     assert (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8") == page
 
 
-# A new format in one file: each line of a .corners file is a corner, three are a triangle.
+# An importer in one file. Each line of a .corners file is a corner, and three lines are a triangle.
 _TOY = """
 import hashlib
 
@@ -140,7 +140,7 @@ def import_corners(source):
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """An importer in one file, found like those of the package; the scene file that it reads."""
+    """Add the importer of `_TOY` to the plugins and return the path of a scene file that it reads."""
     folder = tmp_path / "plugins"
     folder.mkdir()
     (folder / "toy_corners.py").write_text(_TOY)
@@ -164,7 +164,7 @@ def test_a_new_importer_is_one_file(toy, tmp_path):
     )
     out = tmp_path / "out"
     result = bake(toy, settings=settings, out=out)
-    # +z of the file is +Y of the world, and two metres are one unit.
+    # With these settings, +z of the file is +Y of the world, and one unit of the file is two metres.
     np.testing.assert_allclose(result.scene.meshes[0].position.max(axis=0), [2, 0, 0], atol=1e-6)
     assert json.loads((out / "bake.json").read_text())["input"]["sha256"] == load_scene(toy).sha256
     assert (out / "scene.glb").stat().st_size > 0

@@ -1,4 +1,4 @@
-"""A kind of light is one file: a new one is taken everywhere, an unknown one is refused everywhere."""
+"""One file adds a kind of light for all commands; a light of an unknown kind is an error in all commands."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ BEACON = LIGHT_KINDS.register("beacon")(
 
 
 def lit_by(*lights):
-    """A floor with a block on it, below lights."""
+    """Return a scene of a floor with a block on it, lit by `lights`."""
     floor = Quad((-1, 0, 1), (2, 0, 0), (0, 0, -2), grey(0.5))
     block = box_quads((-0.3, 0, -0.3), (0.2, 0.4, 0.3), inward=False, material=grey(0.6))
     return replace(quad_scene([floor, *block]), lights=lights)
@@ -150,7 +150,7 @@ def add_kind(tmp_path, monkeypatch):
 
 
 def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
-    """Baked, written, read, verified, rendered and checked, with the numbers of the sun that it is."""
+    """The kind "moon" gives the same bake, import, verification, picture and check as "directional"."""
     add_kind("moon", MOON)
     out = tmp_path / "out"
     found = bake(lit_by(shining("moon")), settings=SETTINGS, out=out)
@@ -179,7 +179,7 @@ def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
 
 
 def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
-    """Its bake follows its kernel, the path tracer its table: `verify` compares them."""
+    """The bake uses the kernel of the kind, the path tracer its table, and `verify` finds them equal."""
     add_kind("beacon", BEACON)
     out = tmp_path / "out"
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
@@ -192,7 +192,7 @@ def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
     (finding,) = (f for f in report.findings if f.code == "light-intensity")
     assert "the beacon light has 100 cd" in finding.message
 
-    # The same light, baked with azimuths the wrong way round, fails.
+    # If the bake mirrors the azimuth of the same light, `verify` fails.
     text = BEACON.replace("away @ axis, azimuth, ", "away @ axis, -azimuth, ")
     assert text != BEACON
     mirrored = replace(LIGHT_KINDS.get("beacon"), fill=_fill_of(text))
@@ -211,7 +211,7 @@ def beacon_truth(point, normal):
 
 
 def test_the_example_keeps_the_contract(add_kind, monkeypatch):
-    """The example that CONTRIBUTING.md names passes the tests that a copy of it has to pass."""
+    """The example that CONTRIBUTING.md names passes the contract tests of lights."""
     add_kind("beacon", BEACON)
     monkeypatch.setitem(test_lights.TRUTH, "beacon", beacon_truth)
     monkeypatch.setitem(test_lights.PARAMETERS, "beacon", {"sharpness": 3.0})
@@ -234,7 +234,7 @@ def _fill_of(text):
 
 @pytest.mark.parametrize("estimator", ["light", "bdpt"])
 def test_all_estimators_agree_on_a_tabulated_light(add_kind, estimator):
-    """Light that starts at it, and light that is aimed at."""
+    """`light` samples the tabulated light from surfaces; `bdpt` also starts paths at it."""
     add_kind("beacon", BEACON)
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
     view = RenderSettings(camera="0,1.5,3,0,0.2,0,40", width=8, height=6, spp=256)
@@ -279,7 +279,7 @@ def test_an_unknown_kind_is_an_error_also_of_a_light_that_is_off(name):
     assert str(caught.value) == (
         f"light 'night': there is no kind of light 'laser'; known are {', '.join(LIGHT_KINDS.names())}"
     )
-    # The same call with a known kind is no error.
+    # The same function accepts lights of known kinds.
     REFUSERS[name](lit_by(shining("point"), shining("spot", 0.0)))
 
 

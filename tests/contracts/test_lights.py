@@ -1,4 +1,4 @@
-"""What every kind of light promises, and the closed form of each."""
+"""Contract of every kind of light, and the closed form of its irradiance."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INNER, OUTER = 0.3, 0.8
 
 
 def toward(point):
-    """Return vectors from points to the light's position, their length, and the cosine off its axis."""
+    """Return the vectors from points to the light, their lengths, and the cosines of their angles to the axis."""
     way = POSITION - point
     length = np.linalg.norm(way, axis=-1)
     return way, length, -(way @ DIRECTION) / length
@@ -39,7 +39,7 @@ def directional_truth(point, normal):
     return np.maximum(-(normal @ DIRECTION), 0)
 
 
-# A new kind adds its own line, and values of its parameters, if it has any.
+# {kind: closed form of E}. For a new kind add a line here, and its parameters, if any, to `PARAMETERS`.
 TRUTH = {"point": point_truth, "spot": spot_truth, "directional": directional_truth}
 PARAMETERS = {}
 
@@ -77,7 +77,7 @@ def test_every_kind_has_a_closed_form():
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_a_record_agrees_with_what_its_light_does(name):
-    """Moving, turning or widening a light changes its irradiance if and only if the manifest lists that."""
+    """A change of position, direction or cone changes E if and only if `describe` returns that property."""
     kind, light, (origin, normal) = LIGHT_KINDS.get(name), light_of(name), points()
     assert kind.name == name
     assert kind.gltf_type is None or kinds_by_gltf_type()[kind.gltf_type] is kind
@@ -113,7 +113,7 @@ def test_what_is_written_is_read(name, range_):
 
 
 def interpolated(profile, away, cosine):
-    """Return f of a tabulated profile in directions (..., 3)."""
+    """Return the relative intensity of a tabulated profile for directions (..., 3)."""
     rows, columns = profile.table.shape
     low = profile.min_cosine
     row = np.clip((cosine - low) / (1 - low), 0, 1) * (rows - 1)
@@ -127,7 +127,7 @@ def interpolated(profile, away, cosine):
 @pytest.mark.parametrize("name", sorted(TRUTH))
 @pytest.mark.parametrize("range_", [math.inf, 2.0])
 def test_the_profile_for_the_path_tracer_is_the_same_light(name, range_):
-    """The equations of `EmissionProfile`, written out, against what the bake's kernel computes."""
+    """The equations of `EmissionProfile`, evaluated in NumPy, agree with `fill` of the bake."""
     light = replace(light_of(name), range=range_)
     origin, normal = points()
     expected = fill(name, origin, normal, light)[1]
@@ -152,7 +152,7 @@ def test_the_profile_for_the_path_tracer_is_the_same_light(name, range_):
 @pytest.mark.parametrize("name", POSITIONED)
 @pytest.mark.parametrize("inner", [0.0, 0.3, OUTER])
 def test_power_is_the_flux_or_a_bound_of_it(name, inner):
-    """Irradiance of a unit sphere around the light, summed over the sphere by a rule of equal areas."""
+    """`power` is at least the flux: the integral of E over a unit sphere around the light (equal-area rule)."""
     light = replace(light_of(name), inner_cone=inner)
     n = 4000 * 16
     z, turn = 1 - (2 * np.arange(n) + 1) / n, np.arange(n) * np.pi * (3 - 5**0.5)
@@ -160,7 +160,7 @@ def test_power_is_the_flux_or_a_bound_of_it(name, inner):
     origin, normal = np.float32(POSITION + way).reshape(-1, 16, 3), np.float32(-way).reshape(-1, 16, 3)
     flux = 4 * np.pi * fill(name, origin, normal, light)[1].mean(dtype=float)
     power = kind_of(light).power(light, 1.0)
-    # The rule of equal areas is within 0.5 %.
+    # The quadrature has an error of at most 0.5 %.
     assert 0.995 * flux < power < 4 * flux
     if name == "point" or (name == "spot" and inner == OUTER):
         np.testing.assert_allclose(power, flux, rtol=5e-3)
@@ -187,7 +187,7 @@ def test_weights_are_the_closed_form(kind):
     np.testing.assert_allclose(weight, truth, rtol=2e-5, atol=1e-6)
     assert (weight > 0).sum() > 20
     assert np.isfinite(ray).all()
-    # Nothing shines from behind the horizon.
+    # Light from below the horizon of a point gives no irradiance.
     behind = (ray[..., :3].astype(float) * normal).sum(-1) < -1e-6
     assert behind.sum() > 100
     assert (weight[behind] == 0).all()
@@ -210,7 +210,7 @@ def test_rays_end_just_before_the_light(kind):
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
 def test_a_candela_a_metre_and_a_lux(kind):
-    """Straight below: 1 cd at 1 m, or 1 lx, gives 1 lx, for every kind."""
+    """A light of 1 cd at 1 m, or of 1 lx, directly above a point gives 1 lx, for every kind."""
     light = replace(light_of(kind), position=(0, 1, 0), direction=(0, -1, 0), inner_cone=0.2, outer_cone=0.5)
     up = np.zeros((1, 16, 3), np.float32)
     up[..., 1] = 1
@@ -220,12 +220,12 @@ def test_a_candela_a_metre_and_a_lux(kind):
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
 def test_odd_points(kind):
-    """No texel, and a point at the light itself: nothing that is not a number."""
+    """An empty array of points, and a point at the position of the light, give finite results."""
     none = np.zeros((0, 16, 3), np.float32)
     assert fill(kind, none, none)[1].shape == (0, 16)
     at = np.float32(np.tile(POSITION, (1, 16, 1)))
     normal = points(1)[1]
-    # Single precision holds the points, so that they are exactly where the light is.
+    # The light gets the float32 position of the points, so they coincide exactly.
     ray, weight = fill(kind, at, normal, replace(light_of(kind), position=tuple(map(float, at[0, 0]))))
     assert np.isfinite(ray).all()
     assert np.isfinite(weight).all()
@@ -235,7 +235,7 @@ def test_the_fall_off_of_a_spot():
     origin = np.zeros((1, 16, 3), np.float32)
     normal = np.zeros((1, 16, 3), np.float32)
     angle = np.array([0, 0.1, 0.29, 0.31, 0.4, 0.5, 0.6, 0.7, 0.79, 0.81, 1.0, 1.5, 2.0, 3.0, 3.1, 0.3])
-    # Points on a unit sphere around the light, facing it: the weight is the cone's share alone.
+    # Points on a unit sphere around the light that face it, so E is the cone's fall-off times 1 cd.
     axis, side = DIRECTION, np.cross(DIRECTION, [0, 1, 0])
     side = side / np.linalg.norm(side)
     way = np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * side
@@ -245,7 +245,7 @@ def test_the_fall_off_of_a_spot():
     np.testing.assert_allclose(weight[0], share, atol=1e-5)
     assert (weight[0][angle <= INNER] > 0.9999).all()
     assert (weight[0][angle > OUTER] == 0).all()
-    # An inner cone as wide as the outer one is a sharp edge, no division by zero.
+    # If the inner cone equals the outer cone, the cone has a sharp edge, without a division by zero.
     light = PunctualLight("spot", "", 0, (1, 1, 1), tuple(POSITION), tuple(DIRECTION), OUTER, OUTER)
     _, sharp = fill("spot", origin, normal, light)
     np.testing.assert_allclose(sharp[0][angle < OUTER - 0.02], 1, atol=1e-5)

@@ -1,4 +1,4 @@
-"""Runs the `baker` command with a pipeline that misbehaves in the way its first argument names."""
+"""Runs the `baker` command with a fake pipeline; the first argument names how it hangs or fails."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def polite(progress, out):
 
 
 def deaf(progress, out):
-    # PyDLL keeps Python's lock while C runs, as some libraries do: neither a signal handler nor another
-    # thread gets a turn. Locking a mutex twice waits for ever, whatever signal comes.
+    # `PyDLL` does not release the interpreter lock during a C call, so no signal handler and no other thread
+    # runs. Locking a mutex twice blocks forever and cannot be interrupted by signals.
     _ready(out)
     signal.alarm(30)
     lock = ctypes.PyDLL(None).pthread_mutex_lock

@@ -1,4 +1,4 @@
-"""The project's own scenes: made again byte for byte, closed, right way out, and of the promised size."""
+"""Scenes of assets/: reproducible bytes, closed meshes with fronts outwards, and documented sizes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def triangles(name):
 
 
 def directed_edges(corner):
-    """Return (edges, E x 2 point numbers) of triangles, points that coincide being one."""
+    """Return (E, 2) point indices of the directed edges of triangles; coincident points have one index."""
     _, point = np.unique(np.round(corner.reshape(-1, 3), 5), axis=0, return_inverse=True)
     triangle = point.reshape(-1, 3)
     return triangle[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -84,14 +84,14 @@ def test_normals_and_faces_agree(name):
         length = np.linalg.norm(face, axis=1)
         assert length.min() > 1e-7, mesh
         assert np.allclose(np.linalg.norm(normal, axis=2), 1.0, atol=1e-5), mesh
-        # A smooth normal leans away from its face by less than a right angle.
+        # The cosine between a vertex normal and its face normal is above 0.3.
         assert np.einsum("tk,tck->tc", face / length[:, None], normal).min() > 0.3, mesh
 
 
 @pytest.mark.parametrize("name", ["interior", "hall"])
 def test_solids_are_closed_and_right_way_out(name):
     solids = {mesh: corner for mesh, corner, _ in meshes(name)}
-    # Floor, walls and ceiling are one solid between them.
+    # Only together, floor, walls and ceiling form a closed solid.
     building = np.concatenate([solids.pop(part) for part in ("floor", "walls", "ceiling")])
     for mesh, corner in {**solids, "building": building}.items():
         edge = directed_edges(corner)

@@ -1,4 +1,4 @@
-"""Whole bakes of the project's scenes, looked up at world points: what has to be bright, dark or open."""
+"""Bakes of the project's scenes, sampled at world points where the light or AO is known at least roughly."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ def mean(probe, points, normal, channel="irradiance"):
 
 
 def sunlit(y):
-    """Return where on the living room's floor the sun falls in through height y of the window's left half."""
+    """Return the floor point that sunlight hits after passing height y of the living room window's left half."""
     way = np.array([0.72, -0.62, 0.31])
     start = np.array([-0.2, y, 1.55])
     return start + way * (y / 0.62)
 
 
 def test_sun_lies_on_the_floor_where_the_window_lets_it(interior):
-    # 20000 lx times the cosine on the floor, times the mean of the sun's colour.
+    # 20000 lx x cosine at the floor x mean of the sun's colour.
     direct = 20000 * 0.62 / np.linalg.norm([0.72, 0.62, 0.31]) * (1.0 + 0.93 + 0.82) / 3
     spots = [sunlit(y) for y in (1.14, 1.17, 1.2)]
     lit = [interior.at(p, UP, within=0.02).mean() for p in spots]
-    # Texels of this page are 10 cm wide, the patch of sun between sill and rug 25 cm.
+    # Texels are 10 cm wide, and the sunlit area between sill and rug is 25 cm wide.
     assert 0.85 * direct < np.median(lit) < 1.6 * direct
-    # The same spots mirrored in z to the other side of the room lie in the shade.
+    # Points mirrored in z, on the other side of the room, are in the shade.
     assert mean(interior, [(1.5, 0, 3.8), (4.5, 0, 3.6), (3.5, 0, 3.8)], UP) < 0.2 * direct
 
 
@@ -62,18 +62,19 @@ def test_ao_falls_into_corners(interior):
     middle = mean(interior, [(6.9, 0, 2.3)], UP, "ao")
     edge = mean(interior, [(6.9, 0, 3.93)], UP, "ao")
     corner = mean(interior, [(5.27, 0, 3.93)], UP, "ao")
-    # Beside one wall at 7 cm with a reach of 50 cm: 1 - (acos c - c sqrt(1 - c c)) / pi at c = 0.14: 0.59.
+    # At 7 cm from a wall with an AO distance of 50 cm: 1 - (acos c - c sqrt(1 - c c)) / pi = 0.59 at c =
+    # 0.14.
     assert middle > 0.97
     assert edge == pytest.approx(0.59, abs=0.08)
     assert corner < 0.8 * edge
 
 
 def test_no_light_leaks_behind_walls(interior):
-    """The outer walls see the black sky only: the sun shines on -x, from the top; +x stays dark."""
+    """Outside, there is only the sun and a black sky: the sun lights the -x wall, and the +x wall is dark."""
     for z in (0.3, 1.0, 2.0, 3.0, 3.9):
         for y in (0.05, 0.8, 1.7, 2.55):
             assert interior.at((8.8, y, z), (1, 0, 0)).max() < 1e-3
-    # The study has no window: its far wall is lit by the panel and by what comes through the doorway.
+    # The study has no window. Only the panel and the doorway light its far wall.
     study = mean(interior, [(8.6, 1.0, 1.0), (8.6, 1.5, 3.0)], (-1, 0, 0))
     assert 20 < study < 3000
 
@@ -82,24 +83,24 @@ def test_panel_lights_the_study_from_above(interior):
     below = interior.at((6.9, 0, 2.3), UP).mean()
     aside = interior.at((5.4, 0, 3.8), UP).mean()
     assert below > 1.5 * aside
-    # L A cos / r^2 of the panel alone is at most 2730 * 0.72 / 2.545^2 = 303 lx.
+    # Direct light of the panel, L A cos / r^2, is at most 2730 * 0.72 / 2.545^2 = 303 lx.
     assert 200 < below < 900
 
 
 def test_hall_sun_and_shade(hall):
-    # Windows lie 0.9 to 2.1 m into each bay of 3 m, 3.2 to 5.2 m up.
+    # Each bay of 3 m has a window from 0.9 to 2.1 m along the bay, at heights of 3.2 to 5.2 m.
     way = np.array([0.25, -0.72, -0.65])
     spot = np.array([-12.0 + 3 * 3 + 1.25, 4.6, 6.2]) + way * 4.6 / 0.72
     lit = hall.at((spot[0], 0, spot[2]), UP).mean()
     direct = 30000 * 0.72 / np.linalg.norm(way) * (1.0 + 0.95 + 0.87) / 3
-    # Texels of this page are 34 cm wide, the patch of sun is 1.2 m.
+    # Texels are 34 cm wide, and the sunlit area is 1.2 m wide.
     assert 0.75 * direct < lit < 1.2 * direct
     dark = mean(hall, [(-9.5, 0, -5.6), (0.0, 0, -5.7), (9.5, 0, -5.6)], UP)
     assert dark < 0.1 * direct
 
 
 def test_hall_outside_under_the_sky(hall):
-    """The outer face of the wall away from the sun sees sky only: there is no ground: pi L."""
+    """Outside, on the wall away from the sun, E = pi L: only sky is visible, as the scene has no ground."""
     values = [hall.at((x, 2.8, -6.4), (0, 0, -1)).mean() for x in (-10.0, -3.0, 4.0, 11.0)]
     assert np.mean(values) == pytest.approx(np.pi * 500, rel=0.01)
 

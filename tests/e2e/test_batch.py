@@ -1,4 +1,4 @@
-"""`baker batch` as a user runs it: real bakes, moved folders, kills, two runs at once."""
+"""`baker batch` on the command line: bakes, moved folders, killed runs, two runs at the same time."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def states(found):
 
 
 def content(folder):
-    """Hash every file of all bakes, without times."""
+    """Return {path: hash} of every file of all bakes; times are removed from manifests first."""
     found = {}
     for path in sorted(folder.rglob("*")):
         if path.is_file():
@@ -76,7 +76,7 @@ def test_a_night_and_the_next(tree, tmp_path):
     assert [job["out"] for job in found["jobs"]] == ["baked/hall", "baked/room", "baked/shed"]
     assert 'tests="3" failures="0"' in (tree / "junit.xml").read_text()
     assert hidden(tree) == []
-    # One process at a time, from the start and elsewhere, gives the same bytes.
+    # In a moved folder, baking everything again with one process gives the same bytes.
     before = content(tree / "baked")
     moved = tree.rename(tmp_path / "moved")
     for path in moved.rglob("*"):
@@ -85,7 +85,7 @@ def test_a_night_and_the_next(tree, tmp_path):
     code, found, _ = batch(moved, "--force")
     assert states(found) == ["baked"] * 3
     assert content(moved / "baked") == before
-    # The next night one scene is another, and one map is gone.
+    # Replace one scene and delete one map.
     builder = quad_builder()
     builder.json["extras"] = {"name": "another"}
     write(moved / "levels" / "room.glb", builder)
@@ -125,7 +125,7 @@ def test_wrong_use_and_missing_files(tree):
 
 
 def slow(tree):
-    """Make the second job one that takes long enough to be interrupted."""
+    """Replace the second job by a bake that takes long enough to be interrupted."""
     text = JOBS.replace('glob = "levels/*.glb"', 'scene = "levels/hall.glb"')
     more = "resolution = 1024\nsamples = 4096\nao_samples = 65536\n"
     (tree / "JOBS.toml").write_text(f'{text}\n[[job]]\nscene = "levels/room.glb"\n{more}')

@@ -1,4 +1,4 @@
-"""Stopping: whatever is running, the command ends within a second with 130 and leaves nothing behind."""
+"""Interruption: in every stage the command ends within a second with exit code 130 and leaves no files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from baker.io.temporary import TemporaryFolder
 
 FAKE = Path(__file__).with_name("fake_baker.py")
 ASSETS = Path(__file__).parents[2] / "assets"
-# What is promised; the grace period and the end of the process lie well inside.
+# Documented limit from the signal to the end of the process, seconds; it includes the grace period.
 LIMIT = 1.0
 
 
@@ -49,7 +49,7 @@ def _alive(process: int) -> bool:
     except ProcessLookupError:
         return False
     state = Path(f"/proc/{process}/stat")
-    # A zombie has ended; its parent has not read the exit code yet.
+    # A zombie process (state Z) has ended, but its parent has not read the exit code yet.
     return not state.exists() or state.read_text().rpartition(")")[2].split()[0] != "Z"
 
 

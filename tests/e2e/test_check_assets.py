@@ -1,4 +1,4 @@
-"""What `baker check` finds in every scene of assets/ is kept as text, each with its reason."""
+"""The findings of `baker check` in all scenes of assets/ equal those in check_findings.txt."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LINE = re.compile(r"  (\w+) +(\S+) +(\d+) +(\d+)  (\S.*)")
 
 
 def kept():
-    """Return {scene: {(severity, code): (objects, count)}} of the text file."""
+    """Return {scene: {(severity, code): (number of objects, count)}} of check_findings.txt."""
     found, scene = {}, ""
     for line in KEPT.read_text("utf-8").splitlines():
         match = LINE.fullmatch(line)

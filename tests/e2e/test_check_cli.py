@@ -1,4 +1,4 @@
-"""`baker check` from outside: exit codes, JSON, SARIF, JUnit, what is ignored and where that is said."""
+"""`baker check` on the command line: exit codes, JSON, SARIF, JUnit, and the places of `ignore`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from baker.cli.app import run  # noqa: E402
 
 
 def check(*arguments):
-    """Run in process; return exit code and the JSON object."""
+    """Run `baker check` in this process; return the exit code and the JSON object."""
     out = io.StringIO()
     code = run(["check", *map(str, arguments), "--json", "-q"], out=out)
     return code, json.loads(out.getvalue())
@@ -51,7 +51,7 @@ def test_an_error_fails_and_has_all_keys(overlap):
     found = next(f for f in result["findings"] if f["code"] == "uv.overlap")
     assert {"code", "severity", "object", "node", "count", "message", "fix"} <= set(found)
     assert (found["severity"], found["object"], found["node"]) == ("error", "part 0", 0)
-    # Two squares of 0.5 overlap by 0.1 x 0.5.
+    # Two squares of side 0.5 overlap in a rectangle of 0.1 x 0.5.
     assert found["percent"] == pytest.approx(10.0, abs=0.3)
     assert all(a != b for a, b in found["pairs"])
 
@@ -197,7 +197,7 @@ def test_cost_by_the_speed_of_a_bake(tmp_path):
     texels = round(0.8 * 64 * 64)
     assert cost["texels"] == texels
     assert cost["rays"] == {"inside geometry": 4 * texels, "ambient occlusion": 10 * texels}
-    # 2 s a million rays, 1 s ten thousand texels.
+    # Estimated rates: 2 s for a million rays, 1 s for ten thousand texels.
     assert cost["seconds"] == pytest.approx(14 * texels * 2e-6 + texels * 1e-4, abs=0.01)
 
 
@@ -222,7 +222,7 @@ def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):
         _, result = check(path, *arguments, *more)
         return next(f for f in result["findings"] if f["code"] == "cost")
 
-    # Other scenes' bakes, broken ones and folders that are none.
+    # These folders must be ignored: bakes of other scenes, broken manifests, and folders without a bake.
     bake_beside(path, "other", 9.0, of="other.glb")
     bake_beside(path, "hollow", 9.0, timings=None)
     bake_beside(path, "odd", 9.0, input=[])
@@ -236,7 +236,7 @@ def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):
     found = cost()
     assert found["basis"] == "the bake in 'later'"
     assert found["seconds"] == pytest.approx(14 * round(0.8 * 64 * 64) * 2e-3, rel=0.01)
-    # With it nothing is measured, and a bake that is named counts before one that is found.
+    # With an earlier bake, `--cost` measures no rates. `--rates` takes precedence over a bake that is found.
     assert cost("--cost")["basis"] == "the bake in 'later'"
     assert cost("--rates", tmp_path / "first")["seconds"] < found["seconds"] / 100
 

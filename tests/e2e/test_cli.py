@@ -1,4 +1,4 @@
-"""The command line: flags from the settings, config files, exit codes, JSON, progress, start-up."""
+"""The command line: flags made from settings, configuration files, exit codes, JSON, progress, start time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MANIFEST = {
 
 
 class FakePipeline:
-    """Stands in for `baker.pipeline.bake`: remembers how it was called, then answers or fails."""
+    """Replaces `baker.pipeline.bake`: records its arguments, then returns a result or raises an error."""
 
     def __init__(self):
         self.calls = []
@@ -67,7 +67,7 @@ def bake_words(tmp_path, *more):
     return ("bake", "scene.glb", "-o", tmp_path / "out", *more)
 
 
-# A value other than the default for every setting; a setting missing here fails the test below.
+# {setting: a value other than the default}; the test below fails if a setting is missing.
 OTHER = {
     "allow_outside": (None, True),
     "channels": ("ao", ("ao",)),
@@ -299,7 +299,7 @@ def test_plain_progress_is_a_line_now_and_then():
         answers = [reporter("gather", k / 10, "23.1 Mrays/s") for k in range(11)]
     assert not any(answers)
     lines = stream.getvalue().splitlines()
-    # One second passes between two reports and three between two lines.
+    # The fake clock advances one second between reports; a line is printed at most every three seconds.
     assert lines[0] == "gather:  20 %  23.1 Mrays/s  8 s left"
     assert len(lines) == 3
 
@@ -325,7 +325,7 @@ def test_progress_answers_the_stop_flag():
 
 @pytest.mark.timed
 def test_help_is_quick_and_imports_nothing_heavy():
-    # The fastest of three: other work on the machine may slow any one of them.
+    # Take the fastest of three runs, because other processes may slow single runs.
     seconds = []
     for _ in range(3):
         began = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The same bytes in every file for one thread and two, and for two runs."""
+"""All files are byte-identical for one thread, for two threads, and for a second run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def bake(out, *, threads, seed=0):
         if path.is_file()
     }
     manifest = json.loads(files.pop("bake.json"))
-    # When it ran and how long it took are all that may differ.
+    # Only the time of the bake and its duration may differ.
     for key in ("timings", "created"):
         del manifest[key]
     return files, manifest

@@ -1,4 +1,4 @@
-"""`baker diff`: nothing where nothing differs, and what differs where it does."""
+"""`baker diff` reports no difference for equal bakes, and the right object and figures for changed ones."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def other(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def doubled(first, tmp_path_factory) -> tuple[Path, int]:
-    """Twice the light on one object."""
+    """Return a copy of the bake in which one object has twice the light, and the node of that object."""
     out = tmp_path_factory.mktemp("diff") / "doubled"
     shutil.copytree(first, out)
     stored = read_bake(out)
@@ -83,7 +83,7 @@ def test_another_layout_differs_by_noise_alone(first, other):
     code, found = told(first, other)
     assert code == 0
     light, ao = found["channels"]["irradiance"], found["channels"]["ao"]
-    # Noise of 64 rays a texel, and what half a texel's blur does to edges of shadows.
+    # Differences come from the noise of 64 rays a texel, and from the blur of shadow edges by half a texel.
     assert abs(light["bias"]) < 0.002
     assert abs(ao["bias"]) < 0.002
     assert 0 < light["median"] < 0.01
@@ -105,7 +105,7 @@ def test_the_object_whose_light_was_doubled_is_named(first, other, doubled):
     code, found = told(out, first)
     assert code == 0
     bias = {entry["node"]: entry["channels"]["irradiance"]["bias"] for entry in found["objects"]}
-    # Beside the borders of its charts its points lean on texels that were left alone.
+    # Near chart borders, lookups include texels whose light was not doubled.
     assert bias.pop(node) == pytest.approx(1.0, abs=0.02)
     assert all(abs(value) < 1e-6 for value in bias.values())
     assert {entry["node"] for entry in found["worst"]} == {node}
@@ -117,7 +117,7 @@ def test_the_object_whose_light_was_doubled_is_named(first, other, doubled):
     assert max(flip, key=flip.__getitem__) == node
     assert found["channels"]["ao"]["max"] == 0.0
     assert [w["object"] for w in found["warnings"]] == ["irradiance_0.exr"]
-    # Against another layout the same is seen through the noise.
+    # Compared with a bake of another layout, the same object differs, within the noise.
     _, found = told(out, other, "--no-flip", "--texels", "3000")
     bias = {entry["node"]: entry["channels"]["irradiance"]["bias"] for entry in found["objects"]}
     assert bias.pop(node) == pytest.approx(1.0, abs=0.05)
@@ -185,7 +185,7 @@ def test_an_object_of_one_side_only(first, tmp_path):
     assert [entry["node"] for entry in found["only_in_a"]] == [7]
     assert found["only_in_b"] == []
     assert list(found["channels"]) == ["irradiance"]
-    # The shelf shades the floor below it.
+    # The largest difference is on the floor, in the shadow of the shelf.
     floor = next(entry for entry in found["objects"] if entry["node"] == found["worst"][0]["node"])
     assert floor["channels"]["irradiance"]["max"] > 0.5
     _, found = told(first, shelf, "--no-flip")

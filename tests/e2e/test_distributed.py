@@ -1,4 +1,4 @@
-"""More than one machine, played by processes on the loopback: a scheduler and two workers."""
+"""Distributed bakes with a scheduler and two workers as processes on this machine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pytest.importorskip("distributed")
 
 ASSETS = Path(__file__).parents[2] / "assets"
 SETTINGS = {"resolution": 64, "samples": 8, "ao_samples": 4, "denoise": False, "threads": 1}
-# A worker that reports another version of baker.
+# Program of a worker that reports another version of baker.
 OTHER = """
 import importlib.metadata as metadata
 import sys
@@ -38,7 +38,7 @@ main()
 
 
 class Machines:
-    """A scheduler and workers without nannies: who is killed stays dead."""
+    """A scheduler and workers without nanny processes, so a killed worker is not restarted."""
 
     def __init__(self, folder):
         self.file = folder / "scheduler.json"
@@ -101,7 +101,7 @@ def same(first, second):
 
 
 def content(folder):
-    """Hash the files of a bake, without times."""
+    """Return {file name: hash} of a bake; times are removed from the manifest first."""
     found = {}
     for path in sorted(folder.iterdir()):
         data = path.read_bytes()
@@ -167,7 +167,7 @@ def test_another_version_is_refused_and_both_are_named(machines, tmp_path):
 
 
 def test_a_worker_killed_in_the_middle_costs_its_tiles_only(machines, alone):
-    """The last test of these machines: one of them is gone afterwards."""
+    """The bake finishes without the killed worker. Must be the last test that uses `machines`."""
     victim = machines.workers[0]
     fractions = []
 

@@ -37,7 +37,7 @@ def quads(*corners):
 
 
 def crate(low, high):
-    """Return the six faces of a box, outwards, as corners of quads."""
+    """Return the six faces of a box as corners of quads, fronts outwards."""
     (x, y, z), (X, Y, Z) = low, high
     return [
         [(x, Y, z), (x, Y, Z), (X, Y, Z), (X, Y, z)], [(x, y, z), (X, y, z), (X, y, Z), (x, y, Z)],
@@ -47,10 +47,10 @@ def crate(low, high):
 
 
 def spoiled_room() -> GltfBuilder:
-    """Return a floor with a crate under a light, each with defects that a bake survives.
+    """Return a floor with a crate under a light, with defects that do not prevent a bake.
 
-    The floor has doubled and flat faces and no normals; the crate is a heap of triangles whose lightmap uv
-    all lie upon each other.
+    The floor has duplicate faces, faces without area and no normals. The triangles of the crate share no
+    vertices, and their lightmap uv all overlap.
     """
     b = GltfBuilder()
     b.add("materials", {"pbrMetallicRoughness": {"baseColorFactor": [0.6, 0.5, 0.4, 1], "metallicFactor": 0}})
@@ -88,7 +88,7 @@ def test_the_fixed_file_bakes_to_the_same_picture(room, tmp_path):
     for name, n_faces in (("floor", 2), ("crate", 12)):
         assert (two.name == name).sum() == n_faces
         points, normals = one.surface_points(name, 150, rng)
-        # Right at the crate's edges a texel holds shade in one layout and none in the other.
+        # Points near the crate's edges are excluded: there a texel may be in shade in one layout only.
         clear = (np.abs(points).max(axis=1) > 0.6) if name == "floor" else (np.abs(points[:, 1] - 0.5) < 0.4)
         where = points[clear], normals[clear]
         for channel in ("irradiance", "ao"):
@@ -114,7 +114,7 @@ def test_json_lists_what_was_fixed_and_what_is_left(room, tmp_path):
     ]
     assert told["left_alone"] == []
     assert told["out"] == str(tmp_path / "fixed.glb")
-    # The same codes are no longer found.
+    # `check` no longer reports these codes.
     fixable = {"zero-area", "duplicate-faces", "duplicate-vertices", "missing-normals", "uv-overlap"}
     _, before = check(room, "--json", "-q")
     assert fixable & {f["code"] for f in json.loads(before)["findings"]}
@@ -173,7 +173,7 @@ def test_repair_without_its_library_is_one_sentence(room, tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_third_party_scenes_are_fixed_once(path, tmp_path):
-    """Each comes out readable, with every material as it was; a second time there is nothing left to fix."""
+    """The fixed file is readable and has the same materials; fixing the fixed file changes nothing."""
     first, second = tmp_path / "first.glb", tmp_path / "second.glb"
     code, text = check(path, "--fix", "-o", first, "--json", "-q", "--resolution", "256")
     assert code in (0, 1), text

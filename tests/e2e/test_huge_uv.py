@@ -1,4 +1,4 @@
-"""Texture coordinates of any size in a file give finite light of the right colour, and a warning."""
+"""Texture coordinates of any size give finite light of the correct colour, and a warning if they are huge."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PIXELS = np.random.default_rng(5).integers(0, 256, (16, 16, 4), np.uint8)
 
 
 def textured(path: Path, scale: float, transform: float, **material: object) -> Path:
-    """A unit square whose texture repeats `scale` x `transform` times."""
+    """Write a file with a unit square whose texture repeats `scale` x `transform` times along each side."""
     builder = GltfBuilder()
     texture: dict[str, object] = {"index": builder.image(encode_png(PIXELS))}
     if transform != 1.0:
@@ -54,7 +54,7 @@ def test_light_stays_finite(tmp_path: Path, scale: float, transform: float, mate
 
 
 def test_the_light_of_very_many_repeats_is_that_of_their_mean(tmp_path: Path) -> None:
-    """A square lights another one a metre in front of it, as one of the texture's mean colour does."""
+    """An emissive square with very many repeats lights a square 1 m away as the texture's mean colour does."""
     mean = [float(x) for x in linear_from_srgb(PIXELS[..., :3] / 255.0).mean((0, 1))]
     found = []
     for scale, factor in ((1e20, [1.0, 1.0, 1.0]), (None, mean)):
@@ -65,7 +65,7 @@ def test_the_light_of_very_many_repeats_is_that_of_their_mean(tmp_path: Path) ->
         uv = (QUAD[:, :2].astype(np.float64) * (scale or 1.0)).astype(np.float32)
         given = {"NORMAL": QUAD_NORMAL, "TEXCOORD_0": uv, "material": builder.add("materials", material)}
         builder.node(mesh=builder.mesh(builder.primitive(QUAD, QUAD_TRIANGLE, **given)))
-        # Turned by half a turn about y, so that the two fronts face each other.
+        # Rotated by 180 degrees about y, so that the two fronts face each other.
         builder.node(
             mesh=builder.mesh(builder.primitive(QUAD, QUAD_TRIANGLE, NORMAL=QUAD_NORMAL)),
             translation=[1, 0, 1],
@@ -75,10 +75,11 @@ def test_the_light_of_very_many_repeats_is_that_of_their_mean(tmp_path: Path) ->
         result = baker.bake(scene, resolution=64, samples=64, denoise=False)
         value = result.lightmaps["irradiance"].value[result.status == TexelStatus.COVERED]
         found.append(value[value.sum(axis=-1) > 0])
-    # From the centre of the other square F is 4 / pi * A / sqrt(1 + A^2) * atan(A / sqrt(1 + A^2)), A = 1/2
-    # (Howell, configuration B-4).
+    # From the centre of the other square the form factor F is 4 / pi * A / sqrt(1 + A^2) * atan(A / sqrt(1 +
+    # A^2)), A = 1/2 (Howell, configuration B-4).
     side = 0.5 / np.sqrt(1.25)
     centre = 4.0 / np.pi * side * np.arctan(side)
     np.testing.assert_allclose(found[1].max(axis=0), np.pi * centre * np.array(mean), rtol=0.01)
-    # 64 samples of a texel see a texel of the texture each: noise of 0.11, and 0.003 in the mean of all.
+    # Each of the 64 samples of a lightmap texel hits one texel of the texture. The relative noise is 0.11 for
+    # one lightmap texel and 0.003 for the mean of all.
     np.testing.assert_allclose(found[0].mean(axis=0), found[1].mean(axis=0), rtol=0.015)

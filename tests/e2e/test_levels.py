@@ -1,7 +1,7 @@
-"""Levels as designers build them, with known answers, looked up at points of surfaces as an engine does.
+"""Irradiance in levels built like those of games, sampled at surface points as an engine samples it.
 
-What no light can reach is dark; light that does not bounce has closed forms; the rest was path-traced once
-(15,360 paths a point) and stands here with its standard error.
+The expected values are 0 where no light can arrive, closed forms where no light is reflected, and
+otherwise path-traced once (15,360 paths a point) and given with their standard error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ASSETS = Path(__file__).parents[2] / "assets"
 FOLDER = ASSETS / "levels"
 KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
 UP, DOWN, EAST, WEST, NORTH, SOUTH = (0, 1, 0), (0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1), (0, 0, 1)
-# Shares of the light outside that may arrive in the dark: in the open, and within a texel of other surfaces.
+# Largest E in a dark room as a share of E outside: far from other surfaces, and within a texel of them.
 AWAY, BESIDE = 1e-4, 1e-3
 
 
@@ -32,7 +32,7 @@ def bake(name, resolution=192, samples=64, **settings):
 
 
 def texel(probe, name):
-    """Return the width of an object's texels, metres."""
+    """Return the width of an object's texels in metres."""
     names = [instance.name for instance in probe.result.scene.instances]
     return 1.0 / probe.result.atlas.layouts[names.index(name)].texels_per_metre
 
@@ -63,14 +63,15 @@ def test_closed_rooms_on_a_floor_that_runs_on_outside_are_dark():
         away += [(x - 1.5, 1.3, z + b, EAST) for b in (-1.1, 0, 1.1)]
         ceiling = 2.5 if kind.startswith("thin") else 2.4625
         away += [(x + a, ceiling, z, DOWN) for a in (-1.1, 0, 1.1)]
-        # A texel of the floor that lies on both sides of a wall has one value: look a texel away from it.
+        # A floor texel that lies on both sides of a wall has one value, so sample one texel away from the
+        # wall.
         b = 1.5 - 1.05 * width
         beside = [(x + a, 0.0, z + c, UP) for a in (-1.2, 0.4, 1.2) for c in (-b, b)]
         beside += [(x + a, 0.05, z + 1.5, NORTH) for a in (-1.2, 0.4, 1.2)]
         assert light(probe, away).max() < AWAY * outside, kind
         assert light(probe, beside).max() < BESIDE * outside, kind
     assert light(probe, [(2.5, 2.65, 0, UP)]) == pytest.approx(outside, rel=2e-3)
-    # Path-traced between the rooms and before them, +- 0.3 %.
+    # Path-traced values outside, between the rooms and in front of them, standard error 0.3 %.
     found = light(probe, [(0, 0, 0.3, UP), (-7, 0, 3.3, UP), (2.5, 1.3, 1.667, SOUTH)])[:, 1]
     assert found == pytest.approx([2199, 2679, 2830], rel=0.02)
 
@@ -90,7 +91,7 @@ def test_a_shut_garage_is_dark_whatever_reaches_through_its_walls():
     assert light(probe, away).max() < AWAY * outside
     assert light(probe, beside).max() < BESIDE * outside
     assert light(probe, [(1.5, 2.65, 0.5, UP)]) == pytest.approx(outside, rel=2e-3)
-    # Path-traced: the floor outside, a beam's end, a wall; +- 0.1 %.
+    # Path-traced values on the floor outside, a beam's end and a wall, standard error 0.1 %.
     found = light(probe, [(0, 0, 4.5, UP), (3.6, 2.33, 0.1, EAST), (3.08, 1.4, -0.8, EAST)])[:, 0]
     assert found == pytest.approx([1443.6, 1436.7, 1291.2], rel=0.02)
 
@@ -103,12 +104,12 @@ def test_rooms_of_a_sunlit_street_have_their_own_light():
     width = 1.05 * texel(probe, "street")
     beside = [(-8, 0, -5 + width, UP), (-6 - width, 0, -3, UP), (-9, 0.06, -5, SOUTH)]
     assert light(probe, beside).max() < BESIDE * sun
-    # A bulb of 60 cd behind closed doors, path-traced, +- 0.2 to 0.5 %.
+    # Path-traced values for a bulb of 60 cd in a closed room, standard error 0.2 to 0.5 %.
     places = [(8.8, 0, -1.9, UP), (10, 1.2, -3.6, WEST), (8, 2.55, -2.4, DOWN), (8.2, 0.75, -3, UP)]
     assert light(probe, places)[:, 1] == pytest.approx([29.32, 29.45, 77.26, 65.26], rel=0.08)
     dim = light(probe, [(7 + a, 0, -4.4 + b, UP) for a in (-0.3, 0, 0.3) for b in (-0.3, 0, 0.3)])[:, 1]
     assert dim.mean() == pytest.approx(25.84, rel=0.03)
-    # In the sun and in the shade, +- 0.8 %.
+    # Path-traced values in the sun and in the shade, standard error 0.8 %.
     found = light(probe, [(4.5, 0, -0.5, UP), (11, 0, 4, UP), (-4.5, 0, -2, UP)])[:, 1]
     assert found == pytest.approx([48105, 46769, 8571], rel=0.04)
 
@@ -130,7 +131,7 @@ def test_signs_of_a_few_lit_pixels_shine_with_their_power():
         cosine = np.maximum(arm @ np.array(normal), 0) * -arm[:, 0] / square
         truth.append(20_000.0 * size * (cosine / square).sum())
     found = light(probe, places)[:, 0] / np.array(truth)
-    # Its mean has the noise of 40 places; each one that of 256 samples, after the denoiser.
+    # The mean averages 40 points; a single point has the noise of 256 denoised samples.
     assert found.mean() == pytest.approx(1, abs=0.01)
     assert found == pytest.approx(1, abs=0.1)
 
@@ -139,7 +140,7 @@ def test_a_hundred_lights_add_up():
     probe = bake("warehouse", 192, 16, bounces=0)
     k = np.arange(100)
     point = np.stack([-13.5 + 3 * (k % 10), 6.0 + 0.1 * (k % 7), -18.0 + 4 * (k // 10)], axis=1)
-    # Above the racks, where every light is seen.
+    # Points above the racks, from which every light is visible.
     places = [(-15, 3.2, z, EAST) for z in (-15.0, -3.0, 7.0)] + [(15, 4.1, z, WEST) for z in (-9.0, 2.0)]
     places += [(x, 3.4, 20, NORTH) for x in (-8.0, 0.0, 9.0)]
     truth = []

@@ -1,4 +1,4 @@
-"""The recipes of docs/BATCH.md do what they say: the Makefile whole, the pipelines' shell lines."""
+"""The recipes of docs/BATCH.md work: the whole Makefile, and the shell lines of the CI pipelines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import yaml
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
-# As quick as can be: the bake is coarse, and its verification not a strict one.
+# Settings of the shortest verification; the bakes are coarse, too.
 QUICK = "--texels 20 --spp 4"
 LIMITS = "irradiance.median > 0.5"
 
@@ -55,7 +55,7 @@ def make(folder, limits=LIMITS):
 
 
 def told(folder, name):
-    """Return the sums of a JUnit file: cases, failures."""
+    """Return the numbers of test cases and failures of a JUnit file."""
     root = ElementTree.parse(folder / "reports" / name).getroot()
     return int(root.get("tests")), int(root.get("failures"))
 
@@ -65,20 +65,20 @@ def test_the_makefile(game):
     assert code == 0, text
     assert [told(game, f"{name}.xml") for name in ("batch", "verify-cornell")] == [(1, 0), (1, 0)]
 
-    # Then there is nothing to do, although the scene's file time changed.
+    # A second run does nothing, although the scene's file time changed.
     (game / "levels" / "cornell.glb").touch()
     code, text = make(game)
     assert code == 0, text
     assert "0 baked, 1 unchanged" in text
     assert "baker verify" not in text
 
-    # Another setting: another bake, and a verification, which this time nothing could pass.
+    # A changed setting causes a new bake and a verification, with limits that no bake can pass.
     write_jobs(game, 32)
     code, text = make(game, "irradiance.median > 0.000001")
     assert code != 0
     assert "1 baked, 0 unchanged" in text
     assert told(game, "verify-cornell.xml") == (1, 1)
-    # The bake stays, and its stamp is the old one: it will be checked again.
+    # The new bake is kept, and the stamp is older than the bake, so the next run verifies it again.
     stamp, bake = game / "reports" / "cornell.verified", game / "baked" / "cornell" / "bake.json"
     assert stamp.stat().st_mtime < bake.stat().st_mtime
 
@@ -94,7 +94,7 @@ def test_the_makefile_stops_at_a_scene_that_is_no_scene(game, tmp_path):
 
 
 def github():
-    """Return the shell lines of the GitHub recipe, step by step, and its variables."""
+    """Return the shell lines of each step of the GitHub recipe, and its variables."""
     job = yaml.safe_load((RECIPES / "github-actions.yml").read_text("utf-8"))["jobs"]["bake"]
     assert job["defaults"]["run"]["shell"] == "bash"
     return [step["run"] for step in job["steps"] if "run" in step], job["env"]
@@ -109,7 +109,7 @@ def gitlab():
 @pytest.mark.parametrize("recipe", [github, gitlab])
 def test_the_lines_of_a_pipeline(game, tmp_path, recipe):
     folder = tmp_path / "game"
-    # What the cache brings.
+    # Copy the bakes, as if they came from the cache of the CI service.
     shutil.copytree(game, folder, ignore=shutil.ignore_patterns("reports"))
     steps, variables = recipe()
     assert steps[0].startswith("pip install ")
@@ -122,12 +122,12 @@ def test_the_lines_of_a_pipeline(game, tmp_path, recipe):
     assert "0 baked, 1 unchanged" in text
     found = sorted(path.name for path in (folder / "reports").iterdir())
     assert found == ["batch.xml", "check.xml", "verify-cornell.xml"]
-    # The exit code of a verification counts for the job, here a limit with an unknown name.
+    # If a verification fails, here because of a limit with an unknown name, the job fails.
     code, said = shell(folder, steps[-1], limits="irradiance.nothing > 1")
     assert code != 0
     assert "nothing" in said
 
 
 def shell(folder, lines, limits=LIMITS):
-    """Run lines as both services do: they end at the first one that fails."""
+    """Run shell lines with the options of both services: stop at the first line that fails."""
     return run(folder, "bash", "-eo", "pipefail", "-c", lines, VERIFY=QUICK, LIMITS=limits)

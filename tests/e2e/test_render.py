@@ -1,4 +1,4 @@
-"""`baker render`: cameras, layers, closed forms of simple views, refusals, files whole or not there."""
+"""`baker render`: cameras, layers, closed forms of simple views, errors, and no partly written files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from baker.rendering.settings import RenderSettings
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 CORNELL = ASSETS / "cornell.glb"
 SMALL = ("--width", "16", "--height", "12", "--spp", "4")
-# Two metres before the middle of the unit square, which fills the view.
+# A camera 2 m in front of the centre of the unit square, which fills the picture.
 FRONT = "0.5,0.5,2,0.5,0.5,0,20"
 LIGHT = (3.0, 2.0, 1.0)
 
@@ -44,7 +44,7 @@ def planes(path):
 
 @pytest.fixture(scope="module")
 def emissive(tmp_path_factory) -> Path:
-    """The unit square: albedo 0.6, 0.4, 0.2, emission `LIGHT`."""
+    """Write the unit square with albedo (0.6, 0.4, 0.2) and emission `LIGHT`."""
     colours = {"pbrMetallicRoughness": {"baseColorFactor": [0.6, 0.4, 0.2, 1], "metallicFactor": 0}}
     strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 3.0}}
     emission = [value / 3 for value in LIGHT]
@@ -73,7 +73,7 @@ def test_an_emitter_and_its_layers_are_exact(emissive, tmp_path):
         assert found[f"variance.{channel}"] == pytest.approx(0, abs=1e-9)
         assert found[f"albedo.{channel}"] == pytest.approx(albedo, rel=1e-5)
     assert [np.unique(found[f"normal.{axis}"]).tolist() for axis in "XYZ"] == [[0], [0], [1]]
-    # Depth is along the ray: 2 / cos of its angle, and each ray lies within its pixel.
+    # Depth is measured along the ray: 2 / cos(angle). A ray passes through a random point of its pixel.
     depth, high = found["depth.Z"], math.tan(math.radians(10))
     row, column = np.mgrid[:12, :16]
     for which, sign in (("least", 1), ("most", -1)):
@@ -110,7 +110,7 @@ def test_the_files_camera_is_that_of_the_flag(tmp_path):
 
 
 def test_a_turned_camera_of_the_file(tmp_path):
-    # Turned by 90 degrees about +Y it looks along -X, onto an emitter that faces it.
+    # Rotated by 90 degrees about +Y the camera looks along -X, at the front of an emitter.
     builder = quad_builder(emissiveFactor=[1, 1, 1])
     half = math.sqrt(0.5)
     builder.json["nodes"][0]["rotation"] = [0, half, 0, half]
@@ -127,7 +127,7 @@ def test_a_turned_camera_of_the_file(tmp_path):
 
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory) -> Path:
-    """The unit square and four cameras: eye, top, 0 (the third) and another eye."""
+    """Write the unit square with four cameras named "eye", "top", "0" and again "eye"."""
     builder = quad_builder(emissiveFactor=[1, 1, 1])
     for k in range(4):
         fov = 0.3 + 0.1 * k
@@ -181,7 +181,7 @@ def test_no_camera_is_one_sentence_with_a_view_that_works(emissive, tmp_path):
     assert told(emissive, "-o", tmp_path / "a.exr", *SMALL, "--camera", hint)[0] == 0
     seen = planes(tmp_path / "a.exr")[0]["R"]
     assert seen[4:8, 6:10].min() > 0
-    # All of it is in view: nothing is lit at the picture's edge.
+    # The whole square is visible, so all pixels at the picture's edge are black.
     assert max(seen[0].max(), seen[-1].max(), seen[:, 0].max(), seen[:, -1].max()) == 0
 
 
@@ -246,7 +246,7 @@ def test_what_cannot_be_read(tmp_path, baked):
 def test_the_same_bytes_for_any_threads_and_again(argv, tmp_path, baked):
     argv = [*argv, baked] if argv == ("--lightmap",) else argv
     runs = []
-    # More pixels than one block of them.
+    # The picture has more pixels than one block of the renderer.
     size = ("--width", 150, "--height", 120, "--spp", 2)
     size = SMALL if "bdpt" in argv or "mis" in argv else size
     for number, threads in enumerate((1, 2, 2)):
@@ -261,7 +261,7 @@ def test_the_same_bytes_for_any_threads_and_again(argv, tmp_path, baked):
 
 
 def test_variance_is_that_of_the_mean():
-    # Of 20 pictures the spread in each pixel is what the pictures themselves say.
+    # The variance of a pixel over 20 seeds equals the mean variance that the pictures report.
     pictures = [render(CORNELL, RenderSettings(width=16, height=12, spp=32, seed=s)) for s in range(20)]
     spread = np.var([p.colour for p in pictures], axis=0, ddof=1)
     said = np.mean([p.variance for p in pictures], axis=0)
@@ -280,8 +280,8 @@ def test_depth_one_shows_emitters_and_their_direct_light_only(tmp_path):
 
 
 def test_ambient_occlusion_of_known_places(tmp_path):
-    # Two squares at a right angle: at y above the edge the wall's AO is 1 - (1 - y / hypot(y, 1)) / 2
-    # for an endless floor one metre deep.
+    # Wall and floor meet at a right angle. For an infinitely long floor, 1 m deep, the AO of the wall at
+    # height y is 1 - (1 - y / hypot(y, 1)) / 2.
     builder = GltfBuilder()
     wall = np.float32([[-50, 0, 0], [50, 0, 0], [50, 1, 0], [-50, 1, 0]])
     floor = np.float32([[-50, 0, 1], [50, 0, 1], [50, 0, 0], [-50, 0, 0]])
@@ -289,7 +289,7 @@ def test_ambient_occlusion_of_known_places(tmp_path):
     builder.node(mesh=builder.mesh(builder.primitive(wall, triangle), builder.primitive(floor, triangle)))
     scene = write(tmp_path / "corner.glb", builder)
     out, height = tmp_path / "a.exr", 0.4
-    # So narrow a view that all of it is one height.
+    # The field of view is so small that all pixels show nearly the same height.
     camera = f"0,{height},5,0,{height},0,0.01"
     for distance, expected in (("0.1", 1.0), ("inf", 1 - 0.5 * (1 - height / math.hypot(height, 1)))):
         argv = ("--ao", "--ao-distance", distance, "--width", 16, "--height", 16, "--spp", 256)
@@ -332,7 +332,7 @@ def test_a_bake_shows_what_path_tracing_shows(baked, tmp_path):
     shown = render(CORNELL, RenderSettings(**size, spp=64, lightmap=baked))
     assert shown.warnings == []
     found, expected = shown.colour.mean(axis=2), truth.colour.mean(axis=2)
-    # The emitter is the same in both, but few pixels at its edge would decide.
+    # Exclude the emitter, because a few pixels at its edge would dominate the means.
     seen = (expected > 0) & (expected < 0.1 * expected.max())
     assert seen.sum() > 1000
     assert found[seen].mean() == pytest.approx(expected[seen].mean(), rel=0.03)
@@ -363,7 +363,7 @@ def test_a_time_limit_ends_it(more):
     picture = render(CORNELL, RenderSettings(width=64, height=48, time_limit=1.0, **more))
     assert picture.seconds < 3
     assert picture.spp > 4
-    # With a number of samples, too, whichever comes first.
+    # With `spp` and `time_limit`, rendering stops at the limit that is reached first.
     assert render(CORNELL, RenderSettings(width=16, height=12, spp=8, time_limit=60)).spp == 8
 
 
@@ -403,7 +403,7 @@ def test_a_tampered_bake_is_shown_as_it_is(baked, tmp_path):
     size = {"width": 16, "height": 12, "spp": 4}
     once, twice = (render(CORNELL, RenderSettings(**size, lightmap=folder)) for folder in (baked, out))
     assert [w.object for w in twice.warnings] == ["irradiance_0.exr"]
-    # Emitters themselves stay as they are.
+    # The map does not change the emission of emitters, so compare the median.
     lit = once.colour > 0
     assert np.median(twice.colour[lit] / once.colour[lit]) == pytest.approx(2, rel=1e-3)
 

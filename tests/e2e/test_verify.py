@@ -1,4 +1,4 @@
-"""`baker verify`: sound bakes pass, bakes that were tampered with do not."""
+"""`baker verify`: correct bakes pass, and changed bakes fail."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_a_sound_bake_passes(sound):
     assert light["texels"] == ao["texels"] == pytest.approx(400, abs=20)
     assert abs(light["bias"]) < 0.01
     assert light["median"] < 0.03
-    # Most of that is the reference's own noise, which is reported.
+    # Most of the median is noise of the reference, which `noise_floor` reports.
     assert 0.3 * light["median"] < light["noise_floor"] < light["median"] * 1.2
     assert ao["rmse"] < 0.02
     assert light["shift"] == [0, 0]
@@ -112,7 +112,7 @@ def test_tampering_is_caught(sound, tmp_path, name):
     assert code == 1
     assert found["passed"] is False
     assert found["problems"] or any(limit["failed"] for limit in found["limits"])
-    # The file is compared as it is, and reported as changed.
+    # `verify` uses the changed file and warns that its hash differs.
     assert [w["object"] for w in found["warnings"]] == ["irradiance_0.exr"]
     if "shifted" in name:
         assert found["channels"]["irradiance"]["shift"] != [0, 0]
@@ -129,7 +129,8 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
     assert (code, [v["failed"] for v in after["limits"]]) == (1, [True, False])
     figures = [found["channels"]["irradiance"] for found in (before, after)]
     ratio = [found["energy_ratio"] for found in figures]
-    # Rounding to half floats reorders texels by brightness, so some of the chosen ones are others.
+    # Texels are chosen by their order of brightness, which rounding to half floats changes, so the two sets
+    # of texels differ slightly.
     error = np.hypot(*(found["energy_ratio_se"] for found in figures))
     assert ratio[1] / ratio[0] == pytest.approx(1.03, abs=4 * error)
     stream = StringIO()
@@ -147,7 +148,7 @@ def test_texels_stand_for_the_surface_of_their_objects(sound):
     owner = instance_map(geometry, 1, 128).reshape(-1)
     pixel = np.flatnonzero(owner >= 0)
     size = np.bincount(owner[pixel], weights=surface_points(geometry, pixel, 128, 4, 0).surface)
-    # Walls of 2 x 3 x 2 m, the emitter, the block's sides of 0.6 m.
+    # The six largest areas are the walls of a room of 2 x 3 x 2 m.
     np.testing.assert_allclose(np.sort(size[:6]), [4, 4, 6, 6, 6, 6], rtol=0.02)
     assert size[6] == pytest.approx(0.48, rel=0.06)
     np.testing.assert_allclose(size[7:], 0.36, rtol=0.06)
@@ -193,7 +194,7 @@ def test_reports(sound, tmp_path):
     assert text.count("data:image/png;base64,") >= 4 + 9
     assert "http" not in text.replace("http-equiv", "")
     assert "energy_ratio_se" in text
-    # No table is wider than a page of 1200 pixels: figures are rows, long tables scroll.
+    # At most 8 columns, so that a table fits a page of 1200 pixels; figures are rows.
     assert max(row.count("<th>") for row in text.split("<tr>")) <= 8
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.attrib["tests"]) >= 6
@@ -215,7 +216,7 @@ def test_a_time_limit_ends_it(sound):
 
 
 def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
-    """The first call of a kernel compiles it; a good bake must not fail because fewer paths are traced."""
+    """Compile time does not count towards `time_limit`, so a first run traces as many paths as a later run."""
     passes, real = [], tracing.irradiance_pass
 
     def slow_at_first(*args, **options):
@@ -244,6 +245,6 @@ def test_a_bake_under_a_weaker_sky_is_compared_under_it(tmp_path):
     settings = make_settings({"resolution": 64, "samples": 64, "sky": "2,2,2", "sky_strength": 0.25})
     bake(scene, settings=settings, out=tmp_path / "out")
     found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
-    # A box alone sees nothing but the sky: E = pi L.
+    # Only the sky is visible from the outside of a box: E = pi L.
     assert found.channels["irradiance"].reference == pytest.approx(0.5 * np.pi, rel=1e-3)
     assert found.channels["irradiance"].metrics["energy_ratio"] == pytest.approx(1, abs=0.002)

@@ -1,4 +1,4 @@
-"""`baker verify` on folders of every kind: moved, of one channel, of many pages, unlit, damaged."""
+"""`baker verify` on folders that were moved, have one channel, many pages or no light, or are damaged."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_moved_folder(plain, tmp_path):
     shutil.copytree(plain, moved)
     found = verify(moved, QUICK)
     assert found.passed
-    # A furnace: E = pi L / (1 - albedo), and the truth is no luckier than that.
+    # A furnace, so E = pi L / (1 - albedo) everywhere.
     assert found.channels["irradiance"].reference.mean() == pytest.approx(2 * np.pi, rel=0.01)
     assert abs(found.channels["irradiance"].metrics["bias"]) < 0.005
 
@@ -68,7 +68,7 @@ def test_nothing_is_lit(tmp_path):
     assert found.passed
     figures = found.channels["irradiance"].metrics
     assert figures["bias"] == figures["median"] == figures["max"] == 0
-    # Numbers only: what JSON cannot say is not in it.
+    # The result contains no NaN or infinity, which JSON cannot represent.
     json.dumps(found.to_dict(), allow_nan=False)
 
 
@@ -77,7 +77,7 @@ def test_sky_alone(tmp_path):
     post = box_quads((0.4, 0, 0.4), (0.6, 0.5, 0.6), inward=False)
     found = verify(baked(tmp_path / "out", quad_scene([floor, *post]), sky="2,1,0.5"), QUICK)
     assert found.passed
-    # Open ground would have pi L.
+    # Without the post, E would be pi L.
     assert found.channels["irradiance"].reference[:, 0].max() == pytest.approx(2 * np.pi, rel=0.1)
 
 

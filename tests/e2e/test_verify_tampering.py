@@ -1,7 +1,8 @@
-"""`baker verify` with its own limits: what may go wrong in a map or in a bake must not pass.
+"""`baker verify` with its default limits detects changed maps and faulty bakes.
 
-Two closed rooms side by side, one a thousand times brighter than the other. The reference is traced once, as
-it knows nothing of the maps; only the choice of texels would depend on them.
+The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference is
+traced once and used for all changed maps, because it does not depend on the maps. Only the choice of
+texels would depend on them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from baker.pipeline.bake import bake
 from baker.verification.settings import VerifySettings
 from baker.verification.verify import verify
 
-# The module, which the function of the same name hides.
+# The module `verify`; `import` would find the function of the same name.
 module = importlib.import_module("baker.verification.verify")
 SETTINGS = VerifySettings(texels=2400, spp=4096, time_limit=None)
 BAKED = {"resolution": 128, "samples": 256, "ao_distance": "0.5"}
@@ -58,7 +59,7 @@ def sound(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def first(sound):
-    """What verify finds in the sound bake, and what it traced."""
+    """Return the verification of the unchanged bake, and the traced reference."""
     traced = []
     real = module._trace
 
@@ -74,7 +75,7 @@ def first(sound):
 
 @pytest.fixture(scope="module")
 def surface(sound):
-    """Objects (H, W) of the page, and where in the world its texels lie (H, W, 3)."""
+    """Return object (H, W), -1 for none, world position (H, W, 3) and status (H, W) of the page's texels."""
     stored = read_bake(sound)
     geometry = world_geometry(stored.scene, stored.atlas)
     owner = instance_map(geometry, 1, SIZE)
@@ -113,7 +114,7 @@ def dim_room_darker(pixels, surface):
 
 
 def exchanged(pixels, surface):
-    """The red wall's light on the green one, and the other way round."""
+    """Exchange the light of the red and the green wall."""
     a, b = (np.nonzero(surface[0] == number) for number in (0, 1))
     n = min(len(a[0]), len(b[0]))
     one, two = (tuple(axis[:n] for axis in where) for where in (a, b))
@@ -128,7 +129,7 @@ def noise_in_the_dark(pixels, surface):
 
 
 def noise_of_15(pixels, where, block=1):
-    """Noise of 15 % in some texels, the same for squares of `block` texels."""
+    """Multiply some texels by noise of 15 %, constant over squares of `block` x `block` texels."""
     noise = np.random.default_rng(0).standard_normal((SIZE // block, SIZE // block))
     pixels[where] *= (1 + 0.15 * noise.repeat(block, 0).repeat(block, 1))[where][:, None].clip(0)
     return pixels
@@ -141,14 +142,14 @@ def darkest_tenth(pixels, surface):
 
 
 def below_a_thirtieth(pixels, surface):
-    # The median is that of the bright room, as the dim one is smaller.
+    # The threshold is a thirtieth of the median of the bright room.
     light = pixels.mean(axis=2)
     on = covered(surface)
     return on & (light < np.median(light[on & (surface[1][..., 0] < 2.5)]) / 30)
 
 
 def one_chart_shifted(pixels, surface):
-    """An object's texels, and what is filled around them, one column further."""
+    """Shift the texels of an object, and the dilated texels around them, by one column."""
     mine = binary_dilation(surface[0] == 3, np.ones((3, 3)))
     pixels[mine] = np.roll(pixels, 1, axis=1)[mine]
     return pixels
@@ -162,7 +163,7 @@ def box_blurred(pixels, surface):
 
 
 def eight_bits(pixels, surface):
-    """The dim room in steps of 1/255 of the page's largest value."""
+    """Round the dim room to steps of 1/255 of the page's largest value."""
     dim = surface[1][..., 0] > 2.5
     step = pixels.max() / 255
     pixels[dim] = np.round(pixels[dim] / step) * step
@@ -176,7 +177,7 @@ def black_border(pixels, surface):
 
 
 def leak(pixels, surface):
-    """A thousandth of the bright room's light at the foot of the dim room's walls."""
+    """Add a thousandth of the bright room's light at the foot of the dim room's walls."""
     x, z = surface[1][..., 0], surface[1][..., 2]
     foot = (x > 2.5) & (z < 0.1) & (surface[0] != 11) & covered(surface)
     pixels[foot] += 1e-3 * pixels[(x < 2.5) & covered(surface)].mean()
@@ -246,7 +247,7 @@ def test_the_sound_bake_passes(first):
     assert found.passed, found.problems
     assert failed(found) == set()
     assert len(found.verdicts) > 40
-    # Each room is a region, compared with its own light, and its levels are regions, too.
+    # Each room is a region, and so is each light level of a room. Errors are relative to the region's light.
     rows = [row for row in found.regions if row["channel"] == "irradiance"]
     light = {row["room"]: row["light"] for row in rows if row["level"] is None}
     bright, dim = light[0], light[1]
@@ -293,7 +294,7 @@ def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene
 
 
 def forgetful(find):
-    """Return a finder of emitters that overlooks the dim ones."""
+    """Return a wrapper of an emitter finder that ignores emitters of less than 1 cd/m2."""
 
     def found(geometry, shading, *rest):
         emission = shading.emission.copy()
@@ -305,12 +306,12 @@ def forgetful(find):
 
 @pytest.mark.parametrize("both", [False, True], ids=["the bake's", "both"])
 def test_an_emitter_that_a_finder_forgets_is_missed(tmp_path, monkeypatch, both):
-    """The path tracer has a finder of its own; and whatever that one lists, its rays meet what emits."""
+    """`verify` fails if the bake's finder or both finders miss an emitter, since reference rays hit it anyway."""
     monkeypatch.setattr("baker.pipeline.prepare.build_emitters", forgetful(build_emitters))
     if both:
         monkeypatch.setattr("baker.pathtracer.light_table.find_emitters", forgetful(find_emitters))
     bake(rooms(), settings=make_settings({**BAKED, "samples": 64}), out=tmp_path / "out")
     found = verify(tmp_path / "out", SETTINGS.changed(texels=300, spp=256))
-    # Only what rays meet at the emitter itself is left in the dim room of this bake.
+    # In this bake, the dim room gets only the light of gather rays that hit the emitter.
     assert "region_bias" in failed(found)
     assert not found.passed

@@ -1,4 +1,4 @@
-"""`baker view` from the command line: prints its address, answers requests, and ends with Ctrl-C."""
+"""`baker view` on the command line prints its address, answers requests, and ends with Ctrl-C."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def test_it_serves_until_it_is_stopped(tmp_path, number):
         start = time.monotonic()
         process.send_signal(number)
         rest, text = process.communicate(timeout=10)
-        assert time.monotonic() - start < 3  # promised is one second, on a machine that does nothing else
+        assert time.monotonic() - start < 3  # documented: one second on an idle machine
     finally:
         process.kill()
     assert process.returncode == 0
-    assert rest == ""  # one object
+    assert rest == ""  # standard output had a single JSON object
     assert "Traceback" not in text
 
 
