@@ -1,4 +1,4 @@
-"""Closed forms of illumination that the tests hold bakes against."""
+"""Closed forms of irradiance and ambient occlusion with which tests compare bakes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 
 
 def polygon_irradiance(polygon: Any, point: Any, normal: Any) -> np.ndarray:
-    """Return E / L at points (..., 3) of surfaces facing `normal` under a polygon (K, 3) of even radiance.
+    """Return E / L at points (..., 3) with the normal `normal`, from a polygon (K, 3) of constant radiance L.
 
-    E = L / 2 sum_i angle_i Gamma_i . n; the whole polygon must lie above the surface, its front is the
-    side from which its corners run counter-clockwise.
-    Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995.
+    E = L / 2 sum_i angle_i Gamma_i . n, where angle_i is the angle that edge i subtends at the point and
+    Gamma_i the unit normal of the plane through edge i and the point. The polygon must be wholly above the
+    horizon of the points. Its corners run counter-clockwise seen from its front. Based on: Lambert,
+    Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995.
     """
     point, normal = np.asarray(point, float), np.asarray(normal, float)
     arm = np.asarray(polygon, float) - point[..., None, :]
@@ -22,7 +23,7 @@ def polygon_irradiance(polygon: Any, point: Any, normal: Any) -> np.ndarray:
     length = np.linalg.norm(cross, axis=-1)
     angle = np.arctan2(length, (arm * after).sum(axis=-1))
     edge = cross / np.maximum(length, 1e-300)[..., None]
-    # Counter-clockwise seen from the lit side is clockwise seen along the contour from the point.
+    # The sign is negative because the corners run counter-clockwise as seen from the point.
     return np.maximum(-0.5 * (angle * (edge @ normal)).sum(axis=-1), 0.0)
 
 
@@ -34,16 +35,16 @@ def point_irradiance(light: Any, point: Any, normal: Any) -> np.ndarray:
 
 
 def wall_ao(distance: Any, height: float) -> np.ndarray:
-    """Return the open share of a floor at `distance` from an endless wall of that height."""
+    """Return the AO of a floor at `distance` from an infinitely long wall of `height`."""
     distance = np.asarray(distance, float)
     return 0.5 * (1 + distance / np.hypot(distance, height))
 
 
 def limited_wall_ao(distance: Any, reach: float) -> np.ndarray:
-    """Return the open share of a floor at `distance` from an endless, tall wall for rays of length `reach`.
+    """Return the AO of a floor at `distance` from an infinite wall, for rays of length `reach`.
 
-    Cosine-weighted directions project to a disc evenly; those that meet the wall in time are the
-    disc's segment x > distance / reach.
+    Cosine-weighted directions are uniform in their projection to the unit disc. Rays that hit the wall within
+    `reach` are the disc's segment x > distance / reach.
     """
     c = np.clip(np.asarray(distance, float) / reach, 0.0, 1.0)
     return 1 - (np.arccos(c) - c * np.sqrt(1 - c * c)) / np.pi
@@ -62,9 +63,10 @@ def solid_angle(triangle: Any, point: Any) -> np.ndarray:
 
 
 def spot_flux(inner: float, outer: float) -> float:
-    """Return the flux of a spot of one candela, whose light falls with the squared share of the cone's rim.
+    """Return the flux, lm, of a glTF spot light of one candela.
 
-    The integral of ((cos - cos_o) / (cos_i - cos_o))^2 from cos_o to cos_i is a third of the way.
+    Between the cones, the fall-off is ((cos - cos_o) / (cos_i - cos_o))^2, whose integral over cos is
+    (cos_i - cos_o) / 3.
     """
     ci, co = np.cos(inner), np.cos(outer)
     return float(2 * np.pi * ((1 - ci) + (ci - co) / 3))
@@ -77,16 +79,16 @@ def parallel_squares() -> float:
 
 
 def perpendicular_squares() -> float:
-    """Return the form factor of two unit squares with a common edge, at a right angle: the cube closes."""
+    """Return the form factor of two perpendicular unit squares with a common edge."""
     return (1 - parallel_squares()) / 4
 
 
 def walled_ao(distance: Any, height: float, reach: float) -> np.ndarray:
-    """Return the open share of a floor at `distance` from an endless wall of that height, within `reach`.
+    """Return the AO of a floor at `distance` from an endless wall of `height`, for rays of length `reach`.
 
-    Cosine-weighted directions project to a disc evenly. A ray (x, y, z) meets the wall's plane after
-    distance / x, at height z distance / x. So it is blocked where x > distance / reach and outside the
-    ellipse (x / a)^2 + y^2 = 1, a = distance / hypot(distance, height).
+    Cosine-weighted directions are uniform in their projection to the unit disc. A ray (x, y, z) hits the
+    plane of the wall after a length of distance / x, at height z distance / x. So it is blocked where x >
+    distance / reach, outside the ellipse (x / a)^2 + y^2 = 1, a = distance / hypot(distance, height).
     """
     distance = np.asarray(distance, float)
     a = distance / np.hypot(distance, height)
@@ -99,9 +101,9 @@ def walled_ao(distance: Any, height: float, reach: float) -> np.ndarray:
 
 
 def cornered_ao(x: Any, y: Any, reach: float) -> np.ndarray:
-    """Return the open share of a floor at x and y from two endless, tall walls that meet at right angles.
+    """Return the AO of a floor at distances x and y from two infinite walls at a right angle.
 
-    Blocked is what lies beyond either of two chords of the disc: two segments, less what they share.
+    Blocked directions are two segments of the unit disc. Their area is the sum of both, minus their overlap.
     """
     c, d = np.asarray(x, float) / reach, np.asarray(y, float) / reach
 
@@ -109,7 +111,7 @@ def cornered_ao(x: Any, y: Any, reach: float) -> np.ndarray:
         cut = np.minimum(cut, 1.0)
         return np.arccos(cut) - cut * np.sqrt(1 - cut * cut)
 
-    # Both: the area right of x = c and above y = d, by integrating sqrt(1 - x^2) - d from c on.
+    # Overlap: the area with x > c and y > d, the integral of sqrt(1 - x^2) - d from c on.
     end = np.sqrt(np.maximum(1 - d * d, 0.0))
     both = 0.5 * (
         np.arcsin(end) + end * d - np.arcsin(np.minimum(c, 1)) - c * np.sqrt(np.maximum(1 - c * c, 0))

@@ -1,10 +1,10 @@
-"""Stands here so that every test can import the helpers of this folder (pytest puts it on the path).
+"""Makes pytest put this folder on the import path, and coordinates the processes of `pytest -n 2`.
 
-It also lets the processes of `pytest -n 2` share the suite well:
+Rules for the processes:
 
-- tests of a module that makes something expensive once go to the same process;
-- a kernel that one process compiles is waited for by the other one, and taken from disk;
-- a test that measures seconds (marked `timed`) runs while the other processes rest.
+- tests of a module that has module-wide, package-wide or session-wide fixtures run in the same process;
+- if one process compiles a kernel, the other process waits and loads it from disk;
+- a test that measures seconds (marked `timed`) runs while the other processes are idle.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from typing import Any
 
 import pytest
 
-# Fixtures of these scopes are made once in a process.
+# Scopes of fixtures that are made once in a process.
 _ONCE = ("module", "package", "session")
 _LOCKS = pytest.StashKey[Path]()
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests of each module that has fixtures which outlive a test."""
+    """Put all tests of a module into one group if the module uses a fixture with a scope of `_ONCE`."""
     sharing = {
         item.path
         for item in items
         for found in item._fixtureinfo.name2fixturedefs.values()
-        # Fixtures of plugins belong to no file.
+        # Fixtures of plugins have an empty `baseid`.
         if found[-1].scope in _ONCE and found[-1].baseid
     }
     for item in items:
@@ -39,7 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Prepare a process of a distributed run; a run in one process needs nothing."""
+    """Set up the file locks in each process of a distributed run."""
     cache = getattr(config, "cache", None)
     if hasattr(config, "workerinput") and cache is not None:
         config.stash[_LOCKS] = cache.mkdir("locks")
@@ -48,7 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @contextlib.contextmanager
 def held(path: Path, *, shared: bool = False) -> Iterator[None]:
-    """Hold a file lock."""
+    """Hold a file lock, exclusive or shared, within a `with` block."""
     import fcntl
 
     with path.open("w") as lock:
@@ -58,23 +58,23 @@ def held(path: Path, *, shared: bool = False) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Any:
-    """Run a timed test alone, and any other one beside those of other processes."""
+    """Run a timed test while no other process runs a test, and all other tests in parallel."""
     folder = item.config.stash.get(_LOCKS, None)
     if folder is None:
         return (yield)
     alone = item.get_closest_marker("timed") is not None
     with contextlib.ExitStack() as room:
-        # A process that waits for exclusive use blocks new ones from starting.
+        # While a process waits for exclusive use, it holds the lock `door`, so no new test starts.
         with held(folder / "door", shared=not alone):
             room.enter_context(held(folder / "room", shared=not alone))
         return (yield)
 
 
 def compile_once(folder: Path) -> None:
-    """Let Numba hold a file lock for each kernel that it compiles: who comes second finds it on disk.
+    """Make Numba hold a file lock while it compiles a kernel, so that other processes load the result.
 
-    Without it both processes compiled most kernels, and two signatures of one kernel that are kept at the
-    same time can get the same file name.
+    Without the lock both processes compiled most kernels, and two signatures of one kernel that were stored
+    at the same time could get the same file name.
     """
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher
@@ -86,7 +86,7 @@ def compile_once(folder: Path) -> None:
         if kept is None:
             return compile_kernel(self, signature)
         name = hashlib.sha256(f"{kept} {self.__module__}.{self.__qualname__}".encode()).hexdigest()[:16]
-        # Numba's own lock comes first, so that threads of one process never wait for each other in a circle.
+        # Acquire Numba's own lock first; otherwise two threads of one process could deadlock.
         with global_compiler_lock, held(folder / f"kernel-{name}"):
             return compile_kernel(self, signature)
 

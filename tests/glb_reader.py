@@ -1,4 +1,4 @@
-"""Reads GLB files for tests with nothing of baker's code: JSON, accessors, sparse ones included."""
+"""Reads GLB files for tests without code of `baker`: JSON and accessors, also sparse ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class Glb:
-    """A parsed GLB."""
+    """A parsed GLB file: JSON document and binary chunk."""
 
     def __init__(self, data: bytes | Path) -> None:
         data = data.read_bytes() if isinstance(data, Path) else data
@@ -30,7 +30,7 @@ class Glb:
             assert kind == b"BIN\0"
             self.binary = data[28 + size : 28 + size + length]
             assert len(self.binary) == length == self.json["buffers"][0]["byteLength"]
-            # Chunks that glTF does not define may follow.
+            # Chunks of unknown types may follow.
             self.further = data[28 + size + length :]
 
     def view(self, index: int) -> bytes:
@@ -40,7 +40,7 @@ class Glb:
         return self.binary[start : start + view["byteLength"]]
 
     def accessor(self, index: int) -> np.ndarray:
-        """Return (count, width) numbers as stored."""
+        """Return (count, width) numbers of an accessor, in the stored component type."""
         item = self.json["accessors"][index]
         dtype, width = np.dtype(_DTYPE[item["componentType"]]), _WIDTH[item["type"]]
         out = np.zeros((item["count"], width), dtype)
@@ -58,7 +58,7 @@ class Glb:
         return out
 
     def corners(self, primitive: dict[str, Any], name: str, *, target: int | None = None) -> np.ndarray:
-        """Return an attribute at each triangle corner, (T, 3, width)."""
+        """Return (T, 3, width): an attribute of a primitive or of a morph target, at triangle corners."""
         holder = primitive["attributes"] if target is None else primitive["targets"][target]
         values = self.accessor(holder[name])
         if "indices" not in primitive:

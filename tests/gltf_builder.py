@@ -1,4 +1,4 @@
-"""Builds small glTF files for tests, from arrays and plain dictionaries, with nothing of baker's code."""
+"""Builds small glTF files for tests from arrays and dictionaries, without code of `baker`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 _CODE = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 _TYPE = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
-# A unit square in the xy plane, counter-clockwise from +z, as four vertices and two triangles.
+# The unit square in the xy plane, front towards +z, as four vertices and two triangles.
 QUAD = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 QUAD_NORMAL = np.array([[0, 0, 1]] * 4, np.float32)
 QUAD_TRIANGLE = np.array([[0, 1, 2], [0, 2, 3]], np.uint16)
 
 
 class GltfBuilder:
-    """Collects views, accessors and JSON members; `json` may be edited freely before writing."""
+    """Collects buffer views, accessors and JSON members; tests may edit `json` before writing."""
 
     def __init__(self) -> None:
         self.json: dict[str, Any] = {"asset": {"version": "2.0"}}
@@ -33,14 +33,14 @@ class GltfBuilder:
         return len(items) - 1
 
     def view(self, data: bytes, **extra: Any) -> int:
-        """Append bytes to the buffer, on a multiple of four, as a buffer view."""
+        """Append bytes to the buffer, aligned to four bytes, and return the index of their view."""
         self.blob += b"\0" * (-len(self.blob) % 4)
         view = {"buffer": 0, "byteOffset": len(self.blob), "byteLength": len(data), **extra}
         self.blob += data
         return self.add("bufferViews", view)
 
     def accessor(self, array: np.ndarray, **extra: Any) -> int:
-        """Append an accessor for (N,) or (N, width) rows; its dtype gives the component type."""
+        """Append an accessor of an (N,) or (N, width) array and return its index; dtype gives its type."""
         array = np.ascontiguousarray(array)
         width = 1 if array.ndim == 1 else array.shape[1]
         value = {
@@ -55,7 +55,7 @@ class GltfBuilder:
     def primitive(
         self, position: np.ndarray, triangle: np.ndarray | None = None, **extra: Any
     ) -> dict[str, Any]:
-        """Return a primitive; arrays among `extra` become attributes of that name, the rest members."""
+        """Return a primitive; arrays in `extra` become attributes of that name, other values members."""
         attributes = {"POSITION": self.accessor(position)}
         members = {}
         for key, value in extra.items():
@@ -69,11 +69,11 @@ class GltfBuilder:
         return primitive
 
     def mesh(self, *primitives: dict[str, Any], **extra: Any) -> int:
-        """Append a mesh."""
+        """Append a mesh and return its index."""
         return self.add("meshes", {"primitives": list(primitives), **extra})
 
     def node(self, **members: Any) -> int:
-        """Append a node."""
+        """Append a node and return its index."""
         return self.add("nodes", members)
 
     def image(self, data: bytes, **texture: Any) -> int:
@@ -82,7 +82,7 @@ class GltfBuilder:
         return self.add("textures", {"source": source, **texture})
 
     def document(self, *, embed: bool = False) -> dict[str, Any]:
-        """Return the JSON; without scenes, one is made of all nodes without a parent."""
+        """Return the JSON document; if it has no scenes, add one of all root nodes."""
         out = dict(self.json)
         if "scenes" not in out:
             children = {c for n in out.get("nodes", []) for c in n.get("children", [])}
@@ -116,7 +116,7 @@ def pack_glb(document: dict[str, Any], blob: bytes = b"") -> bytes:
 
 
 def mesh_glb(position: np.ndarray, triangle: np.ndarray, **attributes: Any) -> bytes:
-    """Return a GLB of one mesh in one node: (V, 3) positions, (T, 3) triangles, named attributes."""
+    """Return the GLB bytes of one node with a mesh of (V, 3) positions, (T, 3) triangles and attributes."""
     builder = GltfBuilder()
     triangle = np.asarray(triangle).astype(np.uint32)
     builder.node(mesh=builder.mesh(builder.primitive(position.astype(np.float32), triangle, **attributes)))
@@ -124,7 +124,7 @@ def mesh_glb(position: np.ndarray, triangle: np.ndarray, **attributes: Any) -> b
 
 
 def quad_builder(**material: Any) -> GltfBuilder:
-    """Return a builder holding the unit square on node 0, with a material if any member of one is given."""
+    """Return a builder with the unit square on node 0; members of a material, if any, give it a material."""
     builder = GltfBuilder()
     extra = {"material": builder.add("materials", dict(material))} if material else {}
     uv = QUAD[:, :2].copy()
@@ -134,7 +134,7 @@ def quad_builder(**material: Any) -> GltfBuilder:
 
 
 def write(path: Path, data: bytes | GltfBuilder) -> Path:
-    """Write a file by its suffix and return its path."""
+    """Write bytes, or a builder as GLB or glTF by the suffix of `path`, and return `path`."""
     if isinstance(data, GltfBuilder):
         data = data.gltf() if path.suffix == ".gltf" else data.glb()
     path.write_bytes(data)

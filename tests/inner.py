@@ -1,4 +1,4 @@
-"""Doors into functions that only kernels call."""
+"""Compiles functions that only kernels call, for tests."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from numba import njit
 
 
 def compiled(*functions: Callable[..., Any]) -> tuple[Callable[..., Any], ...]:
-    """Compile inner functions of kernels, so that a test can call them."""
+    """Return compiled versions of `inner` functions that Python can call."""
     return tuple(njit(error_model="numpy")(getattr(f, "py_func", f)) for f in functions)

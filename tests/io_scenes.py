@@ -1,4 +1,4 @@
-"""Scenes for the tests of what writes: a glTF with everything in it, atlases and bakes without rays."""
+"""Scenes for tests of writers: a glTF that uses many features, and atlases and bakes made without rays."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ IDENTITY = np.eye(4, dtype=np.float32).reshape(1, 16)
 
 
 def rich_builder() -> GltfBuilder:
-    """Return a document that uses what baking must not touch.
+    """Return a document with many features that a bake must preserve.
 
-    Nodes: 0 a skinned, morphed square of two primitives plus lines; 1 the same mesh again; 2 a joint;
-    3 a camera; 4 the same mesh once more but in the second scene only; 5 a plain square.
+    Nodes: 0 a skinned square with morph targets, of two triangle primitives and one of lines; 1 the same
+    mesh; 2 a joint; 3 a camera; 4 the same mesh, only in the second scene; 5 a square without skin or
+    targets.
     """
     b = GltfBuilder()
     grey = b.add("materials", {"name": "grey", "extras": {"shop": "no. 7"}})
@@ -46,7 +47,7 @@ def rich_builder() -> GltfBuilder:
     for name in ("WEIGHTS_0", "COLOR_0"):
         accessors[first["attributes"][name]]["normalized"] = True
     accessors[first["attributes"]["POSITION"]] |= {"min": [0, 0, 0], "max": [1, 1, 0], "name": "points"}
-    # Three bytes and two bytes an element have to be spread out to four for vertex data.
+    # Vertex attributes of two or three bytes have to be padded to four bytes an element.
     heat, colour = np.array([10, 20, 30, 40], "<u2").view(np.uint8), np.arange(12, dtype=np.uint8)
     for name, data in (("COLOR_0", colour), ("_HEAT", heat)):
         rows = data.reshape(4, -1)
@@ -102,7 +103,7 @@ def rich_builder() -> GltfBuilder:
 
 
 def split_layout(scene: Scene, index: int, page: int = 0) -> InstanceLayout:
-    """Return a layout with every corner a vertex of its own, last triangle first, random uv."""
+    """Return a layout with a separate vertex for each corner, triangles in reverse order, and random uv."""
     mesh = scene.meshes[scene.instances[index].mesh]
     corner = mesh.triangle[::-1].ravel().astype(np.int32)
     number = np.arange(len(corner), dtype=np.int32).reshape(-1, 3)[::-1]
@@ -111,7 +112,7 @@ def split_layout(scene: Scene, index: int, page: int = 0) -> InstanceLayout:
 
 
 def kept_layout(scene: Scene, index: int, page: int = 0) -> InstanceLayout:
-    """Return a layout that is the mesh's own TEXCOORD_1."""
+    """Return a layout with the TEXCOORD_1 of the mesh."""
     mesh = scene.meshes[scene.instances[index].mesh]
     uv = mesh.texcoord[1]
     assert uv is not None
@@ -122,13 +123,13 @@ def kept_layout(scene: Scene, index: int, page: int = 0) -> InstanceLayout:
 
 
 def make_atlas(*layouts: InstanceLayout, resolution: int = 16) -> Atlas:
-    """Return an atlas of these layouts."""
+    """Return an atlas with these layouts."""
     pages = 1 + max(layout.page for layout in layouts)
     return Atlas(resolution, pages, layouts, len(layouts), 2)
 
 
 def quad_result(folder: Path, **settings: object) -> BakeResult:
-    """Return a bake of the unit square with made-up maps on two pages' worth of random numbers."""
+    """Return a bake of the unit square on two pages of random values."""
     folder.mkdir(parents=True, exist_ok=True)
     scene = load_scene(write(folder / "level.glb", quad_builder(name="wall")))
     rng = np.random.default_rng(4)

@@ -1,4 +1,4 @@
-"""Which functions of a parsed file are compiled kernels."""
+"""Finds the compiled kernels in a parsed file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ KERNEL_MARKS = {"kernel", "inner", "njit", "jit", "cfunc", "vectorize", "guvecto
 
 
 def is_kernel(node):
-    """Return whether a decorator of a function is, or is made from, one of `KERNEL_MARKS`."""
+    """Return whether a decorator of a function is, or calls, one of `KERNEL_MARKS`."""
     marks = {name.id for mark in node.decorator_list for name in ast.walk(mark) if isinstance(name, ast.Name)}
     return bool(marks & KERNEL_MARKS)

@@ -1,4 +1,4 @@
-"""Scenes that use all features of the path tracer, small enough for many passes."""
+"""Scenes that together use all features of the path tracer, small enough for many passes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.pathtracer.camera import look_at
 
 
 def texture(rows, *, linear=False):
-    """Return a texture of (H, W, 3) values, sRGB bytes or linear floats."""
+    """Return a texture from (H, W, 3) sRGB bytes or linear floats."""
     image = np.array(rows)
     alpha = np.ones((*image.shape[:2], 1))
     if linear:
@@ -26,7 +26,7 @@ def glossy(base, metallic, roughness, **more):
 
 
 def smooth_ball(scene: Scene, centre, radius, material, level=1) -> Scene:
-    """Add a ball of few triangles with interpolated normals."""
+    """Return the scene with an added ball of 20 * 4**level triangles and smooth normals."""
     corner = icosphere(level).reshape(-1, 3)
     n = len(corner)
     mesh = Mesh(
@@ -45,10 +45,10 @@ def smooth_ball(scene: Scene, centre, radius, material, level=1) -> Scene:
 
 
 def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
-    """Return a room with textured, glossy and mirroring walls, a two-sided emitter and two balls."""
+    """Return a room with textured, glossy and mirror walls, a two-sided emitter and two balls."""
     walls = box_quads((0, 0, 0), (2, 2, 2), inward=True)
     tiles = texture([[[230, 60, 60], [90, 160, 90]], [[90, 90, 200], [220, 220, 220]]])
-    # Green scales the roughness, blue the metal.
+    # The green channel scales roughness, the blue channel metallic.
     finish = texture([[[0, 1.0, 0.0], [0, 0.5, 1.0]], [[0, 0.7, 0.5], [0, 1.0, 0.2]]], linear=True)
     kinds = [
         glossy((0.8, 0.8, 0.8), 0.0, 1.0, base_colour_texture=tiles),
@@ -76,7 +76,7 @@ def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
 
 
 def open_yard() -> Scene:
-    """Return ground, a wall, a glossy ball, a sun, a spot and a bulb of a range, to be seen under a sky."""
+    """Return ground, wall and glossy ball, with sun, spot light and point light of a range; use with a sky."""
     quads = [
         Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), glossy((0.6, 0.5, 0.4), 0.0, 0.6)),
         Quad((-1, 1, 0), (2, 0, 0), (0, 0, 1.5), glossy((0.8, 0.8, 0.8), 0.0, 1.0, double_sided=True)),
@@ -86,7 +86,7 @@ def open_yard() -> Scene:
     spot = PunctualLight("spot", "spot", 1, (3.0, 4.0, 5.0), (0.8, -0.5, 2.0), (0.0, 0.6, -0.8), 0.2, 0.5)
     bulb = PunctualLight("point", "bulb", 2, (0.5, 0.4, 0.3), (-0.8, 0.6, 1.0), range=1.6)
     scene = replace(quad_scene(quads), lights=(sun, spot, bulb))
-    # No smoother: paths from the eye rarely find light of a point that a narrow lobe reflects.
+    # Roughness is not lower, because eye paths rarely find the light of a point light in a narrow lobe.
     return smooth_ball(scene, (0.6, 0.2, 0.5), 0.45, glossy((0.9, 0.9, 0.9), 1.0, 0.5))
 
 

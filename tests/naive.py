@@ -1,4 +1,4 @@
-"""Slow, obvious twins of kernels, and the statistics that test samplers."""
+"""Slow, simple implementations of kernels, and statistical tests of samplers."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from scipy.stats import chi2
 
 
 def chi_square_chance(observed, expected):
-    """Return the chance of counts at least as uneven as `observed` (sum equal to that of `expected`)."""
+    """Return the p-value of Pearson's chi-square test of `observed` counts; both arrays have the same sum."""
     observed, expected = np.ravel(observed).astype(float), np.ravel(expected).astype(float)
     assert (observed[expected == 0] == 0).all()
     observed, expected = observed[expected > 0], expected[expected > 0]
-    # Bins of few expected counts are not chi-square distributed: they count as one.
+    # Merge bins with less than 5 expected counts, since they are not chi-square distributed.
     few = expected < 5
     if few.any():
         observed = np.append(observed[~few], observed[few].sum())
@@ -25,7 +25,7 @@ def chi_square_chance(observed, expected):
 
 
 def sidak(n, significance=1e-3):
-    """Return the level of each of n tests for which any of them fails with probability `significance`."""
+    """Return the significance level of each of n independent tests that gives `significance` in total."""
     return 1.0 - (1.0 - significance) ** (1.0 / n)
 
 
@@ -40,7 +40,7 @@ def assert_uniform(tables):
 
 
 def intersect(position, triangle, origin, direction, near=0.0, far=np.inf):
-    """Return (distance in units of the direction's length, triangle or -1) as Moeller and Trumbore."""
+    """Return (distance / |direction|, triangle or -1) of the closest hit, by Moeller and Trumbore."""
     corner = np.asarray(position, float)[np.asarray(triangle, int)]
     if not len(corner):
         return np.inf, -1
@@ -62,7 +62,7 @@ def intersect(position, triangle, origin, direction, near=0.0, far=np.inf):
 
 
 def barycentric(corner, point):
-    """Return b1, b2 of a point in the plane of a triangle (3, k), float64."""
+    """Return the barycentric coordinates b1, b2 of a point in the plane of a triangle (3, k), float64."""
     corner = np.asarray(corner, float)
     edges = np.stack([corner[1] - corner[0], corner[2] - corner[0]], axis=1)
     return np.linalg.lstsq(edges, np.asarray(point, float) - corner[0], rcond=None)[0]
@@ -72,7 +72,7 @@ def barycentric(corner, point):
 
 
 def inside(corner, point, slack=0.0):
-    """Tell whether a point lies in a triangle of either winding."""
+    """Return whether a 2D point lies in a triangle of either winding."""
     (ax, ay), (bx, by), (cx, cy) = corner
     x, y = point
     side = np.array([
@@ -84,7 +84,7 @@ def inside(corner, point, slack=0.0):
 
 
 def cut_polygon(corner, x0, y0, width=1.0):
-    """Return the corners, in order, of what a square leaves of a triangle."""
+    """Return the corners of the intersection of a triangle and the square at (x0, y0), in order."""
     corner = [tuple(map(float, c)) for c in corner]
     square = [(x0, y0), (x0 + width, y0), (x0 + width, y0 + width), (x0, y0 + width)]
     points = [p for p in corner if x0 <= p[0] <= x0 + width and y0 <= p[1] <= y0 + width]
@@ -125,12 +125,12 @@ def shoelace(polygon):
 
 
 def cut_area(corner, x0, y0, width=1.0):
-    """Return the area of a triangle inside a square."""
+    """Return the area of the intersection of a triangle and a square."""
     return shoelace(cut_polygon(corner, x0, y0, width))[0]
 
 
 def covered_texels(uv, triangle, page, size):
-    """Return {(page, row, column): {triangle: area in texels}} of everything that covers any area."""
+    """Return {(page, row, column): {triangle: covered area in texels}} for all covered texels."""
     found = {}
     for t, corners in enumerate(np.asarray(uv, float)[triangle] * size):
         low, high = np.floor(corners.min(0)).astype(int), np.ceil(corners.max(0)).astype(int)
@@ -156,7 +156,7 @@ def bits_reversed(x):
 
 
 def owen_hash(x, seed):
-    """Return Laine and Karras's hash: bit k depends on bits 0 to k only."""
+    """Return the hash of Laine and Karras, whose bit k depends only on bits 0 to k."""
     x = (x + seed) % 2**32
     for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
         x ^= x * factor % 2**32
@@ -164,7 +164,7 @@ def owen_hash(x, seed):
 
 
 def cosine_direction(u, v):
-    """Return Shirley and Chiu's concentric map of the unit square, lifted to the hemisphere."""
+    """Return the direction of (u, v) by Shirley and Chiu's concentric map, projected up to the hemisphere."""
     a, b = 2.0 * u - 1.0, 2.0 * v - 1.0
     if a == 0 and b == 0:
         return np.array([0.0, 0.0, 1.0])
@@ -191,7 +191,7 @@ def frame(normal):
 
 
 def wrapped(i, n, mode):
-    """Return the pixel that pixel i of an endless row shows."""
+    """Return the index in 0..n-1 to which a wrap mode maps pixel i."""
     if mode == "repeat":
         return i % n
     if mode == "mirror":
@@ -213,7 +213,7 @@ def bilinear(image, u, v, wrap):
 
 
 def pyramid(image):
-    """Return the image and its halvings by 2 x 2 means; an odd last row or column is left out."""
+    """Return the mip levels of an image by 2 x 2 means; an odd last row or column is left out."""
     levels = [np.asarray(image, float)]
     while levels[-1].shape[:2] != (1, 1):
         last = levels[-1]
@@ -228,7 +228,7 @@ def pyramid(image):
 
 
 def hit_pixel(uv, page, double_sided, size, n_pages, t, u, v, front):
-    """Return the flat pixel at barycentrics of a triangle: backs behind all fronts, -1 is black."""
+    """Return the flat pixel index of a hit: backs follow after all fronts, and black backs are -1."""
     if not front and not double_sided[t]:
         return -1
     x, y = ((1 - u - v) * uv[t, 0] + u * uv[t, 1] + v * uv[t, 2]).astype(float) * size

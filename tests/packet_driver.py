@@ -1,4 +1,4 @@
-"""Casts any rays through packets, as the project's kernels do, and hands back what the lanes hold."""
+"""Casts arbitrary rays in packets, as the kernels do, and returns the results of all lanes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _cast(occluded, buffers, origin, direction, near, far, valid_ray, geom, prim
 
 
 def tracer_of_width(rays, width):
-    """Return a tracer for packets of another width than the CPU's widest."""
+    """Return a tracer for packets of the given width."""
     address = [
         ctypes.cast(getattr(rays._library, f"rtc{kind}{width}"), ctypes.c_void_p).value
         for kind in ("Intersect", "Occluded")
@@ -56,7 +56,7 @@ def tracer_of_width(rays, width):
 
 
 def cast(rays, origin, direction, near=0.0, far=1e30, *, width=0, valid=True, occluded=False):
-    """Return geometry (-1 for none), triangle, u, v and tfar of each ray; width 0 is the CPU's widest."""
+    """Return geometry (-1 for none), triangle, u, v and tfar of each ray; width 0 is the native width."""
     tracer = tracer_of_width(rays, width) if width else rays.tracer
     n = len(origin)
     origin, direction = np.float32(origin), np.float32(direction)

@@ -1,7 +1,8 @@
-"""A rough path tracer in numpy over embreex's own interface: a second opinion on bakes.
+"""A simple NumPy path tracer on embreex, independent of the bake's code, with which bakes are compared.
 
-Irradiance at points: light sampling of emissive triangles at every vertex of the path, cosine-weighted
-bounces, Russian roulette. Lambertian surfaces with plain colours, one-sided or double-sided.
+It computes irradiance at points, with light sampling of emissive triangles at every vertex of a path,
+cosine-weighted bounces and Russian roulette. Surfaces are Lambertian without textures, one-sided or
+double-sided.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ LIFT = 1e-4
 
 
 class PathTracer:
-    """Holds a scene's triangles, colours and emitters in world space."""
+    """The triangles, colours and emitters of a scene, world space."""
 
     def __init__(self, scene: Scene) -> None:
         corner, material = [], []
@@ -43,7 +44,7 @@ class PathTracer:
         self.mesh = TriangleMesh(self.embree, self.corner.astype(np.float32))
 
     def irradiance(self, point: Any, normal: Any, rng: np.random.Generator, *, depth: int = 60) -> np.ndarray:
-        """Return one estimate (n, 3) of E / lx for each of n points and normals (n, 3)."""
+        """Return one estimate of E, (n, 3) lx, for each of n points and normals (n, 3)."""
         point, normal = np.array(point, float), np.array(normal, float)
         result = np.zeros((len(point), 3))
         path, weight = np.arange(len(point)), np.ones((len(point), 3))
@@ -53,7 +54,8 @@ class PathTracer:
             hit, where = self._closest(point + LIFT * normal, direction)
             front = (self.normal[hit] * direction).sum(axis=1) < 0
             seen = (hit >= 0) & (front | self.double_sided[self.material[hit]])
-            # E = pi / n sum L; L = albedo E' / pi: each bounce multiplies by the albedo of what is hit.
+            # E = pi / n sum L and L = albedo E' / pi, so each bounce multiplies by the albedo of the surface
+            # hit.
             path, weight = path[seen], weight[seen] * self.albedo[self.material[hit[seen]]]
             point = where[seen]
             normal = np.where(front[seen, None], self.normal[hit[seen]], -self.normal[hit[seen]])
@@ -67,14 +69,14 @@ class PathTracer:
         return result
 
     def inside_geometry(self, point: Any, normal: Any) -> np.ndarray:
-        """Tell which points (n, 3) lie under the back of a one-sided surface."""
+        """Return (n,) bool: the points whose ray along the normal hits the back of a one-sided surface."""
         normal = np.asarray(normal, float)
         hit, _ = self._closest(np.asarray(point, float) + LIFT * normal, normal)
         back = (self.normal[hit] * normal).sum(axis=1) > 0
         return (hit >= 0) & back & ~self.double_sided[self.material[hit]]
 
     def _emitters(self, point: np.ndarray, normal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the irradiance from one point of one emitter triangle for each surface point."""
+        """Return an estimate (n, 3) of direct irradiance, from one random emitter point for each point."""
         pick = rng.choice(len(self.emitter), len(point), p=self.chance)
         triangle = self.emitter[pick]
         root, share = np.sqrt(rng.random((len(point), 1))), rng.random((len(point), 1))
@@ -104,7 +106,7 @@ class PathTracer:
 
 
 def _cosine(normal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return cosine-weighted directions: a point of the unit sphere on top of the normal."""
+    """Return cosine-weighted directions: normal plus a random point of the unit sphere, normalized."""
     z = 2 * rng.random(len(normal)) - 1
     turn = 2 * np.pi * rng.random(len(normal))
     radius = np.sqrt(1 - z * z)

@@ -1,4 +1,4 @@
-"""Looks a bake up at world points, as an engine would: nearest triangle, lightmap uv, bilinear."""
+"""Samples a bake at world points as an engine does: nearest triangle, lightmap uv, bilinear lookup."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baker.core.lightmap import BakeResult
 
 
 class Probe:
-    """Finds points on the surfaces of a bake that is in memory."""
+    """Finds the surface point nearest to a world point, in a bake in memory."""
 
     def __init__(self, result: BakeResult) -> None:
         self.result = result
@@ -30,7 +30,7 @@ class Probe:
         self.normal = cross / np.maximum(2 * self.area, 1e-300)[:, None]
 
     def at(self, point: Any, normal: Any, channel: str = "irradiance", *, within: float = 5e-3) -> np.ndarray:
-        """Return the value (C,) at a world point of a surface that faces about along `normal`."""
+        """Return the value (C,) at a world point of a surface whose normal is near `normal`."""
         point, normal = np.asarray(point, float), np.asarray(normal, float)
         a, b, c = (self.corner[:, k] for k in range(3))
         u, v, w = b - a, c - a, point - a

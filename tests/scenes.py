@@ -1,4 +1,4 @@
-"""Closed-form scenes as code: quads and triangles with texel-exact lightmap uv, without any importer."""
+"""Builds scenes for closed forms: quads and triangles whose lightmap uv follow texel borders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GAP = 2
 
 @dataclass(frozen=True)
 class Quad:
-    """A parallelogram whose texels are all whole: columns run along `u`, rows along `v`."""
+    """A parallelogram covered by whole texels: columns run along `u`, rows along `v`."""
 
     origin: np.ndarray
     u: np.ndarray
@@ -42,11 +42,11 @@ class Quad:
         return float(np.linalg.norm(np.cross(self.u, self.v)))
 
     def at(self, s: Any, t: Any) -> np.ndarray:
-        """Return the world points at shares s of `u` and t of `v`."""
+        """Return the world points origin + s u + t v."""
         return self.origin + np.asarray(s)[..., None] * self.u + np.asarray(t)[..., None] * self.v
 
     def points(self, n: int = 4) -> np.ndarray:
-        """Return (rows, columns, n * n, 3): Gauss points of each texel; see `texel_mean`."""
+        """Return (rows, columns, n * n, 3): n x n Gauss-Legendre points of each texel, world space."""
         wide, high = self.texels
         spot = 0.5 + 0.5 * np.polynomial.legendre.leggauss(n)[0]
         s = ((np.arange(wide)[:, None] + spot) / wide)[None, :, None, :]
@@ -54,18 +54,18 @@ class Quad:
         return self.at(*np.broadcast_arrays(s, t)).reshape(high, wide, n * n, 3)
 
     def texel_mean(self, function: Any, n: int = 4) -> np.ndarray:
-        """Return (rows, columns): `function` of (..., 3) points, averaged over each texel's square."""
+        """Return (rows, columns): `function` of (..., 3) points, integrated over texels by Gauss-Legendre."""
         weight = 0.5 * np.polynomial.legendre.leggauss(n)[1]
         return function(self.points(n)) @ (weight[:, None] * weight[None, :]).reshape(-1)
 
     def values(self, result: BakeResult, channel: str = "irradiance") -> np.ndarray:
-        """Return the quad's texels of a bake, (rows, columns, C) float64."""
+        """Return the values of the quad's texels in a bake, (rows, columns, C) float64."""
         wide, high = self.texels
         page = result.lightmaps[channel].value[0]
         return page[self.row : self.row + high, self.column : self.column + wide].astype(np.float64)
 
     def value_at(self, result: BakeResult, point: Any, channel: str = "irradiance") -> np.ndarray:
-        """Return the texel (C,) in which a world point of the quad lies."""
+        """Return the value (C,) of the texel that contains a world point of the quad."""
         offset = np.asarray(point, float) - self.origin
         s, t = (float(offset @ edge / (edge @ edge)) for edge in (self.u, self.v))
         assert 0.0 <= s <= 1.0
@@ -75,7 +75,7 @@ class Quad:
 
 
 class SceneBuilder:
-    """Collects surfaces, one object each, packed in rows of one square page of `size` texels."""
+    """Builds a scene with an object for each surface; charts are packed in rows of a page of `size` texels."""
 
     def __init__(self, size: int = 64) -> None:
         self.size = size
@@ -103,7 +103,7 @@ class SceneBuilder:
         return len(self.materials) - 1
 
     def quad(self, origin: Any, u: Any, v: Any, material: int, texels: tuple[int, int] = (16, 16)) -> Quad:
-        """Add a parallelogram that faces along u x v."""
+        """Add a parallelogram, whose front is towards u x v, and return it."""
         o, u, v = (np.asarray(a, float) for a in (origin, u, v))
         x, y = self._cell(*texels)
         made = Quad(o, u, v, x, y, texels)
@@ -116,7 +116,7 @@ class SceneBuilder:
     def box(
         self, low: Any, high: Any, material: int, texels: int = 12, *, inward: bool = False
     ) -> dict[str, Quad]:
-        """Add six quads, by the side they lie on ("-x", "+x", ...); `inward` ones face the middle."""
+        """Add the six quads of a box, fronts inwards if `inward`; return them by side ("-x", "+x", ...)."""
         low, high = np.asarray(low, float), np.asarray(high, float)
         found = {}
         for axis, letter in enumerate("xyz"):
@@ -129,14 +129,15 @@ class SceneBuilder:
             for side in (0, 1):
                 origin = low.copy()
                 origin[axis] = (low, high)[side][axis]
-                # u x v is the positive axis: right for the far side of a solid, the near side of a room.
+                # u x v is the positive axis: the front of the far side of a solid, and of the near side of a
+                # room.
                 forth = (side == 1) != inward
                 u, v = edges if forth else edges[::-1]
                 found["-+"[side] + letter] = self.quad(origin, u, v, material, (texels, texels))
         return found
 
     def triangles(self, corner: np.ndarray, material: int, texels: int = 4, normal: Any = None) -> None:
-        """Add (T, 3, 3) triangles as one object, each a chart of its own; flat unless `normal` (T, 3, 3)."""
+        """Add (T, 3, 3) triangles as one object, a chart for each; `normal` (T, 3, 3), default flat."""
         n = len(corner)
         uv = np.zeros((n, 3, 2))
         for t in range(n):
@@ -152,7 +153,7 @@ class SceneBuilder:
         )  # fmt: skip
 
     def sheet(self, point: np.ndarray, material: int, texels: tuple[float, float]) -> None:
-        """Add a flat-shaded grid of points (rows, columns, 3) as one chart; it faces along column x row."""
+        """Add a flat-shaded grid of points (rows, columns, 3) as one chart, fronts towards column x row."""
         rows, columns = point.shape[:2]
         x, y = self._cell(*(int(np.ceil(t)) for t in texels))
         r, c = (a.reshape(-1) for a in np.indices((rows - 1, columns - 1)))
@@ -167,7 +168,7 @@ class SceneBuilder:
         self._add(corner.reshape(-1, 3), normal, triangle, material, uv, share)
 
     def light(self, kind: str, intensity: Any, **where: Any) -> None:
-        """Add a punctual light."""
+        """Add a light without area."""
         colour = tuple(np.broadcast_to(np.asarray(intensity, float), 3).tolist())
         self.lights.append(PunctualLight(kind, "", len(self.lights), colour, **where))
 
@@ -178,7 +179,7 @@ class SceneBuilder:
         )
 
     def bake(self, **settings: Any) -> BakeResult:
-        """Bake all channels on this page with the uv as built; settings as of `baker.bake`."""
+        """Bake all channels with the uv of this builder; settings are those of `baker.bake`."""
         given = {"resolution": self.size, "uv": "keep", "padding": GAP, "samples": 64, **settings}
         given = {"channels": ["irradiance"], "denoise": False, "threads": 2, **given}
         return baker.bake(self.build(), **given)
@@ -244,7 +245,7 @@ def moved(scene: Scene, matrices: list[np.ndarray]) -> Scene:
 
 
 def prepared(builder: SceneBuilder, **settings: Any) -> tuple[PreparedScene, Record]:
-    """Return the state of a bake before the first light ray: texels, ray tree, tables."""
+    """Return the prepared scene of a bake (texels, ray tree, tables), without light, and its record."""
     given = {"resolution": builder.size, "uv": "keep", "padding": GAP, "threads": 2, **settings}
     scene, chosen = builder.build(), make_settings(given)
     record = Record(silent)

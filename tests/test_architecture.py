@@ -1,4 +1,4 @@
-"""What the source has to look like: layers, sizes, one home for each library, no leaks, types, format."""
+"""Rules of the source: layers, file sizes, one file for each heavy library, types, format, no local paths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from baker.core.stage import Stage
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
-# Libraries that are slow to import or that a file should hide behind an interface.
+# Libraries that only one file may import, because they are slow to import or hidden behind an interface.
 HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic", "pymeshlab")
 HEAVY += ("distributed",)
 NOT_SOURCE = {
@@ -49,7 +49,7 @@ def name_of(path):
 
 
 def imported(path):
-    """Return the top-level names of everything that a file imports, wherever in it."""
+    """Return the top-level package names of all imports in a file, including imports in functions."""
     names = set()
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
@@ -67,7 +67,7 @@ def run(*command, cwd=ROOT, **env):
 
 @pytest.fixture(scope="module")
 def installed_layout(tmp_path_factory):
-    """A copy of the packages as they are installed: cli/ lies in baker/ there."""
+    """Return a copy of the packages in their installed layout, where cli/ is baker/cli/."""
     folder = tmp_path_factory.mktemp("layout")
     ignore = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "baker", folder / "baker", ignore=ignore)
@@ -82,7 +82,7 @@ def test_imports_point_down(installed_layout):
 
 
 def test_types(installed_layout):
-    # The cache stays in the checkout, so that only the first run takes long.
+    # The cache is stored in the checkout, so that later runs are fast.
     cache = str(ROOT / ".mypy_cache" / "layout")
     run(sys.executable, "-m", "mypy", "-p", "baker", "--cache-dir", cache, cwd=installed_layout)
 
@@ -108,14 +108,14 @@ def test_no_file_is_long():
 
 
 def test_no_two_tests_have_one_name():
-    """Files of tests are imported by their name alone: two of one name cannot be collected."""
+    """pytest imports test files by file name, so two files with one name cannot be collected."""
     names = [path.name for path in sources("tests") if path.name.startswith("test_")]
     assert sorted({name for name in names if names.count(name) > 1}) == []
     assert len(names) > 150
 
 
 def long_functions(tree):
-    """Yield (name, lines without docstring, parameters without self) of the functions that are no kernels."""
+    """Yield (name, lines without docstring, parameters without self) of all functions except kernels."""
     for node in ast.walk(tree):
         if not isinstance(node, ast.FunctionDef) or is_kernel(node):
             continue
@@ -150,7 +150,7 @@ def test_pillow_has_one_reader_and_one_writer():
 
 def test_numba_lives_low():
     homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
-    # The path tracer's paths are kernels of its own: it shares none with the bake that is compared with it.
+    # The path tracer has separate kernels, because bakes are compared with it.
     assert homes <= {"kernels", "lights", "trace", "pathtracer"}
 
 
@@ -175,7 +175,7 @@ def test_uninitialised_arrays_are_for_kernels():
 
 
 def stage_literals(tree):
-    """Yield strings of a file that name a stage: where stages are passed, looked up, compared or listed."""
+    """Yield string literals that name a stage where stages are passed, looked up, compared or listed."""
     stages = {str(stage) for stage in Stage}
 
     def text(node):
@@ -208,11 +208,11 @@ def stage_literals(tree):
             found += [node.value, *getattr(node.value, "elts", [])]
         elif isinstance(node, ast.List | ast.Tuple | ast.Set | ast.Dict):
             parts = node.keys if isinstance(node, ast.Dict) else node.elts
-            # Lists of stages; one of their names alone may be a key of something else.
+            # Lists of stages. A single name of a stage may be another kind of key.
             if len(parts) > 1 and all(part is not None and text(part) in stages for part in parts):
                 found += parts
         elif text(node) in stages and " " in node.value and node.value != Stage.AMBIENT_OCCLUSION:
-            # Nothing but a stage has such a name; ambient occlusion is a quantity as well.
+            # These names are used only for stages; "ambient occlusion" is also a quantity.
             found.append(node)
         yield from (part for part in found if part is not None and text(part) in stages)
 
@@ -248,7 +248,7 @@ def test_a_stage_literal_is_found(line):
 
 
 def test_no_variable_of_the_environment_is_read():
-    # Handing the whole environment on to a helper process is fine; looking into it is not.
+    # Code may pass the whole environment to a helper process, but not read variables.
     found = []
     for path in sources(*PACKAGES):
         for node in ast.walk(tree_of(path)):
@@ -260,7 +260,7 @@ def test_no_variable_of_the_environment_is_read():
 
 
 def registrations(path):
-    """List what a file registers: variable of the registry, name, and node of what is registered."""
+    """Return (variable of the registry, name, AST node of the plugin) for each registration in a file."""
     tree = tree_of(path)
     calls = {}
     for node in ast.walk(tree):
@@ -279,14 +279,14 @@ def registrations(path):
 
 
 def is_plugin(path, registry):
-    """Tell whether a file registers something in a registry; checks do so by their own decorator."""
+    """Return whether a file registers a plugin in a registry; checks use the decorator `check`."""
     if registry == "CHECKS":
         return re.search(r"^@check\(", path.read_text("utf-8"), re.MULTILINE) is not None
     return any(variable == registry for variable, _, _ in registrations(path))
 
 
 def registries():
-    """Return each registry's variable, as the source names it, with the registry."""
+    """Return {variable name in the source: registry}."""
     found = {}
     for path in sources("baker"):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -301,19 +301,19 @@ def test_a_plugin_file_registers_one_thing():
     count, seen = {}, {}
     for path in sources("baker"):
         found = registrations(path)
-        # One importer may answer to several file suffixes: names are not counted, plugins are.
+        # Count plugins and not names, because an importer may be registered for several suffixes.
         count[name_of(path)] = len({plugin for _, _, plugin in found})
         for registry, name, _ in found:
             seen.setdefault(registry, []).append(name)
     assert {name: plugins for name, plugins in count.items() if plugins > 1} == {}
-    # Nothing registers in a way that is not counted here. Checks do so through a decorator of their own.
+    # All registered names were found in the source. Checks use the decorator `check` instead.
     names = {variable: registry.names() for variable, registry in registries().items()}
     assert names.pop("CHECKS")
     assert {variable: sorted(found) for variable, found in seen.items()} == names
 
 
 def test_registries_are_constants_and_find_only_plugins():
-    """A module of a registry's package is a plugin, or a plugin of the package imports it."""
+    """Each module in the package of a registry is a plugin, or is imported by a plugin of the package."""
     found = registries()
     assert len(found) >= 6
     assert [variable for variable in found if not variable.isupper()] == []
@@ -334,7 +334,7 @@ def test_registries_are_constants_and_find_only_plugins():
 
 
 def test_no_path_of_one_machine():
-    # Written in two parts, so that this line does not find itself.
+    # The words are split so that the pattern does not match this line.
     leak = re.compile(r"(?:^|[^\w.\-/])/(?:wo" + r"rk|ro" + r"ot|ho" + r"me|Us" + r"ers|tm" + r"p)/\w")
     found = []
     for path in sorted(ROOT.rglob("*")):

@@ -1,4 +1,4 @@
-"""The pages of the docs: none is missing, and every link leads somewhere."""
+"""Docs pages: required pages and sections exist, and all relative links have targets."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ CODE = re.compile(r"^ *```.*?^ *```$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 
 
 def anchors(path):
-    """Return the anchors of a page's headings, formed as code hosts do."""
+    """Return the anchors of a page's headings, formed by the rule of code hosts."""
     text = re.sub(r"^ *```.*?^ *```$", "", path.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
     titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
 
 
 def broken(page):
-    """Return the relative links of a page that lead nowhere."""
-    # What looks like a link within code is none, but the text of a link may be code.
+    """Return the relative links of a page whose file or anchor does not exist."""
+    # Replace code, in which brackets are no links; the text of a link may itself be code.
     text = CODE.sub("code", page.read_text("utf-8"))
     found = []
     for link in LINK.findall(text):

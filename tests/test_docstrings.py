@@ -1,8 +1,8 @@
-"""Docstrings are complete: numpydoc for what another package imports, array arguments for kernels.
+"""Docstrings are complete: numpydoc for public functions, array arguments for kernels.
 
-A public function is one that a file of another package of `baker`, or `cli`, imports by name. Its docstring
-passes the checks of numpydoc that `CHECKS` lists and names in a Raises section each error that its own body
-raises. A kernel names in its docstring each argument that its body indexes.
+A function is public if a file of another package of `baker`, or of `cli`, imports it by name. Its docstring
+must pass the checks of numpydoc that `CHECKS` lists, and its Raises section must name each error that its
+body raises. The docstring of a kernel must name each argument that its body indexes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PACKAGES = sorted(
 
 
 def package_of(path):
-    """Return the package below `baker` that a file belongs to, `__init__` for baker/__init__.py, or `cli`."""
+    """Return the package of a file: its folder below `baker`, `__init__` for baker/__init__.py, or `cli`."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return parts[1] if parts[0] == "baker" else "cli"
 
@@ -54,7 +54,7 @@ def trees():
 
 @functools.cache
 def public_names():
-    """Return {(module, name)} of everything that another package imports by name."""
+    """Return {(module, name)} of all names that a file of another package imports."""
     names = set()
     for path, tree in trees().items():
         for node in ast.walk(tree):
@@ -77,7 +77,7 @@ def indexed_arguments(node):
 
 
 def raised(node):
-    """Return the names of the errors that a function raises itself, not those of functions inside it."""
+    """Return the names of the errors that a function raises, without those of nested functions."""
     names, queue = set(), list(node.body)
     while queue:
         part = queue.pop()
@@ -106,7 +106,7 @@ def faults_of_function(path, node, ancestry):
 
 
 def faults(package):
-    """Return one line for each fault of a package's docstrings."""
+    """Return one line for each broken rule in a package's docstrings."""
     lines = []
     public = public_names()
     for path, tree in trees().items():
@@ -135,7 +135,7 @@ def test_docstrings_are_complete(package):
 
 
 def test_each_kind_of_fault_is_seen(tmp_path):
-    """Each rule finds a function made to break it."""
+    """Each rule reports a function that breaks it."""
     source = '''
 def bare(a):
     pass

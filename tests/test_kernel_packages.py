@@ -1,4 +1,4 @@
-"""Where kernels lie, and that packages name what their kernels are made of."""
+"""Kernels are in the right packages, and each package lists the files from which its kernels are compiled."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def package_of(module):
 
 @pytest.fixture(scope="module")
 def texts():
-    """The text of each module."""
+    """Return {module name: source text}."""
     paths = sorted((ROOT / "baker").rglob("*.py"))
     return {dotted(path): path.read_text("utf-8") for path in paths if "templates" not in path.parts}
 
 
 @pytest.fixture(scope="module")
 def imports(texts):
-    """The modules of ours that each module imports, wherever in it."""
+    """Return {module name: modules of `baker` that it imports}, including imports in functions."""
     found = {name: set() for name in texts}
     for name, text in texts.items():
         for node in ast.walk(ast.parse(text)):
@@ -42,7 +42,7 @@ def imports(texts):
 
 
 def test_packages_name_what_their_kernels_are_made_of(texts, imports):
-    """Else an update of one package would leave yesterday's kernels of another one in use."""
+    """Otherwise, after a change of one package, cached kernels of another package would be outdated."""
     kernels = {name for name, text in texts.items() if KERNEL.search(text)}
     assert {
         "baker.radiosity.kernels.gather",
@@ -66,7 +66,7 @@ def test_packages_name_what_their_kernels_are_made_of(texts, imports):
 
 
 def test_shared_kernels_are_shared(imports):
-    """A kernel that one package uses lies in that package."""
+    """A kernel in `baker.kernels` is used by several packages; others are in the package that uses them."""
     users = {name: set() for name in imports if name.startswith("baker.kernels.")}
     assert len(users) > 10
     for name, targets in imports.items():

@@ -1,4 +1,4 @@
-"""The glossary of docs/CONVENTIONS.md is kept: the words it retires occur in no source and no page."""
+"""Words that docs/CONVENTIONS.md retires occur in no source file and no docs page."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import pytest
 ROOT = Path(__file__).parents[1]
 GLOSSARY = ROOT / "docs" / "CONVENTIONS.md"
 SUFFIXES = {".py", ".md", ".js", ".html", ".toml"}
-# Quoted names of objects in scenes are data of these files, such as "lamp", "lamp 3" or f"lamp {k}".
+# Quoted names of objects in scenes are allowed, such as "lamp", "lamp 3" or f"lamp {k}".
 OBJECT_NAME = re.compile(r"""(["'])(?:(?:floor_)?lamp(?: (?:\d+|\{\w+\}))?|(?:\{name\} )?glow)\1""")
 WITH_OBJECTS = ("assets", "benchmarks", "tests")
-# Names of glTF extensions are given by others.
+# Names of glTF extensions are allowed.
 EXTENSION = re.compile(r"\b(?:ADOBE|EXT|KHR|MSFT)_\w+")
 
 
 def table_cells(heading, end):
-    """Return the last cell of each row between two lines of the glossary."""
+    """Return the last cell of each table row between the lines `heading` and `end` of the glossary."""
     text = GLOSSARY.read_text("utf-8")
     text = text[text.index(heading) :]
     text = text[: text.index(end)]
@@ -41,7 +41,7 @@ def retired_names():
 
 
 def pattern_of(word):
-    """Return a pattern for a word, alone or as part of a name; `*` is any letters."""
+    """Return a pattern that finds a word alone or as part of a name; `*` matches any letters."""
     body = re.escape(word).replace(r"\*", "[A-Za-z]*").replace(r"\ ", r"\s+")
     before = "" if word.startswith("*") else "(?<![A-Za-z])"
     capital = re.escape(word[0].upper() + word[1:]).replace(r"\*", "[A-Za-z]*").replace(r"\ ", r"\s+")
@@ -61,7 +61,7 @@ def names_in(tree):
 
 
 def places():
-    """Return {name of a part of the project: its files}: packages of baker, cli, docs, tests and the rest."""
+    """Return {part of the project: its files and folders}; each package of `baker` is a part."""
     parts = {
         path.name: [path]
         for path in (ROOT / "baker").iterdir()

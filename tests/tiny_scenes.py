@@ -1,4 +1,4 @@
-"""Scenes of a few rectangles whose lightmap uv is known, ready to be traced stage by stage."""
+"""Scenes of a few rectangles with known lightmap uv, for tests that run single stages of a bake."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from baker.trace.embree import RayScene
 
 @dataclass(frozen=True)
 class Quad:
-    """A rectangle from `corner` along two edges; its front is towards edge_u x edge_v."""
+    """A rectangle with the corner `corner` and two edges; its front is towards edge_u x edge_v."""
 
     corner: tuple[float, float, float]
     edge_u: tuple[float, float, float]
@@ -35,7 +35,7 @@ class Quad:
 
 @dataclass(frozen=True)
 class World:
-    """What `baker.pipeline.prepare.prepare_scene` makes, without invalid points and sides."""
+    """The data that `baker.pipeline.prepare.prepare_scene` makes, without invalid points and sides."""
 
     scene: Any
     atlas: Any
@@ -49,32 +49,32 @@ class World:
 
     @property
     def free(self):
-        """Masks for scenes in which no point is inside geometry."""
+        """Return (n,) uint16 point masks with all bits set: no point is inside geometry."""
         return np.full(self.texels.n, 0xFFFF, np.uint16)
 
     def job(self, valid=None, threads=1, seed=0):
-        """The job of all texels, with all of their points unless told which are valid."""
+        """Return the job of all texels; `valid` (n,) uint16 masks the valid points, default all."""
         valid = self.free if valid is None else valid
         return TraceJob(self.surface, valid, self.table, self.rays.tracer, seed, threads, silent)
 
     def sampling(self, n_light, n_gather):
-        """The emitters with numbers of rays."""
+        """Return the sampling of emitters with these numbers of light and gather rays per texel."""
         return EmitterSampling(self.emitters, self.shading, n_light, n_gather)
 
     @property
     def hit_kind(self):
-        """What triangles prove of rays that come from inside something."""
+        """Return for each triangle what a hit on its back implies for the test for points inside geometry."""
         solids = scene_solids(self.scene, self.geometry, self.shading)
         return hit_kinds(self.geometry, self.shading, solids)
 
 
 def seen_patches(texels, patch):
-    """Patches as rays find them where no texel is split."""
+    """Return the patch lookup for hits, in a scene without split texels."""
     return SeenPatch(texels.hit_image(patch, -1), np.zeros(0, np.int32), no_sides())
 
 
 def seen_light(texels, exitance):
-    """Reflected light as rays find it where no texel is split."""
+    """Return the lookup of reflected light for hits, in a scene without split texels."""
     light = exitance * np.float32([1, 1, 1, 0])
     return SeenLight(texels.hit_image(light), np.zeros((0, 4), np.float32), no_sides())
 
@@ -111,12 +111,12 @@ def quad_scene(quads):
 
 
 def joined(scene, order=slice(None)):
-    """The same triangles as one object, in another order."""
+    """Return the scene with all triangles in one object, in the order `order`."""
     first = np.cumsum([0, *(len(m.position) for m in scene.meshes)])
     names = ("position", "normal", "material", "primitive", "vertex_primitive", "source_vertex")
     column = {name: np.concatenate([getattr(m, name) for m in scene.meshes]) for name in names}
     triangle = np.concatenate([m.triangle + s for m, s in zip(scene.meshes, first, strict=False)])
-    # A triangle's material goes with it.
+    # Reorder materials together with triangles.
     for name in ("material", "primitive"):
         column[name] = column[name][order]
     mesh = Mesh("all", triangle=np.int32(triangle[order]), **column)
@@ -124,7 +124,7 @@ def joined(scene, order=slice(None)):
 
 
 def quad_atlas(scene, size, inset=0.0):
-    """Put each quad into its own cell of a square grid, `inset` texels away from the cell's border."""
+    """Return an atlas with a cell of a square grid for each quad, `inset` texels inside the cell."""
     side = int(np.ceil(np.sqrt(len(scene.instances))))
     cell = size // side
     layouts = []
@@ -154,7 +154,7 @@ def world_of(scene, atlas):
 
 
 def box_quads(low, high, *, inward, material=None):
-    """Six rectangles of an axis-aligned box, fronts inwards (a room) or outwards (a crate)."""
+    """Return the six rectangles of an axis-aligned box, fronts inwards (a room) or outwards (a crate)."""
     low, high = np.array(low, float), np.array(high, float)
     quads = []
     for axis in range(3):
@@ -164,7 +164,7 @@ def box_quads(low, high, *, inward, material=None):
         for side in (0, 1):
             corner = low.copy()
             corner[axis] = (low, high)[side][axis]
-            # u x v is +axis: outwards at the high side.
+            # u x v is the positive axis, which points outwards at the high side.
             a, b = (u, v) if (side == 1) != inward else (v, u)
             quads.append(Quad(tuple(corner), tuple(a), tuple(b), material or grey()))
     return quads

@@ -1,7 +1,8 @@
-"""A bake without rays in which every texel, pixel and click has a known value.
+"""A bake made without rays, in which every texel, pixel and click has a known value.
 
-A camera at z = 5 looks at the plane z = 0, four metres high in the picture. Left, a painted square on page 0;
-right, a plain one on page 1, its uv transposed; before that, a leaf whose left half is a hole.
+A camera at z = 5 looks at the plane z = 0; the picture is 4 m high there. On the left is a square with a base
+colour texture, on page 0. On the right is a square without texture, on page 1 with transposed uv. In front of
+it is a leaf whose left half is a hole.
 """
 
 from __future__ import annotations
@@ -21,26 +22,27 @@ from baker.io.load import load_scene
 from baker.io.png import encode_png
 
 SIZE = 32
-# Quadrants of the painted square as bytes: upper left, upper right, lower left, lower right.
+# Base colour texture of the left square, sRGB bytes: upper left, upper right, lower left, lower right
+# quadrant.
 PAINT = np.array([[[230, 60, 60], [60, 200, 80]], [[70, 90, 220], [240, 240, 240]]], np.uint8)
 FACTOR = (0.9, 0.8, 0.7, 1.0)
 PLAIN = (0.5, 0.4, 0.3, 1.0)
-# Corners in the plane (x, y), side, depth z.
+# (x, y) of the lower left corner, side, z of the squares; metres.
 PAINTED_AT, PLAIN_AT, LEAF_AT = (-2.1, -1.0, 2.0, 0.0), (0.1, -1.0, 2.0, 0.0), (0.8, -0.3, 0.6, 0.5)
 
 
 def painted_uv(s, t):
-    """Return the place on page 0 of a place of the painted square; s to the right, t upwards, 0 to 1."""
+    """Return the uv on page 0 of a point (s, t) of the left square; s to the right, t upwards, 0 to 1."""
     return 0.125 + 0.75 * s, 0.875 - 0.75 * t
 
 
 def plain_uv(s, t):
-    """Return the place on page 1 of a place of the plain square."""
+    """Return the uv on page 1 of a point (s, t) of the right square."""
     return 0.0625 + 0.5 * t, 0.125 + 0.5 * s
 
 
 def leaf_uv(s, t):
-    """Return the place on page 1 of a place of the leaf."""
+    """Return the uv on page 1 of a point (s, t) of the leaf."""
     return 0.75 + 0.125 * s, 0.875 - 0.125 * t
 
 
@@ -91,7 +93,7 @@ def _document() -> GltfBuilder:
             "pbrMetallicRoughness": {"baseColorTexture": {"index": b.image(encode_png(leaf))}},
         },
     ]
-    uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])  # the picture stands upright
+    uv = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])  # the texture is upright
     for material, (x, y, side, z), name in zip(
         materials, (PAINTED_AT, PLAIN_AT, LEAF_AT), ("painted", "plain <b>&", "leaf"), strict=True
     ):
@@ -114,10 +116,10 @@ def _layout(index: int, page: int, place) -> InstanceLayout:
 
 def _maps(half: bool) -> dict[str, Lightmap]:
     page, row, column = np.meshgrid(np.arange(2), np.arange(SIZE), np.arange(SIZE), indexing="ij")
-    # Even slopes: a bilinear lookup between texels has a known answer as well.
+    # The light is linear in row and column, so that bilinear lookups between texels are also known.
     light = np.stack([10.03125 + row, 10.5 + column, 12 + 6 * page], axis=-1).astype(np.float32)
     if not half:
-        light *= np.float32(1.1)  # no half any more
+        light *= np.float32(1.1)  # values that half floats cannot represent
     occlusion = ((column + 0.5) / SIZE)[..., None].astype(np.float32)
     return {"irradiance": make_lightmap("irradiance", light), "ao": make_lightmap("ao", occlusion)}
 

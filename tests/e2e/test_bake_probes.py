@@ -33,7 +33,7 @@ def mean(probe, points, normal, channel="irradiance"):
 
 
 def sunlit(y):
-    """Return the floor point that sunlight hits after passing height y of the living room window's left half."""
+    """Return the floor point lit by sun through height y of the left half of the living room's window."""
     way = np.array([0.72, -0.62, 0.31])
     start = np.array([-0.2, y, 1.55])
     return start + way * (y / 0.62)

@@ -216,7 +216,7 @@ def test_a_time_limit_ends_it(sound):
 
 
 def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
-    """Compile time does not count towards `time_limit`, so a first run traces as many paths as a later run."""
+    """Compile time does not count towards `time_limit`, so a first run traces as many paths as later runs."""
     passes, real = [], tracing.irradiance_pass
 
     def slow_at_first(*args, **options):

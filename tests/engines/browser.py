@@ -1,7 +1,7 @@
 """Headless Chromium with a software renderer, and a server of static files on the loopback address.
 
-Both are for tests of what a browser shows. Nothing here is skipped if a tool is missing: the test fails with
-a sentence that says what to install.
+Tests use both to read back what a browser draws. If a tool is missing, the test is not skipped: it fails
+with a sentence that says what to install.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
 ]  # fmt: skip
 
-# What a module is served as; without the right type a browser does not run it.
+# {suffix: MIME type}. A browser runs a module only if it has the correct type.
 _TYPES = {
     ".js": "text/javascript",
     ".mjs": "text/javascript",
@@ -36,7 +36,7 @@ _TYPES = {
 
 
 def need_program(name: str, package: str) -> str:
-    """Return the path of a program, or fail the test with what to install."""
+    """Return the path of a program; if it is missing, fail the test and name the package to install."""
     found = shutil.which(name)
     if found is None:
         pytest.fail(f"'{name}' is not installed: apt-get install {package}")
@@ -44,7 +44,7 @@ def need_program(name: str, package: str) -> str:
 
 
 def need_modules() -> Path:
-    """Return the folder of the browser libraries, or fail the test with how to get them."""
+    """Return the `node_modules` folder of the browser libraries; if it is missing, fail with advice."""
     if not (NODE_MODULES / "three" / "package.json").is_file():
         pytest.fail("the browser libraries are not installed: run 'npm install' in tests/engines")
     return NODE_MODULES
@@ -52,7 +52,7 @@ def need_modules() -> Path:
 
 @contextmanager
 def serve(folders: Mapping[str, Path]) -> Iterator[str]:
-    """Serve folders on 127.0.0.1 and give the address, like http://127.0.0.1:40123.
+    """Serve folders on 127.0.0.1 and yield the address, like http://127.0.0.1:40123.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def serve(folders: Mapping[str, Path]) -> Iterator[str]:
             parts = PurePosixPath(unquote(urlsplit(self.path).path)).parts[1:]
             path = folders[parts[0]].joinpath(*parts[1:]) if parts and parts[0] in folders else None
             if parts == ("favicon.ico",):
-                # Every browser asks for one, and a 404 would count as an error of the page.
+                # Every browser requests the icon, and a 404 would count as an error of the page.
                 self.send_response(204)
                 self.end_headers()
                 return
@@ -82,7 +82,7 @@ def serve(folders: Mapping[str, Path]) -> Iterator[str]:
             self.wfile.write(data)
 
         def log_message(self, *_: Any) -> None:
-            """Keep the test's output clean."""
+            """Print no request log."""
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
@@ -96,7 +96,7 @@ def serve(folders: Mapping[str, Path]) -> Iterator[str]:
 
 @contextmanager
 def chromium(width: int = 640, height: int = 480) -> Iterator[Any]:
-    """Start Chromium and give a Playwright browser context; pages of it are closed at the end."""
+    """Start Chromium and yield a Playwright browser context, whose pages are closed at the end."""
     program = need_program("chromium", "chromium")
     try:
         from playwright.sync_api import sync_playwright
@@ -110,7 +110,8 @@ def chromium(width: int = 640, height: int = 480) -> Iterator[Any]:
             browser.close()
 
 
-# A program that reads pixels back hears that this is slow; one that has all bytes may close the stream early.
+# Console messages that are not errors: reading pixels back is slow, and a fetch that has all bytes may close
+# its stream early.
 _HARMLESS = ("GPU stall due to ReadPixels", "net::ERR_ABORTED")
 
 
@@ -121,7 +122,7 @@ def _note(troubles: list[str], kind: str, text: str) -> None:
 
 @contextmanager
 def page_at(context: Any, url: str) -> Iterator[tuple[Any, list[str]]]:
-    """Open a page and give it with the list of its errors and warnings, which grows as they come."""
+    """Open a page and yield it with a list to which its errors and warnings are appended."""
     page = context.new_page()
     troubles: list[str] = []
     page.on("pageerror", lambda error: troubles.append(f"error: {error}"))
@@ -135,7 +136,7 @@ def page_at(context: Any, url: str) -> Iterator[tuple[Any, list[str]]]:
 
 
 def run(context: Any, url: str, timeout: float = 60.0) -> tuple[Any, list[str]]:
-    """Open a page that ends by setting `window.result` or `window.failure`; return result and troubles."""
+    """Open a page, wait until it sets `window.result` or `window.failure`, and return result and messages."""
     with page_at(context, url) as (page, troubles):
         page.wait_for_function(
             "window.result !== undefined || window.failure !== undefined", timeout=1000 * timeout

@@ -1,4 +1,4 @@
-"""One browser for all engine tests."""
+"""The fixture of the browser that all engine tests share."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Bakes whose pixels in an engine are known: a probe square with made-up light, and a room of constant light.
+"""Bakes whose pixels in an engine are known: the probe (made-up light) and the room (constant light).
 
-The probe: a square of 2 x 2 in the xy plane, seen from +z. TEXCOORD_0 is one single point, TEXCOORD_1 the
-whole page with v = 0 at the top. Its page has four quadrants of irradiance: pi, 2 pi, pi / 4, pi / 2 (left to
-right, top to bottom), so albedo x E / pi is albedo times 1, 2, 1/4, 1/2.
+The probe is a square of 2 x 2 m in the xy plane, seen from +z. All corners have the same TEXCOORD_0.
+TEXCOORD_1 is the whole page with v = 0 at the top. The irradiance of its four quadrants is pi, 2 pi, pi /
+4, pi / 2 (left to right, top to bottom), so albedo x E / pi is albedo times 1, 2, 1/4, 1/2.
 """
 
 from __future__ import annotations
@@ -23,37 +23,38 @@ from baker.io.load import load_scene
 
 ALBEDO = (0.8, 0.5, 0.25)
 QUADRANT = np.array([[1.0, 2.0], [0.25, 0.5]])
-# The middles of the quadrants, as shares of the picture from its top left.
+# (row, column) of the quadrants' centres, as shares of the picture's size from its top left corner.
 MIDDLE = [(0.25, 0.25), (0.25, 0.75), (0.75, 0.25), (0.75, 0.75)]
-# A name that loaders change, and that two nodes have.
+# Name of two nodes; loaders change it because of the dot and the space.
 NAME = "wall.north side"
 SIZE = 64
 
-# A closed room: radiance of the walls EMISSION / (1 - REFLECTED) wherever one looks.
+# The room: its walls emit EMISSION cd/m2 and have albedo REFLECTED, so their radiance is EMISSION / (1 -
+# REFLECTED) in every direction.
 EMISSION, REFLECTED = 0.5, 0.5
 ROOM_RADIANCE = EMISSION / (1.0 - REFLECTED)
 
 
 def probe_page() -> np.ndarray:
-    """Return (SIZE, SIZE, 3) float32, lx."""
+    """Return the irradiance page of the probe, (SIZE, SIZE, 3) float32, lx."""
     page = np.kron(QUADRANT, np.ones((SIZE // 2, SIZE // 2))) * math.pi
     return np.repeat(page[:, :, None], 3, axis=2).astype(np.float32)
 
 
 def srgb_page() -> np.ndarray:
-    """Return the probe's page with the sRGB curve on it, which is wrong."""
+    """Return the probe's page with the sRGB curve applied, for tests of wrong exports."""
     share = probe_page() / probe_page().max()
     curve = np.where(share > 0.0031308, 1.055 * share ** (1 / 2.4) - 0.055, 12.92 * share)
     return (curve * probe_page().max()).astype(np.float32)
 
 
 def probe_expected(albedo: tuple[float, float, float] = ALBEDO) -> np.ndarray:
-    """Return (4, 3): what the quadrants' middles show, in the order of `MIDDLE`."""
+    """Return (4, 3) expected colours at the points `MIDDLE`."""
     return QUADRANT.ravel()[:, None] * np.array(albedo)
 
 
 def probe_builder(alpha: str = "OPAQUE") -> GltfBuilder:
-    """Return the probe's glTF: node 1 is the square, node 2 another far away, of the same name."""
+    """Return the probe's glTF: node 1 is the square, node 2 a distant square with the same name."""
     builder = GltfBuilder()
     position = np.float32([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
     whole = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -82,7 +83,7 @@ def probe_builder(alpha: str = "OPAQUE") -> GltfBuilder:
 def write_probe(folder: Path, exports: str, *, page: np.ndarray | None = None, **settings: object) -> Path:
     """Write the probe as a bake with these exports and return the output folder.
 
-    The far square lies on a page of its own, which is black.
+    The distant square is on the second page, which is black.
     """
     folder.mkdir(parents=True, exist_ok=True)
     scene = load_scene(write(folder / "probe.glb", probe_builder()))
@@ -112,7 +113,7 @@ def _whole(scene: baker.Scene, index: int) -> InstanceLayout:
 
 
 def room_builder() -> GltfBuilder:
-    """Return a closed box of 2 x 2 x 2 seen from inside, all walls of one grey that emits."""
+    """Return a closed box of 2 x 2 x 2 m, fronts inwards, whose walls have one grey, emissive material."""
     builder = GltfBuilder()
     grey = builder.add(
         "materials",

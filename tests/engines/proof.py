@@ -1,4 +1,4 @@
-"""Draws exports in the browser and checks the pixels."""
+"""Draws exports in the browser and compares pixels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PAGES = Path(__file__).parent / "pages"
 
 
 def draw(browser, folder, page="three", **query):
-    """Return the picture (64, 64, 3) that a page draws of an export folder, row 0 on top."""
+    """Return the (64, 64, 3) picture of an export folder that an HTML page draws, row 0 on top."""
     with serve({"modules": need_modules(), "pages": PAGES, "bake": folder}) as address:
         url = f"{address}/pages/{page}.html?{urlencode({'folder': '/bake/', **query})}"
         result, troubles = run(browser, url)
@@ -33,18 +33,18 @@ def shows_the_probe(picture, expected=None, rel=0.01):
 
 
 def shows_something_else(picture, rel=0.01):
-    """Say whether a wrong export shows as wrong. A black picture shows nothing: the page would be broken."""
+    """Return whether the pixels are wrong but not all black; an all-black picture means a failed page."""
     return middles(picture).max() > 0.05 and not shows_the_probe(picture, rel=rel)
 
 
 def shows_the_room(picture):
-    """Say whether 99 of 100 pixels are right to 1 %: where walls meet, the bake itself is up to 4 % off."""
+    """Return whether 99 % of the pixels have an error below 1 %; the bake has up to 4 % at room edges."""
     miss = np.abs(picture / ROOM_RADIANCE - 1.0)
     return np.quantile(miss, 0.99) < 0.01 and miss.max() < 0.04
 
 
 def changed(folder, target, name, right, wrong):
-    """Copy an export and replace one piece of one of its files; return the copy."""
+    """Copy an export to `target`, replace `right` by `wrong` in the file `name`, and return the copy."""
     shutil.copytree(folder, target)
     path = target / name
     text = path.read_text("utf-8")
@@ -54,7 +54,7 @@ def changed(folder, target, name, right, wrong):
 
 
 def lower_left_quarter(folder, target):
-    """Copy an export and let the probe's first object read only the lower left quarter of its page."""
+    """Copy an export and change the probe's first object to use only the lower left quarter of its page."""
     shutil.copytree(folder, target)
     path = target / "lightmap.json"
     bake = json.loads(path.read_text("utf-8"))

@@ -1,4 +1,4 @@
-"""Run by Blender's Python: renders an export. Arguments: folder, camera (front or inside), image to write."""
+"""Renders an export, run by Blender's Python. Arguments: folder, camera (front or inside), image to write."""
 
 import math
 import runpy
@@ -21,7 +21,7 @@ scene.view_settings.view_transform = "Raw"
 camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
 scene.collection.objects.link(camera)
 scene.camera = camera
-# glTF's (x, y, z) is Blender's (x, -z, y).
+# The point (x, y, z) of glTF is (x, -z, y) in Blender.
 if view == "front":
     camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
     camera.location, camera.rotation_euler = (0.0, -2.0, 0.0), (math.pi / 2, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Babylon.js in headless Chromium shows the export `babylon` as it should, and wrong exports as wrong."""
+"""Babylon.js in headless Chromium draws the export `babylon` correctly, and changed exports incorrectly."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Blender shows the export `blender` as it should, and wrong exports as wrong.
+"""Blender draws the export `blender` correctly, and changed exports incorrectly.
 
-By hand, for Blender is large. It wants Python 3.11:
+The test runs by hand because Blender is large. It needs Python 3.11:
 
     python3.11 -m venv tests/engines/blender-env && tests/engines/blender-env/bin/pip install 'bpy==4.5.*'
     pytest -m engines_by_hand tests/engines/test_blender.py

@@ -1,6 +1,6 @@
-"""Godot 3 imports and shows the export `godot` as it should, and wrong exports as wrong.
+"""Godot 3 imports and draws the export `godot` correctly, and changed exports incorrectly.
 
-By hand, for Godot is large:
+The test runs by hand because Godot is large:
 
     apt-get install godot3 godot3-server xvfb xauth
     pytest -m engines_by_hand tests/engines/test_godot.py
@@ -23,12 +23,13 @@ from proof import changed, lower_left_quarter, middles, shows_something_else, sh
 
 pytestmark = pytest.mark.engines_by_hand
 PROJECT = Path(__file__).parent / "godot3"
-# The picture has 8 bits: values are read where their code is high, at several exposures, and averaged.
+# Exposures of the pictures. A picture has 8 bits, so a value is averaged over the exposures at which its code
+# is high.
 EXPOSURES = [2.0 ** (k / 4) for k in range(-8, 17)]
 
 
 def imported(project, environment):
-    """Run the editor until everything is imported: with --quit it may leave before it has begun."""
+    """Run the editor until all files are imported; with --quit it may exit before it begins to import."""
     editor = [need_program("godot3-server", "godot3-server"), "--editor", "--path", str(project)]
     wanted = len(list(project.glob("godot/*.exr"))) + 1
     log = project.with_suffix(".log")
@@ -36,7 +37,7 @@ def imported(project, environment):
         process = subprocess.Popen(editor, env=environment, stdout=stream, stderr=subprocess.STDOUT)
         try:
             for _ in range(600):
-                # The hash of a file is written after the file itself.
+                # Godot writes the .md5 file of an asset after the imported asset.
                 if len(list(project.glob(".import/*.md5"))) == wanted or process.poll() is not None:
                     break
                 time.sleep(0.2)
@@ -49,16 +50,16 @@ def imported(project, environment):
 
 
 def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
-    """Import an export with the editor, draw it, and return the picture (64, 64, 3), row 0 on top."""
+    """Import an export with the editor, draw it, and return the (64, 64, 3) picture, row 0 on top."""
     project = tmp_path / "project"
     shutil.copytree(PROJECT, project)
     shutil.copytree(folder, project / "godot")
-    # The steps of the README for Godot 3.
+    # Follow the steps of the README for Godot 3.
     for path in sorted((project / "godot" / "godot3").glob("lightmap*")):
         path.replace(project / "godot" / path.name)
     (project / "godot" / "import_scene.gd").unlink()
     (project / "task.json").write_text(json.dumps({"camera": camera, "exposures": exposures}), "utf-8")
-    # Godot keeps its settings in the home folder.
+    # Godot stores its settings in the home folder.
     environment = {**os.environ, "HOME": str(tmp_path)}
     imported(project, environment)
     game = [need_program("xvfb-run", "xvfb"), "-a", need_program("godot3", "godot3")]
@@ -69,7 +70,7 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     assert result.exists(), told[-3000:]
     assert "SCRIPT ERROR" not in told, told[-3000:]
     code = np.array(json.loads(result.read_text("utf-8")), float).reshape(-1, 64, 64, 3)
-    # Godot truncates: a code represents the interval above it.
+    # Godot truncates, so a code represents the interval from code / 255 to (code + 1) / 255.
     level = (code + 0.5) / 255.0
     linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     good = (code >= 120) & (code <= 250)

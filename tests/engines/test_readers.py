@@ -1,4 +1,4 @@
-"""Other programs read the files: Khronos' validator the GLB, OpenImageIO and exrheader the images."""
+"""Other programs read the files: Khronos' validator reads the GLB, OpenImageIO and exrheader the images."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ASSETS = Path(__file__).parents[2] / "assets"
 
 
 def validate(path):
-    """Return the codes of the validator's errors and warnings for a file, sorted, each with its place."""
+    """Return the sorted (severity, code) pairs of the validator's errors and warnings for a file."""
     script = Path(__file__).with_name("validate.mjs")
     done = subprocess.run(
         [need_program("node", "nodejs"), str(script), str(need_modules()), str(path)],
@@ -28,7 +28,7 @@ def validate(path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
-    # Severity 0 is an error, 1 a warning; hints and notes are taste.
+    # Severity 0 is an error and 1 a warning; infos and hints are ignored.
     return sorted((m["severity"], m["code"]) for m in report["messages"] if m["severity"] <= 1)
 
 
@@ -55,7 +55,7 @@ def test_every_glb_of_an_export_is_valid(probe):
 def test_the_validator_finds_what_is_wrong(probe, tmp_path):
     data = (probe / "scene.glb").read_bytes()
     assert data.count(b'"TEXCOORD_1"') > 0
-    # Same length, so that only the attribute's name is wrong.
+    # The new name has the same length, so that nothing else in the file becomes invalid.
     (tmp_path / "bad.glb").write_bytes(data.replace(b'"TEXCOORD_1"', b'"TEXCOORD_9"'))
     assert validate(tmp_path / "bad.glb")
 
@@ -102,7 +102,7 @@ def test_openimageio_reads_the_png_files(encoded):
     code, spec = read(out / "irradiance_0.rgbm.png")
     assert (spec.nchannels, str(spec.format)) == (4, "uint8")
     top = float(spec["top"])
-    # OpenImageIO hands colours multiplied by alpha, which is the product that RGBM asks for.
+    # OpenImageIO returns colours multiplied by alpha, which is the product in the formula of RGBM.
     value = top * code[:, :, :3].astype(np.float64) ** 2.2
     assert value == pytest.approx(probe_page(), rel=0.02)
     for bits in (8, 16):

@@ -1,4 +1,4 @@
-"""Sources for engines that are not run here are at least whole sentences of their languages."""
+"""Source files for engines that the tests do not run parse without syntax errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.engines
 
 
 def errors(module, source):
-    """Return the lines at which a grammar does not understand a source."""
+    """Return the numbers of the lines with syntax errors, by the grammar in a tree-sitter module."""
     from tree_sitter import Language, Parser
 
     parser = Parser(Language(module.language()))

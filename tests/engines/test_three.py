@@ -1,4 +1,4 @@
-"""three.js in headless Chromium shows the export `three` as it should, and wrong exports as wrong."""
+"""three.js in headless Chromium draws the export `three` correctly, and changed exports incorrectly."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.engines
 
 def test_the_probe_is_shown_exactly(browser, probe):
     picture = draw(browser, probe / "three", camera="front")
-    # Half floats and a linear lookup: far closer than the 1 % asked for.
+    # With half floats and linear output, the error is far below the required 1 %.
     assert shows_the_probe(picture, rel=0.001), middles(picture)
 
 
@@ -38,7 +38,7 @@ def test_exposure_multiplies(browser, probe):
 
 
 def test_a_room_of_known_radiosity(browser, room):
-    """In a closed room of one colour the radiance is L / (1 - albedo) everywhere, emission included."""
+    """In a closed room of one material the radiance, including emission, is L / (1 - albedo) everywhere."""
     picture = draw(browser, room / "three", camera="inside")
     assert shows_the_room(picture)
 
@@ -63,7 +63,7 @@ def test_offset_and_scale_of_an_object_are_used(browser, probe, tmp_path):
 def test_a_wrong_export_fails(browser, probe, tmp_path, right, wrong, matte):
     copy = changed(probe / "three", tmp_path / "wrong", "lightmap.js", right, wrong)
     options = json.dumps({"matte": matte})
-    # Standard materials are up to 2 % off even when right.
+    # Correct pictures of standard materials differ by up to 2 %, because part of the light is specular.
     rel = 0.01 if matte else 0.03
     if not matte:
         assert shows_the_probe(draw(browser, probe / "three", camera="front", options=options), rel=rel)

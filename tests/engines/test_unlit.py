@@ -1,4 +1,4 @@
-"""The export `unlit`, which needs no module, shown by three.js as any viewer shows it."""
+"""three.js draws the export `unlit`, which needs no module, correctly."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ def exposure_of(folder):
 
 
 def test_the_probe_is_shown(browser, probe):
-    """Eight bits behind the sRGB curve, so nothing may be off by more than half a step of that."""
+    """Textures have 8 bits after the sRGB curve, so the error is at most half a step of that encoding."""
     folder = probe / "unlit"
     exposure = exposure_of(folder)
     picture = middles(draw(browser, folder, camera="front", plain=1))
     miss = np.abs(curve(picture) - curve(probe_expected() * exposure))
     assert miss.max() <= 0.51 / 255, picture
-    # Of bright values that is less than 1 %.
+    # For bright values half a step is less than 1 %.
     bright = probe_expected() > 0.3
     assert picture[bright] / exposure == pytest.approx(probe_expected()[bright], rel=0.01)
-    # The brightest quadrant's red is what just fits.
+    # The exposure maps the red of the brightest quadrant to white.
     assert exposure == pytest.approx(1.0 / probe_expected().max(), rel=1e-3)
 
 
@@ -38,7 +38,7 @@ def test_a_room_of_known_radiosity(browser, room):
     folder = room / "unlit"
     picture = draw(browser, folder, camera="inside", plain=1) / exposure_of(folder)
     miss = np.abs(picture / ROOM_RADIANCE - 1.0)
-    # Beside the bake's own borders, texels over the exposure are cut off.
+    # Exceptions are errors of the bake at chart borders, and texels brighter than white, which clip.
     assert np.quantile(miss, 0.99) < 0.01
     assert miss.max() < 0.04
 

@@ -1,6 +1,7 @@
-"""`baker view` in a real browser: every pixel and figure is compared with what the files say.
+"""`baker view` in a browser: pixels and displayed numbers are compared with the files of the bake.
 
-Expected places come from the camera in the file, expected colours from the EXR as another reader decodes it.
+Expected pixel positions follow from the camera in the file, and expected colours from the EXR, decoded by
+another library.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ from baker.viewer.script import find_three
 from baker.viewer.server import make_server
 
 pytestmark = pytest.mark.engines
-# sRGB bytes may be rounded either way by the card, and by the texture unit before that.
+# Largest difference of sRGB bytes: the texture unit and the frame buffer may round up or down.
 LEVELS = 2
 MIDDLE = 0.35
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class Page:
-    """The page of one bake in one browser window, and the files behind it."""
+    """The viewer page of one bake in one browser window, and the files of the bake."""
 
     def __init__(self, window, url, out):
         self.window, self.url, self.out = window, url, out
@@ -62,7 +63,7 @@ class Page:
         return self.window.evaluate(expression)
 
     def wait_for(self, expression, seconds=10):
-        # Asked from outside: the page's own policy forbids scripts that are handed in as text.
+        # Poll from this process, because the page's content policy forbids to evaluate waiting scripts in it.
         end = time.monotonic() + seconds
         while not self.ask(expression):
             assert time.monotonic() < end, f"waited in vain for {expression}"
@@ -82,7 +83,7 @@ class Page:
         mouse.up(button=button)
 
     def picture(self):
-        """Return what is seen, (height, width, 3), once all that was asked for is drawn."""
+        """Return a screenshot (height, width, 3) after all requested changes are drawn."""
         self.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
         shot = Image.open(io.BytesIO(self.window.screenshot()))
         return np.asarray(shot.convert("RGB")).astype(int)
@@ -92,18 +93,18 @@ class Page:
         return self.ask(script + " return [b.left, b.top, b.width, b.height]; })()")
 
     def spot(self, x, y, z=0.0):
-        """Return the pixel where a point of the world is seen from (0, 0, 5)."""
+        """Return the pixel at which the camera at (0, 0, 5) sees a world point."""
         left, top, width, height = self.box("stage")
         tall = 0.4 * (5 - z)
         return left + width / 2 + x / tall * height / 2, top + height / 2 - y / tall * height / 2
 
     def atlas_spot(self, u, v):
-        """Return the pixel where a place of the page is seen in the atlas."""
+        """Return the pixel at which the atlas window shows the uv (u, v)."""
         left, top, width, height = self.box("atlas")
         return left + width * (0.5 + (u - 0.5) * 0.97), top + height * (0.5 + (v - 0.5) * 0.97)
 
     def pixels(self, places):
-        """Return (n, 3): the colours seen at places, all in one picture."""
+        """Return (n, 3) colours at pixels of one screenshot."""
         picture = self.picture()
         return np.array([picture[int(y), int(x)] for x, y in places])
 
@@ -135,9 +136,9 @@ def served(out, three=None):
 
 @contextmanager
 def window_of(browser):
-    """Open a window of the size of a small screen; nothing may be asked of any other machine."""
+    """Open a window of 1200 x 720 pixels; fail if the page requests anything from another machine."""
     context = browser.browser.new_context(viewport={"width": 1200, "height": 720})
-    context.set_default_timeout(90_000)  # for machines with much else to do
+    context.set_default_timeout(90_000)  # milliseconds, enough for busy machines
     with page_at(context, "about:blank") as (window, troubles):
         far = re.compile(r"^(?!http://127\.0\.0\.1:|data:|about:)")
         window.on("request", lambda asked: troubles.append(asked.url) if far.match(asked.url) else None)
@@ -192,7 +193,7 @@ def close(pixel, expected):
     return np.abs(pixel - np.asarray(expected)).max() <= LEVELS
 
 
-# Places of the squares, off the borders of texels and of the paint's quadrants.
+# (s, t) points on the squares, not on borders of texels or of the quadrants of `PAINT`.
 PLACES = [(0.2, 0.9), (0.8, 0.7), (0.15, 0.2), (0.93, 0.35)]
 
 
@@ -201,7 +202,7 @@ def paint_at(s, t):
 
 
 def lit_pixels(page):
-    """Return (what is seen, what should be) at places of both squares, texels as they are."""
+    """Return (drawn, expected) colours at `PLACES` of both squares, without smooth lookup."""
     page.press("t")
     spots, expected = [], []
     for s, t in PLACES:
@@ -259,7 +260,7 @@ def test_a_click_tells_object_texel_and_the_exact_value(page):
             assert float(page.field("ao")) == page.ao[number, row, column, 0]
             assert page.field("status") == "covered"
             x, y, z = (float(word) for word in page.field("position").split()[:3])
-            # Half a pixel of the picture is 2.4 mm.
+            # Half a pixel is 2.4 mm wide in the scene.
             np.testing.assert_allclose((x, y, z), world(at, s, t), atol=0.004)
 
 
@@ -291,7 +292,7 @@ def test_one_sees_and_clicks_through_the_holes_of_a_leaf(page):
         page.wait_for(f"document.querySelector('[data-field=object]')?.innerText === {name!r}", 5)
     page.show("2", "irradiance")
     x, y = page.spot(*world(LEAF_AT, 0.25, 0.4))
-    # The point of the plane z = 0 behind it, then its place on the plain square.
+    # The point of the plane z = 0 behind the hole, then its (s, t) on the plain square.
     behind = [0.25 * 0.6 + 0.8, 0.4 * 0.6 - 0.3] * np.array(5 / 4.5)
     s, t = (behind - np.array(PLAIN_AT[:2])) / PLAIN_AT[2]
     page.press("t")
@@ -311,13 +312,14 @@ def test_every_switch_shows_its_quantity(page):
     assert close(page.pixel(spot), srgb(page.light[1, row, column] * page.exposure * 2))
     assert page.ask("document.getElementById('exposure-value').innerText") == "+1.0 EV"
     page.show("5", "status")
-    # Seen square on the light from the eye is full: the legend's colours are met.
+    # A surface that faces the viewer has the full brightness of the headlight, so its colours equal those of
+    # the legend.
     for kind, place in ((1, (0.1, 0.1)), (3, (0.25, 0.75)), (4, (0.55, 0.45))):
         row, column = texel_at(painted_uv(*place))
         assert page.status[0, row, column] == kind
         swatch = f"getComputedStyle(document.querySelectorAll('#legend .swatch')[{kind}]).backgroundColor"
         colour = [int(part) for part in re.findall(r"\d+", page.ask(swatch))]
-        # A place off the axis is seen at up to 24 degrees: 0.55 + 0.45 cos of it.
+        # Brightness is 0.55 + 0.45 cos(view angle), with angles of up to 24 degrees off the axis.
         x, y, _ = world(PAINTED_AT, *place)
         light = 0.55 + 0.45 * 5 / np.sqrt(x * x + y * y + 25)
         assert close(page.pixel(page.spot(*world(PAINTED_AT, *place))), np.array(colour) * light)
@@ -329,7 +331,8 @@ def test_every_switch_shows_its_quantity(page):
 
 def test_the_checker_has_squares_of_eight_texels(page):
     page.show("4", "checker")
-    # Page 0 begins at texel 4: squares change at s = 4/24, 12/24, 20/24.
+    # The painted square begins at texel 4 of page 0, so squares of the checker change at s = 4/24, 12/24,
+    # 20/24.
     spots = [page.spot(*world(PAINTED_AT, s, 0.25)) for s in (0.08, 0.25, 0.42, 0.6, 0.8, 0.92)]
     row = page.pixels(spots).mean(axis=1)
     light = row > row.mean()
@@ -337,7 +340,8 @@ def test_the_checker_has_squares_of_eight_texels(page):
         [True, False, False, True, True, False],
         [False, True, True, False, False, True],
     )
-    # Each object in its own hue: the hues differ by more than light and dark of one hue do.
+    # Each object has a different hue: the hues of two objects differ more than light and dark squares of one
+    # object.
     hues = page.pixels([page.spot(*world(at, s, 0.25)) for at in (PAINTED_AT, PLAIN_AT) for s in (0.1, 0.9)])
     ratios = [np.argsort(hue).tolist() for hue in hues]
     assert ratios[0] == ratios[1] != ratios[2] == ratios[3]
@@ -380,7 +384,7 @@ def test_the_atlas_shows_the_page_with_its_first_row_on_top(page):
     assert page.field("texel") == f"page 1, row {row}, column {column}"
     assert page.field("object") == "plain <b>& node 1"
     assert page.picked_light() == page.light[1, row, column].tolist()
-    # The arrow keys go on from there, one texel each.
+    # Each arrow key moves the picked texel by one.
     page.press("ArrowRight")
     page.press("ArrowDown")
     assert page.field("texel") == f"page 1, row {row + 1}, column {column + 1}"
@@ -407,7 +411,7 @@ def test_one_can_turn_shift_zoom_and_come_back(page):
         seen.append(page.picture())
         assert np.abs(seen[-1] - seen[-2]).mean() > 0.2
     page.press("0")
-    page.ask("document.activeElement.blur()")  # the stage shows its middle while it has the focus
+    page.ask("document.activeElement.blur()")  # the stage marks its middle while it has the focus
     stage = np.s_[60:660, 330:870]  # without the legend
     np.testing.assert_array_equal(page.picture()[stage], before[stage])
 

@@ -1,4 +1,4 @@
-"""Says in words where two records of the guard differ."""
+"""Describes the differences between two records of the guard, one line for each."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-# Differences reported for one file.
+# Largest number of differences that are reported for one file.
 MOST = 8
 _NOTHING = object()
 
@@ -46,7 +46,7 @@ def _run(old: Record, new: Record) -> Iterator[str]:
 
 
 def _entry(old: Record | None, new: Record | None) -> list[str]:
-    """Return what differs between two entries of one file or stream."""
+    """Return lines that describe the differences between two entries of one file or output stream."""
     if old == new:
         return []
     if old is None or new is None:
@@ -82,7 +82,7 @@ def _json(old: str, new: str) -> list[str]:
 
 
 def json_differences(old: Any, new: Any, path: str = "$") -> Iterator[str]:
-    """Yield a line for each place where two JSON values differ, the order of keys included."""
+    """Yield a line for each path at which two JSON values differ; the order of keys is compared, too."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys([*old, *new]):
             yield from json_differences(old.get(key, _NOTHING), new.get(key, _NOTHING), f"{path}.{key}")

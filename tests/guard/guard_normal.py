@@ -1,4 +1,4 @@
-"""Removes from outputs what may differ between two runs of one program: times, paths, versions."""
+"""Removes from outputs all data that may differ between two runs of one program: times, paths, versions."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from typing import Any
 # Keys removed from every JSON object, at any depth.
 REMOVED_KEYS = frozenset(
     {
-        # How long something took, and when.
+        # Durations and times of day.
         "timings", "created", "seconds", "compile_seconds", "startTimeUtc", "endTimeUtc",
-        # What it was run with.
+        # Versions, machine and memory of the run.
         "versions", "machine", "memory", "peak_memory", "source",
     }
 )  # fmt: skip
 
-# Replaced in texts, in this order.
+# (pattern, replacement), applied to texts in this order.
 REPLACED = (
-    # Progress is shown every few seconds: how many lines, and what they say, depends on the machine.
+    # Progress lines are printed every few seconds, so their number and content depend on the machine.
     (re.compile(r"^[a-z][a-z ]*:  \d+ %.*\n", re.MULTILINE), ""),
-    # Seconds, and how far they are indented.
+    # Seconds and their indentation.
     (re.compile(r"^\d+\.\d\d s: .*$", re.MULTILINE), lambda m: re.sub(r"\d+\.\d\d", "<time>", m[0])),
     (re.compile(r" *\b\d[\d.,]* (Mrays/s|s\b)"), r" <number> \1"),
-    # The manifest's length follows the number of digits of its times.
+    # The size of the manifest depends on the number of digits of its times.
     (re.compile(r"(bake\.json +)\d[\d.]* k?B"), r"\1<size>"),
     (re.compile(r"\b(time|timestamp)=\"[^\"]*\""), r'\1="<time>"'),
     (re.compile(r"127\.0\.0\.1:\d+"), "127.0.0.1:<port>"),
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(Z|\+00:00)?"), "<date>"),
 )
 TEXTS = frozenset({".html", ".md", ".xml", ".svg", ".txt", ".toml", ".cfg", ".csv"})
-# A longer text is kept as its hash alone.
+# Length of a text, characters: only the hash of a longer text is recorded.
 LONGEST = 500_000
 
 Entry = dict[str, Any]
 
 
 def normal_text(text: str, places: dict[str, str]) -> str:
-    """Return a text without times, ports and places of this machine.
+    """Return a text in which times, ports and paths of this machine are replaced by placeholders.
 
     Parameters
     ----------
     text : str
     places : dict
-        Absolute paths and their placeholders; the first match is used.
+        {absolute path: placeholder}, replaced in this order.
     """
     for path, name in places.items():
         text = text.replace(path, name)
@@ -56,7 +56,7 @@ def normal_text(text: str, places: dict[str, str]) -> str:
 
 
 def normal_json(value: Any, places: dict[str, str]) -> Any:
-    """Return a JSON value without `REMOVED_KEYS`, and with normal texts; the order of keys is kept."""
+    """Return a JSON value without `REMOVED_KEYS`, in the same key order, with normal strings."""
     if isinstance(value, dict):
         return {key: normal_json(item, places) for key, item in value.items() if key not in REMOVED_KEYS}
     if isinstance(value, list):
@@ -65,7 +65,7 @@ def normal_json(value: Any, places: dict[str, str]) -> Any:
 
 
 def layout(text: str) -> str:
-    """Name the way in which a JSON text is laid out: its spaces, line ends and escapes."""
+    """Return a description of the format of a JSON text: indentation, line ends and escapes."""
     value = json.loads(text)
     for indent in (None, 1, 2, 4):
         for separators in (None, (",", ":")):
@@ -83,7 +83,7 @@ def hashed(content: bytes) -> str:
 
 
 def text_entry(text: str, places: dict[str, str]) -> Entry:
-    """Return what is recorded of a text, which may be JSON."""
+    """Return the record entry of a text, parsed if it is JSON."""
     stripped = text.lstrip()
     if stripped[:1] in ("{", "["):
         try:
@@ -96,7 +96,7 @@ def text_entry(text: str, places: dict[str, str]) -> Entry:
 
 
 def file_entry(path: Path, places: dict[str, str]) -> Entry:
-    """Return what is recorded of a file."""
+    """Return the record entry of a file."""
     content = path.read_bytes()
     suffix = path.suffix.lower()
     if suffix in TEXTS or content[:1] in (b"{", b"["):
@@ -118,7 +118,7 @@ def _kept(kind: str, text: str, **more: Any) -> Entry:
 
 
 def _glb_parts(content: bytes) -> Entry:
-    """Return the JSON chunk of a GLB as text, and the hash of the rest: only to say what differs."""
+    """Return an entry with the JSON chunk of a GLB as text and the hash of the other bytes."""
     (length,) = struct.unpack_from("<I", content, 12)
     text, rest = content[20 : 20 + length].decode(), content[20 + length :]
     return {"rest": hashed(rest), **({"text": text.rstrip()} if length <= LONGEST else {})}

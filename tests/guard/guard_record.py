@@ -1,4 +1,4 @@
-"""Runs the command lines of the guard with one program, and records what they leave and say."""
+"""Runs the command lines of the guard with one program, and records the files they write and their output."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from guard_normal import file_entry, hashed, text_entry
 from guard_runs import FIRST, RUNS
 from guard_scenes import write_scenes
 
-# Seconds after which a command is ended; compiling all its kernels takes one or two minutes of a core.
+# Time after which a command is killed, seconds. Compiling all kernels of a command takes 60 to 120 s on one
+# core.
 LONGEST = 900
 _LINK = re.compile(r"""(?:src=|href=|from |import )["']([^"':]+)["']""")
 
@@ -36,11 +37,11 @@ class Program:
     Attributes
     ----------
     command : list of str
-        What the arguments follow.
+        First words of the command line; the arguments are appended.
     root : Path
-        The checkout it is of.
+        Root folder of the checkout.
     path : Path or None
-        Folder that holds its packages, if it is not the installed one.
+        Folder that contains the packages; None for the installed ones.
     """
 
     command: list[str]
@@ -49,7 +50,7 @@ class Program:
 
     @property
     def environment(self) -> dict[str, str]:
-        """Return the variables it runs with."""
+        """Return the environment variables for the program's processes."""
         kept = {name: text for name, text in os.environ.items() if not name.startswith(("PYTHON", "LC_"))}
         for name in ("FORCE_COLOR", "TERMINAL_WIDTH"):
             kept.pop(name, None)
@@ -57,20 +58,20 @@ class Program:
         return {**kept, **more, "COLUMNS": "100", "TERM": "dumb", "NO_COLOR": "1", "LC_ALL": "C.UTF-8"}
 
     def source(self) -> Path:
-        """Return the file of the package that it runs."""
+        """Return the path of the `baker/__init__.py` that the program imports."""
         words = [sys.executable, "-P", "-c", "import baker; print(baker.__file__)"]
         found = subprocess.run(words, env=self.environment, capture_output=True, text=True, check=True)
         return Path(found.stdout.strip()).resolve()
 
 
 def record(program: Program, *, processes: int = 2, only: tuple[str, ...] = ()) -> Record:
-    """Run all, or some, and return the record.
+    """Run all command lines of the guard, or those of `only`, and return the record.
 
     Parameters
     ----------
     program : Program
     processes : int
-        Runs at a time, once kernels are compiled.
+        Number of runs at a time; the runs of `FIRST`, which compile most kernels, run one at a time.
     only : tuple of str
         Names of runs; empty for all.
     """
@@ -86,7 +87,7 @@ def record(program: Program, *, processes: int = 2, only: tuple[str, ...] = ()) 
 
 
 def _run(program: Program, name: str, place: Path) -> Record:
-    """Do one run in a folder of its own."""
+    """Do one run in a new folder below `place` and return its record."""
     folder = place / name.replace(" ", "-")
     shutil.copytree(place / "scenes", folder / "scenes")
     given = {path: hashed(path.read_bytes()) for path in _files(folder)}
@@ -138,7 +139,7 @@ def _said(code: int, out: str, errors: str, places: dict[str, str]) -> Record:
 def _view(
     program: Program, out: str, folder: Path, environment: dict[str, str], places: dict[str, str]
 ) -> Record:
-    """Start `baker view`, fetch its pages into `fetched/`, and stop it as Ctrl-C does."""
+    """Start `baker view`, fetch its pages into `fetched/`, and stop it with the signal of Ctrl-C."""
     process = subprocess.Popen(
         [*program.command, "view", out, "--json", "--no-browser"], cwd=folder, env=environment,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -161,13 +162,13 @@ def _view(
         process.kill()
     said = _said(process.returncode, told + rest, errors, places)
     if found is not None:
-        # The port is any that was free.
+        # The port is a random free one, so record 0.
         said["stdout"] = text_entry(json.dumps({**found, "port": 0}), places)
     return said
 
 
 def _fetch(url: str, target: Path) -> None:
-    """Fetch the page, all that it links to, and the data of the bake."""
+    """Fetch the page, all files to which it links, and the data of the bake."""
     todo = ["/", "/scene.json", "/geometry", "/status/0", "/out/bake.json"]
     todo += [f"/page/{channel}/{page}" for channel in ("irradiance", "ao") for page in (0, 1)]
     seen: set[str] = set()

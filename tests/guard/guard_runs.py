@@ -1,13 +1,14 @@
-"""What the guard runs: command lines in order, each list in a folder of its own that holds `scenes/`.
+"""The command lines that the guard runs; each list runs in order in a separate folder that has `scenes/`.
 
-A line is the command line of `baker` as one types it, except for lines that begin with @: `@view OUT` starts
-`baker view`, fetches what a browser would and stops it; `@copy FROM TO` and `@remove PATH` change files.
+A line has the arguments of `baker` as typed in a shell. Lines that begin with @ differ: `@view OUT` starts
+`baker view`, fetches the files that a browser would fetch, and stops it; `@copy FROM TO` and `@remove
+PATH` change files.
 """
 
 from __future__ import annotations
 
-# Run one after another, and before all others: they are the first to need most kernels, and two processes
-# should not compile the same kernel at once.
+# These runs are done first and one after another. They compile most kernels, and two processes should not
+# compile the same kernel at the same time.
 FIRST = ("cornell", "holes", "glass", "verify", "pictures")
 
 _TINY = "--resolution 32 --samples 4"

@@ -1,4 +1,4 @@
-"""The scenes of the guard's runs: files of `assets/`, and small ones built without any code of baker."""
+"""The scenes of the guard's runs: files of `assets/`, and small scenes built without code of `baker`."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ seed = 7
 
 
 def write_scenes(folder: Path) -> None:
-    """Write all scenes into a folder; files of `assets/` lie beside their textures."""
+    """Write all scenes into a folder; files of `assets/` are copied together with their textures."""
     folder.mkdir(parents=True)
     for name in ASSETS:
         source, inside = ROOT / "assets" / name, Path(name).parts
@@ -87,7 +87,7 @@ def write_scenes(folder: Path) -> None:
 
 
 def _window(*, glass: bool) -> GlbBuilder:
-    """Return a room with a window of coloured glass, or a grating whose texture has holes."""
+    """Return a room whose window is coloured glass (`glass`) or a grating with a `MASK` texture."""
     builder = GlbBuilder()
     wall = builder.material("wall", (0.7, 0.6, 0.5))
     if glass:
@@ -108,7 +108,7 @@ def _window(*, glass: bool) -> GlbBuilder:
 
 
 def _crates() -> GlbBuilder:
-    """Return copies of a crate and a ball on a floor under a spot, an emitter and a sun."""
+    """Return instances of a crate and a ball on a floor, lit by a spot light, an emitter and a sun."""
     builder = GlbBuilder()
     wood = builder.material("wood", (0.5, 0.3, 0.2))
     grey = builder.material("grey", (0.5, 0.5, 0.5), roughness=0.4)
@@ -131,7 +131,7 @@ def _crates() -> GlbBuilder:
 
 
 def _text_meshes(folder: Path) -> None:
-    """Write an L of two rectangles as PLY, OFF and STL, in text."""
+    """Write two rectangles that form an L as text files in PLY, OFF and STL."""
     point = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (1, 1, 0), (0, 1, 0)]
     face = [(0, 3, 2), (0, 2, 1), (0, 1, 4), (0, 4, 5)]
     rows = "".join(f"{x} {y} {z}\n" for x, y, z in point)

@@ -1,11 +1,12 @@
 """Records every output of `baker` in small runs of all its features, to compare two commits on one machine.
 
     python tests/guard/outputs.py --write FILE       records the installed checkout
-    python tests/guard/outputs.py --compare FILE     records it again and tells what differs
-    python tests/guard/outputs.py --against COMMIT   records a commit and this checkout, and tells
+    python tests/guard/outputs.py --compare FILE     records it again and prints the differences
+    python tests/guard/outputs.py --against COMMIT   records both versions and prints the differences
 
-Exit code 1 if something differs. Only the command line is used, so modules may be moved and renamed. A record
-is true for one machine: instructions of the processor, and libraries, change the last bits.
+The exit code is 1 if there are differences. The guard uses only the command line, so modules may be moved
+and renamed. A record is valid on one machine only, because the processor and libraries change the last
+bits of results.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from guard_record import Program, record
 from guard_runs import RUNS
 
 ROOT = Path(__file__).resolve().parents[2]
-# Python's own install of this project in editable form would lend modules that the commit does not have.
+# Start-up code of a commit's program: it removes the import hook of the editable install, which would find
+# modules that the commit does not have.
 _NO_EDITABLE = """
 import sys
 
@@ -48,7 +50,7 @@ def main() -> int:
         parser.error(f"unknown runs: {', '.join(sorted(set(only) - set(RUNS)))}")
     if given.against:
         with tempfile.TemporaryDirectory(prefix="guard-") as folder:
-            # One at a time: its kernels are not compiled yet.
+            # The kernels of the commit are not compiled yet, so use one process.
             old = _timed(program_of(given.against, Path(folder).resolve()), 1, only)
     elif given.compare:
         old = read(given.compare)
@@ -70,26 +72,26 @@ def _timed(program: Program, processes: int, only: tuple[str, ...]) -> Record:
 
 
 def counted(found: Record) -> str:
-    """Tell the size of a record."""
+    """Return a text with the numbers of runs and files of a record."""
     runs = found["runs"].values()
     lines, files = sum(len(run["steps"]) for run in runs), sum(len(run["files"]) for run in runs)
     return f"{len(runs)} runs, {lines} commands, {files} files"
 
 
 def write(path: Path, found: Record) -> None:
-    """Write a record, compressed."""
+    """Write a record as compressed JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(gzip.compress(json.dumps(found).encode(), mtime=0))
 
 
 def read(path: Path) -> Record:
-    """Read a record."""
+    """Read a record written by `write`."""
     found: Record = json.loads(gzip.decompress(path.read_bytes()))
     return found
 
 
 def installed() -> Program:
-    """Return the program of this checkout, as installed in editable form beside this Python."""
+    """Return the program of this checkout, the editable install of this Python."""
     program = Program([str(Path(sys.executable).with_name("baker"))], ROOT)
     source = program.source()
     if not source.is_relative_to(ROOT):
@@ -98,10 +100,10 @@ def installed() -> Program:
 
 
 def program_of(commit: str, folder: Path) -> Program:
-    """Return the program of a commit, whose files are written into a folder.
+    """Write the files of a commit into a folder and return its program.
 
-    It runs with this Python and its libraries. Packages that `pyproject.toml` takes from elsewhere are linked
-    to where an install would put them.
+    The program runs with this Python and its libraries. Packages that `pyproject.toml` maps to other
+    folders are linked at the paths that an install would use.
     """
     archive = subprocess.run(["git", "archive", commit], cwd=ROOT, capture_output=True, check=True).stdout
     subprocess.run(["tar", "-x"], cwd=folder, input=archive, check=True)

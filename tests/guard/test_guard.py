@@ -1,4 +1,4 @@
-"""Equality and the report of differences of the guard; these tests do not run `baker`."""
+"""Comparison of records and description of differences, without running `baker`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MANIFEST = {
 
 
 def recorded(manifest, *, code=0, picture=b"\x00\x01", errors="", indent=2):
-    """Return a record of one run of one command, with a manifest and a picture, by way of its texts."""
+    """Return a record of one run of one command that wrote a manifest and a picture."""
     step = {"command": "bake level.glb -o out", "exit": code}
     step["stderr"] = text_entry(errors, PLACES)
     text = json.dumps(manifest, indent=indent)
@@ -43,7 +43,7 @@ def test_times_and_places_do_not_count():
 
 
 def test_figures_count_in_texts():
-    # Numbers with other units, and names that hold digits, stay.
+    # Numbers with other units, and names that contain digits, are not replaced.
     text = "E = 12.5 lx, 3 texels, ao_0.exr 5.3 kB, 0.5 m"
     assert normal_text(text, {}) == text
     assert normal_text("32 x 24, 4 samples a pixel, 0.2 s, 1.5 Mrays/s", {}) == (
