@@ -8,12 +8,12 @@ import numpy as np
 
 
 def polygon_irradiance(polygon: Any, point: Any, normal: Any) -> np.ndarray:
-    """Return E / L at points (..., 3) with the normal `normal`, from a polygon (K, 3) of constant radiance L.
+    """Return E / L at points (..., 3) with a common normal, from a polygon (K, 3) of radiance L.
 
     E = L / 2 sum_i angle_i Gamma_i . n, where angle_i is the angle that edge i subtends at the point and
     Gamma_i the unit normal of the plane through edge i and the point. The polygon must be wholly above the
-    horizon of the points. Its corners run counter-clockwise seen from its front. Based on: Lambert,
-    Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995.
+    horizon of the points. Its corners run counter-clockwise seen from its front.
+    Based on: Lambert, Photometria, 1760; Arvo, Analytic methods for simulated light transport, 1995.
     """
     point, normal = np.asarray(point, float), np.asarray(normal, float)
     arm = np.asarray(polygon, float) - point[..., None, :]

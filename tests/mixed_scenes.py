@@ -76,7 +76,7 @@ def glossy_room(lights: tuple[PunctualLight, ...] = ()) -> Scene:
 
 
 def open_yard() -> Scene:
-    """Return ground, wall and glossy ball, with sun, spot light and point light of a range; use with a sky."""
+    """Return ground, wall and glossy ball, with a sun, a spot light and a point light that has a range."""
     quads = [
         Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), glossy((0.6, 0.5, 0.4), 0.0, 0.6)),
         Quad((-1, 1, 0), (2, 0, 0), (0, 0, 1.5), glossy((0.8, 0.8, 0.8), 0.0, 1.0, double_sided=True)),

@@ -75,7 +75,7 @@ class Quad:
 
 
 class SceneBuilder:
-    """Builds a scene with an object for each surface; charts are packed in rows of a page of `size` texels."""
+    """Builds a scene with an object for each surface; charts are packed on a page of `size` texels."""
 
     def __init__(self, size: int = 64) -> None:
         self.size = size

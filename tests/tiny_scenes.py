@@ -63,7 +63,7 @@ class World:
 
     @property
     def hit_kind(self):
-        """Return for each triangle what a hit on its back implies for the test for points inside geometry."""
+        """Return the argument `hit_kind` (T,) uint8 of `find_inside_geometry`."""
         solids = scene_solids(self.scene, self.geometry, self.shading)
         return hit_kinds(self.geometry, self.shading, solids)
 

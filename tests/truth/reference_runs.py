@@ -1,7 +1,7 @@
-"""Runs of the reference on scenes of closed form, and the tests that each has to pass.
+"""Runs the reference on scenes with closed forms, and compares its results and standard errors.
 
-A point is traced many times: its copies have independent random numbers, so that their spread must match the
-standard errors that the reference reports.
+Each point is traced as many copies with independent random numbers. The standard deviation over the copies
+must match the standard errors that the reference reports.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from baker.pathtracer.scene import Reference, build_reference
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002
 COPIES = 256
-# Of some 190 points one in 370 is beyond three standard errors by chance. With seed 0 one was, by 3.2: over
-# 200 other seeds the same point is 0.003 % +- 0.003 % off.
+# About 190 points are tested, and one in 370 is beyond three standard errors by chance. With seed 0 one point
+# was, at 3.2 standard errors. Its mean error over 200 other seeds is 0.003 % +- 0.003 %.
 SEED = 1
 
 
 def copies_of(point: Any, normal: Any = UP, copies: int = COPIES) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and normal (n * copies, 1, 3) of n points (n, 3) with normals (3,) or (n, 3)."""
+    """Return position and normal, each (n * copies, 1, 3), of n points (n, 3) with normals (3,) or (n, 3)."""
     point = np.atleast_2d(np.asarray(point, float))
     normal = np.broadcast_to(np.asarray(normal, float), point.shape)
     return np.repeat(point, copies, axis=0)[:, None], np.repeat(normal, copies, axis=0)[:, None]
 
 
 def spread_over(triangle: Any, samples: int, seed: int = 0, copies: int = COPIES) -> tuple[Any, Any]:
-    """Return position and normal (copies, samples, 3) of random points, stratified by area.
+    """Return position and normal, each (copies, samples, 3), of random points, stratified by area.
 
-    triangle : (t, 3, 3), the surface
+    triangle : (t, 3, 3), triangles of the surface
     """
     rng = np.random.default_rng(seed)
     corner = np.asarray(triangle, float)
@@ -58,7 +58,7 @@ def traced(
     threads: int = 2,
     **how: Any,
 ) -> PointEstimate:
-    """Return path-traced irradiance; `where` is position and normal, or a function of the pass number."""
+    """Return path-traced irradiance at `where`: (position, normal), or a function of the pass number."""
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
         options = PassOptions(**{"seed": SEED, **how})
         return _passes(irradiance_pass, reference, where, 3, passes, samples, {"options": options})
@@ -67,7 +67,7 @@ def traced(
 def traced_ao(
     scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64
 ) -> PointEstimate:
-    """Return the ambient occlusion of the reference, 1 = open."""
+    """Return the ambient occlusion of the reference, 1 = unoccluded."""
     with build_reference(scene, threads=2) as reference:
         return _passes(
             ambient_occlusion_pass, reference, where, 1, passes, samples, {"seed": SEED, "distance": distance}
@@ -88,12 +88,13 @@ def _passes(
 
 
 def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, rounding: float = 1e-5) -> None:
-    """Check n points, each in the same number of copies, against their truth (n,).
+    """Compare n points, each traced as the same number of copies, with their truth (n,).
 
-    The error is at most three of the reported standard errors, and at most 0.2 %; three standard errors are
-    below 0.2 %; and they match the spread of the copies. rounding : relative error that is no noise: float32,
-    and rays that leave surfaces by 1e-5 of the scene. Seeds are fixed. After a change of random numbers a
-    point may be beyond three standard errors by chance; it is wrong if it stays there with other seeds.
+    The error is at most three reported standard errors and at most 0.2 %, three standard errors are below
+    0.2 %, and the standard errors match the standard deviation of the copies. `rounding` is a relative
+    error that is not noise: it comes from float32 and from ray origins, which are offset by 1e-5 of the
+    scene. Seeds are fixed. After a change of random numbers a point may be beyond three standard errors by
+    chance. The result is incorrect only if the point stays there with other seeds.
     """
     truth = np.atleast_1d(np.asarray(truth, float))
     mean = found.mean[:, channel].reshape(len(truth), -1)
@@ -114,7 +115,7 @@ def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, ro
 
 
 def _assert_believable(mean: Any, error: Any, report: str) -> None:
-    """Check that the spread of the copies matches their standard errors, by an F-test over all points."""
+    """Check by an F-test over all points that the variance of the copies matches their standard errors."""
     real, reported = mean.var(axis=1, ddof=1), (error**2).mean(axis=1)
     noisy = reported > 0
     if not noisy.any():
@@ -122,7 +123,7 @@ def _assert_believable(mean: Any, error: Any, report: str) -> None:
     n = mean.shape[1]
     ratio = float((real[noisy] / reported[noisy]).mean())
     degrees = noisy.sum() * (n - 1)
-    # The reported errors come from a few passes of each copy: they have about as many degrees of freedom.
+    # A reported error is estimated from the passes of a copy, so it has about as many degrees of freedom.
     low, high = stats.f.ppf([5e-5, 1 - 5e-5], degrees, degrees)
     assert low < ratio < high, (
         f"copies vary {ratio:.3f} times as reported (from {low:.3f} to {high:.3f})\n{report}"

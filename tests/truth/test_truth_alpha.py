@@ -1,4 +1,4 @@
-"""Light through MASK and BLEND surfaces: holes at the right uv, shares of alpha, nothing else."""
+"""Light through MASK and BLEND surfaces: holes at the correct uv, and the share 1 - alpha."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HIGH = 0.5
 def alpha_material(
     builder, mode, alpha=1.0, *, cutoff=0.5, image=None, wrap="clamp", emission=0.0, albedo=0.0
 ):
-    """Add a two-sided material; `image` (H, W) is the alpha of its texture."""
+    """Add a double-sided material and return its index; `image` (H, W) is the alpha of its texture."""
     number = builder.material(albedo, emission, double_sided=True)
     texture = None
     if image is not None:
@@ -36,13 +36,15 @@ def alpha_material(
 
 
 def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
-    """A black floor of 2 x 2 m under square cards of (material of builder) at rising heights."""
+    """Return a builder and a black floor of 2 x 2 m under square cards at rising heights.
+
+    cards : functions that add a material to the builder and return its index"""
     builder = SceneBuilder(96)
     floor = builder.quad(
         (-half, 0, -half), (0, 0, 2 * half), (2 * half, 0, 0), builder.material(0.0), (texels, texels)
     )
     for k, make in enumerate(cards):
-        # Columns of the card's uv run along z, rows along x, as the floor's do.
+        # The uv of card and floor have the same directions: columns run along z, rows along x.
         builder.quad((-1, HIGH + 0.1 * k, -1), (0, 0, 2), (2, 0, 0), make(builder), (8, 8))
     if light:
         builder.light(light, 1.0, **(where or {"direction": SUN}))
@@ -58,7 +60,7 @@ def blended(alpha, **settings):
 
 
 def bilinear(image, u, v, wrap):
-    """Sample an image (H, W) by a sum over its pixels' tents: the slow twin of the kernel's lookup."""
+    """Return the bilinear lookup of an image (H, W) as a sum over tent functions of its pixels."""
     high, wide = image.shape
     total = np.zeros(np.shape(u))
     for row in range(-2 * high, 3 * high):
@@ -118,7 +120,7 @@ def test_opaque_materials_ignore_alpha():
 def test_vertex_alpha_counts():
     builder, floor = floor_under(masked(cutoff=0.5))
     mesh = builder.meshes[1]
-    # Alpha rises from 0 at x = -1 to 1 at x = 1 (corners in the order of `SceneBuilder.quad`).
+    # Vertex alpha rises from 0 at x = -1 to 1 at x = 1.
     colour = np.ones((4, 4), np.float32)
     colour[:, 3] = (mesh.position[:, 0] + 1) / 2
     builder.meshes[1] = replace(mesh, colour=colour)
@@ -143,7 +145,7 @@ LIGHTS = {
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize(("alpha", "layers"), [(0.25, 2), (0.6, 1), (0.9, 1)])
 def test_blend_lets_the_rest_of_alpha_through(light, alpha, layers):
-    """Exactly so at every texel, also on the diagonal that the two triangles of each pane share."""
+    """Panes multiply E by exactly (1 - alpha)^layers at each texel, also below their diagonals."""
     found, free = (
         floor.values(builder.bake(bounces=0))[..., 0]
         for builder, floor in (
@@ -159,7 +161,7 @@ def test_blend_lets_the_rest_of_alpha_through(light, alpha, layers):
 
 @pytest.mark.parametrize("alpha", [0.0, 0.25, 1.0])
 def test_ambient_occlusion_through_blend(alpha):
-    """A closed box of glass: every ray of the floor inside meets it once."""
+    """In a closed box of glass, every ray of the floor crosses one pane."""
     builder = SceneBuilder(96)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
     builder.box((-2, -1, -2), (2, 1, 2), alpha_material(builder, "BLEND", alpha), 8)
@@ -169,10 +171,10 @@ def test_ambient_occlusion_through_blend(alpha):
 
 
 def test_sky_through_blend_and_its_own_reflection():
-    """A room of coloured glass under an even sky: what comes in, and what the glass reflects of it.
+    """A room of coloured glass under a uniform sky: transmitted and reflected light.
 
-    Inside, E = T * pi * L + alpha * albedo * E with T = (1 - alpha) * (1 - alpha * (1 - albedo)); the glass
-    sees itself all around.
+    Inside, E = T * pi * L + alpha * albedo * E with T = (1 - alpha) * (1 - alpha * (1 - albedo)); from
+    each point of the glass, only glass is visible.
     """
     alpha, albedo = 0.4, np.array([0.5, 1.0, 0.0])
     builder = SceneBuilder(96)
@@ -187,7 +189,7 @@ def test_sky_through_blend_and_its_own_reflection():
 
 @pytest.mark.parametrize("mode", ["MASK", "BLEND"])
 def test_what_is_not_there_does_not_shine(mode):
-    """Half an emitter, as a hole or as glass of alpha 0.5, lights half as much as a whole one."""
+    """An emitter with holes in half of its area, or of alpha 0.5, gives half of the light."""
     image = np.repeat(np.array([[0.0, 1.0]]), 2, axis=0)
     half = masked(image=image, emission=10.0) if mode == "MASK" else blended(0.5, emission=10.0)
 
@@ -202,9 +204,9 @@ def test_what_is_not_there_does_not_shine(mode):
 
 
 def test_reciprocity_of_a_leaf_with_holes():
-    """A white card with holes beside a lit wall reflects as much as the part of it that is there.
+    """A white card with holes beside a lit wall lights the floor like a card without the cut-out part.
 
-    Its twin is the same card cut to that part by its shape: they must light the floor alike.
+    The second card has the shape of the opaque part as geometry.
     """
     image = np.zeros((64, 64))
     image[:, 32:] = 1.0

@@ -1,4 +1,4 @@
-"""Ambient occlusion: beside walls with and without a limit, alone, closed in, convex."""
+"""Ambient occlusion beside walls with and without a distance limit, and in open and closed scenes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SEEDS = 6
 
 
 def wall_and_floor(height):
-    """A floor of 16 rows of texels, 0.1 m to 2.1 m from a wall 400 m long."""
+    """Return a builder and a floor of 16 rows of texels, 0.1 to 2.1 m from a wall 400 m long."""
     builder = SceneBuilder(64)
     material = builder.material(0.5)
     builder.quad((0, 0, -200), (0, height, 0), (0, 0, 400), material, (8, 8))
@@ -21,13 +21,13 @@ def wall_and_floor(height):
 
 
 def ao_rows(builder, floor, seed, **settings):
-    """Return the AO at each distance, (rows,): means along the wall."""
+    """Return (rows,) AO of the floor at each distance, averaged along the wall."""
     result = builder.bake(channels=["ao"], ao_samples=256, seed=seed, **settings)
     return floor.values(result, "ao")[..., 0].mean(axis=1)
 
 
 def test_closed_forms_agree_with_quadrature():
-    """The closed forms themselves against a plain sum over the projected disc."""
+    """The closed forms agree with a sum over the projected disc."""
     x, y = np.meshgrid(*[(np.arange(1500) + 0.5) / 750 - 1] * 2)
     inside = x * x + y * y < 1
     x, z = x[inside], np.sqrt(1 - x[inside] ** 2 - y[inside] ** 2)
@@ -53,7 +53,7 @@ def test_floor_beside_a_long_wall_without_limit(height):
     builder, floor = wall_and_floor(height)
     truth = floor.texel_mean(lambda p: wall_ao(p[..., 0], height))[:, 0]
     found = [ao_rows(builder, floor, seed, ao_distance="inf") for seed in range(SEEDS)]
-    # Slack: origins are lifted by 5e-7 of the 400 m scene, 0.2 mm of 0.3 m height.
+    # `slack`: ray origins are raised by 5e-7 of the 400 m scene, that is 0.2 mm of a wall height of 0.3 m.
     assert_unbiased(found, truth, least=0.002, slack=3e-4)
 
 
@@ -68,7 +68,7 @@ def test_floor_beside_a_long_wall_within_a_distance(reach):
 
 
 def test_limited_ao_from_gather_rays_is_the_same_as_alone():
-    """With light baked too, AO comes from the gather's rays: the same numbers in another way."""
+    """If light is also baked, AO is computed from the gather rays, with the same result."""
     builder, floor = wall_and_floor(10.0)
     truth = floor.texel_mean(lambda p: limited_wall_ao(p[..., 0], 1.5), 8)[:, 0]
     found = []
@@ -85,7 +85,8 @@ def test_percentage_is_of_the_diagonal():
     material = builder.material(0.5)
     builder.quad((0, 0, 0), (0, 0, 3), (4, 0, 0), material)
     builder.quad((0, 1, 0), (4, 0, 0), (0, 0, 3), material)
-    # The diagonal is sqrt(26) = 5.099: 19 % of it does not reach the ceiling at 1 m, 21 % just does.
+    # The diagonal is sqrt(26) = 5.099 m. 19 % of it is less than the distance of the ceiling, 1 m, and 21 %
+    # is more.
     near = builder.bake(channels=["ao"], ao_distance="19%").lightmaps["ao"].value
     far = builder.bake(channels=["ao"], ao_distance="21%").lightmaps["ao"].value
     assert near[near > 0].min() == 1.0
@@ -114,7 +115,7 @@ def test_closed_box_is_dark_without_limit_and_open_in_the_middle_with_one(denois
     result = builder.bake(channels=["ao"], ao_distance="0.5", denoise=denoise)
     for quad in quads.values():
         value = quad.values(result, "ao")[..., 0]
-        # Texels further than the reach from every wall see nothing; corners are closed in by three sides.
+        # Texels farther than the AO distance from every wall are unoccluded.
         assert np.allclose(value[3:9, 3:9], 1.0, atol=0.02 if denoise else 0)
         assert value[0, 0] < value[0, 6] < value[6, 6]
 

@@ -1,4 +1,4 @@
-"""Emissive surfaces against Lambert's polygon formula: far, close, many, textured."""
+"""Emissive surfaces compared with Lambert's polygon formula: far, near, many and textured emitters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ UP = (0.0, 1.0, 0.0)
 
 
 def square_over(height, half=0.5):
-    """Corners counter-clockwise from below: the emitter shines down."""
+    """Return the corners of a square at `height`, counter-clockwise from below: it shines downwards."""
     return np.array(
         [(-half, height, -half), (half, height, -half), (half, height, half), (-half, height, half)]
     )
 
 
 def test_the_polygon_formula_agrees_with_form_factors():
-    """The closed form itself: averaged over a facing unit square it is pi times 0.1998249."""
+    """The mean of the formula over a facing unit square is pi times the form factor 0.1998249."""
     axis = (np.arange(40) + 0.5) / 40 - 0.5
     x, z = np.meshgrid(axis, axis)
     point = np.stack([x, 0 * x, z], axis=-1)
@@ -42,9 +42,9 @@ def test_parallel_square_at_every_texel(denoise):
         0.0,
     ]
     mean = np.mean(found, axis=0)
-    # The denoiser, a network, lets a hair of the other colours into one that is not there.
+    # The denoiser adds a little of the other colours to a colour without light.
     assert mean[..., 2].max() <= (0.01 * mean.max() if denoise else 0)
-    # 64 + 64 samples, six bakes: 384 stratified samples a texel leave under 2 %.
+    # Six bakes with 64 light samples each: 384 stratified samples a texel have noise under 2 %.
     lit = truth[..., :2]
     assert np.abs(mean[..., :2] / lit - 1).max() < (0.04 if denoise else 0.03)
     if not denoise:
@@ -53,7 +53,7 @@ def test_parallel_square_at_every_texel(denoise):
 
 @pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.3, 1.0, 2.0])
 def test_close_up_there_is_neither_bias_nor_a_spark(height):
-    """An emitter that nearly touches a wall: pi L under its middle, the closed form at its rim."""
+    """An emitter close to a surface: E = pi L opposite its middle, and the closed form at its rim."""
     found, worst = [], 0.0
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -62,18 +62,18 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
         value = floor.values(builder.bake(seed=seed, samples=64))[..., 0]
         worst = max(worst, value.max())
         found.append(value)
-    # Texels at the rim of an emitter at 1 cm see E change within their 5 cm: average over 24 x 24 points.
+    # At the rim of an emitter 1 cm away, E changes within a texel of 5 cm, so average over 24 x 24 points.
     truth = floor.texel_mean(lambda p: polygon_irradiance(square_over(height), p, UP), 24)
     assert worst < 1.25 * np.pi
     middle = slice(8, 16)
     assert_unbiased([v[middle, middle].mean() for v in found], truth[middle, middle].mean(), least=0.004)
-    # 0.2 %: the quadrature of the rim at 1 cm.
+    # `slack`: the quadrature at the rim has an error of 0.2 % for a distance of 1 cm.
     assert_unbiased([v.mean() for v in found], truth.mean(), least=0.004, slack=0.002)
     assert np.abs(np.mean(found, axis=0) - truth).max() < 0.08 * truth.max()
 
 
 def test_penumbra_from_its_first_to_its_last_hair():
-    """A screen hides the emitter's half with x < s: every texel sees a rectangle of it, from none to all."""
+    """A screen hides a part of the emitter that depends on x: texels see none, a rectangle, or all of it."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -83,20 +83,21 @@ def test_penumbra_from_its_first_to_its_last_hair():
         found.append(floor.values(builder.bake(seed=seed, denoise=False))[..., 0])
 
     def visible(p):
-        # The screen's edge lies half way up: it hides emitter points with x < -p_x.
+        # The edge of the screen is at x = 0, half way between floor and emitter: it hides emitter points with
+        # x < -p_x.
         edge = np.clip(-p[..., 0], -0.5, 0.5)
         corners = np.broadcast_to(square_over(1.0), (*p.shape[:-1], 4, 3)).copy()
         corners[..., [0, 3], 0] = edge[..., None]
         return polygon_irradiance(corners, p, UP)
 
-    # Rows run along x.
+    # Average over columns, since rows run along x.
     profile, expected = [f.mean(axis=1) for f in found], floor.texel_mean(visible, 8).mean(axis=1)
     assert expected.min() == 0 < expected.max()
     assert_unbiased(profile, expected, least=0.004)
 
 
 def test_wall_that_touches_an_emitter():
-    """Perpendicular squares with a common edge: E rises to pi L / 2 at the edge, without a spark."""
+    """Perpendicular squares with a common edge: E rises to pi L / 2 at the edge, without bright outliers."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -122,13 +123,13 @@ def test_textured_emission_conserves_its_flux():
         builder.quad((0.5, 1.9, 0.5), (1, 0, 0), (0, 0, 1), emissive, (12, 12))
         result = builder.bake(seed=seed)
         absorbed.append(sum(w.values(result).mean(axis=(0, 1)) * w.area for w in walls))
-    # Clamped bilinear lookups average to the mean of the image.
+    # The mean of clamped bilinear lookups is the mean of the image.
     truth = np.pi * 2.0 * image.mean(axis=(0, 1))
     assert_unbiased(absorbed, truth, least=0.01)
 
 
 def test_texture_lies_the_right_way_round():
-    """One bright corner of the image: the wall behind that corner of the emitter is the brightest."""
+    """With one bright image corner, the wall opposite that corner of the emitter is brightest."""
     image = np.zeros((8, 8, 3))
     image[0:2, 6:8] = 10.0
     builder = SceneBuilder(64)
@@ -137,7 +138,7 @@ def test_texture_lies_the_right_way_round():
         (-1, 0.3, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 1.0, texture=image), (12, 12)
     )
     value = floor.values(builder.bake())[..., 0]
-    # Image row 0 is v = 0, columns run along u: the spot is at u = 7 / 8, v = 1 / 8 of the emitter.
+    # Image row 0 is v = 0 and columns run along u, so the bright spot is at u = 7 / 8, v = 1 / 8.
     bright = emitter.at(7 / 8, 1 / 8)
     row, column = np.unravel_index(value.argmax(), value.shape)
     assert np.abs((floor.points(1)[row, column, 0] - bright)[[0, 2]]).max() < 0.15
@@ -146,7 +147,7 @@ def test_texture_lies_the_right_way_round():
 def test_a_thousand_emitters_against_the_sum_of_their_closed_forms():
     rng = np.random.default_rng(3)
     n = 1000
-    # Small triangles in one plane, facing down, of very different power; none hides another.
+    # Small coplanar triangles of very different power, facing down; none occludes another.
     cell = np.stack(np.divmod(np.arange(n), 32), axis=1) / 16.0 - 1.0
     centre = np.stack([cell[:, 0], np.full(n, 0.8), cell[:, 1]], axis=1) + 0.03
     turn = rng.random(n) * 2 * np.pi
@@ -171,5 +172,6 @@ def test_a_thousand_emitters_against_the_sum_of_their_closed_forms():
 
     truth = floor.texel_mean(irradiance, 2)
     assert_unbiased([f.mean() for f in found], truth.mean(), least=0.01)
-    # 64 light rays a texel choose among 1000: 6 bakes leave 5 % of noise, four sigma of it is the bound.
+    # 64 light rays a texel choose among 1000 triangles. The mean of 6 bakes has a noise of 5 %; the bound is
+    # four standard deviations.
     assert np.abs(np.mean(found, axis=0) / truth - 1).max() < 0.2

@@ -1,4 +1,4 @@
-"""Pictures of everything at once: estimators against each other, mirrored lights, where connections win."""
+"""Pictures of mixed scenes: estimators agree, mirrored lights are correct, and `bdpt` reduces variance."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SIZE = 12
 
 
 def picture(scene, camera, estimator, passes, *, sky=(0, 0, 0), samples=16, size=SIZE, threads=2, **how):
-    """Return mean and standard error (size, size, 3) of a picture, and the rays it took."""
+    """Return mean and standard error, each (size, size, 3), of a picture, and its number of rays."""
     with build_reference(scene, sky=sky, threads=threads) as reference:
         estimate = new_estimate(size * size, 3, samples)
         for _ in range(passes):
@@ -37,13 +37,13 @@ def picture(scene, camera, estimator, passes, *, sky=(0, 0, 0), samples=16, size
 
 
 def blocks(found, side):
-    """Return means and errors of blocks of side x side pixels, green."""
+    """Return mean and standard error of the green channel over blocks of side x side pixels."""
     n = SIZE // side
     mean, error = (x[..., 1].reshape(n, side, n, side) for x in found[:2])
     return mean.mean(axis=(1, 3)), np.sqrt((error**2).sum(axis=(1, 3))) / side**2
 
 
-# Passes that leave about one percent of noise in the mean of the picture.
+# {estimator: passes} for about one percent of noise in the mean of the picture.
 ROOM_PASSES = {
     "uniform": 220, "cosine": 160, "stratified": 160, "light": 40, "bsdf": 100, "mis": 40, "mis-power": 40,
     "bdpt": 40,
@@ -83,7 +83,7 @@ def test_both_ends_agree_at_each_part_of_a_room():
 
 
 def mirrored_light():
-    """Return a floor beside a perfect mirror under a point light, and a camera that sees the floor only."""
+    """Return a floor beside a perfect mirror under a point light, and a camera that sees only the floor."""
     floor = Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0), glossy((0.6, 0.6, 0.6), 0.0, 1.0))
     mirror = Quad((1, 2, 0), (0, -4, 0), (0, 0, 3), glossy((1.0, 1.0, 1.0), 1.0, 0.0))
     light = PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0.4, 0.1, 0.8))
@@ -91,10 +91,10 @@ def mirrored_light():
 
 
 def test_a_light_behind_a_mirror_lights_as_its_image_does():
-    # No path from the eye can find a point light by way of a mirror: only paths from the light do.
+    # Only paths from the light find a point light that a mirror reflects; paths from the eye cannot.
     scene, camera = mirrored_light()
     mean, error, _ = picture(scene, camera, "bdpt", 180, size=4, samples=1024)
-    # The closed form: the light and its image, through the floor's f, averaged over each pixel.
+    # Closed form: radiance of the floor from the light and its mirror image, averaged over each pixel.
     fine = (np.arange(64) + 0.5) / 64 * 2 - 1
     x, y = np.meshgrid(fine, -fine)
     high = math.tan(0.5 * camera.fov)
@@ -118,13 +118,13 @@ def test_a_light_behind_a_mirror_lights_as_its_image_does():
     away, noise = mean[..., 0].mean() / truth.mean() - 1, np.linalg.norm(error[..., 0]) / truth.sum()
     assert abs(away) < min(3 * noise, 0.002)
     assert 3 * noise < 0.002
-    # And it is the image that is tested: without it a sixth is missing.
+    # The mirror image contributes about a sixth of the light, so the comparison tests it.
     alone, _, _ = picture(scene, camera, "mis", 4, size=4, samples=64)
     assert alone.mean() < 0.9 * truth.mean()
 
 
 def gap_room():
-    """Return two rooms and a gap between: an emitter shines at the ceiling of one, the other is dark."""
+    """Return two rooms joined by a gap: one with an emitter that shines at the ceiling, one without light."""
     walls = box_quads((0, 0, 0), (4, 2, 2), inward=True, material=grey(0.7))
     screen = [
         Quad((2, 0, 0), (0, 0.95, 0), (0, 0, 2), grey(0.7, double_sided=True)),
@@ -151,7 +151,7 @@ def test_connections_win_where_light_comes_through_a_gap():
 
 
 def test_connections_win_on_a_caustic():
-    # A small emitter over a mirror, seen on the wall above: from the eye only luck finds it.
+    # A small emitter over a mirror lights the wall above; paths from the eye rarely find it.
     quads = [
         Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), glossy((0.95, 0.95, 0.95), 1.0, 0.0)),
         Quad((0, 1, 0), (1, 0, 0), (0, 0, 1), glossy((0.7, 0.7, 0.7), 0.0, 1.0)),

@@ -1,4 +1,4 @@
-"""Light of lit texels against sums of L A cos cos' / d^2: in a bake, and by the reference's estimators."""
+"""Light of emissive textures with few lit texels, in bake and reference, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 N = 64
 RED, GREEN, BLUE = np.eye(3)
-# Middle and side of three panels, one beside the other at a height of one metre.
+# (x, z) centres and side of three emissive panels at a height of 1 m, metres.
 PANELS, SIDE = ((-0.7, 0.1), (0.0, -0.2), (0.7, 0.3)), 0.6
-# Radiance of lit texels, cd/m2: the same power for each panel.
+# Radiance of lit texels for each panel, cd/m2; the panels have the same power.
 BRIGHT = (143 * 3e4, 143 * 3e4, 3e4)
 
 
@@ -31,11 +31,16 @@ def lit(*texels):
 
 
 def panels(size=48):
-    """A red panel with one lit texel, a green one that shows it 5 x 5 times mirrored, a blue one of LEDs."""
+    """Return a builder with three panels over a black floor, and the floor.
+
+    The red panel has one lit texel, the green one 5 x 5 mirrored repeats of one lit texel, and the blue one
+    a grid
+    of lit texels."""
     builder = SceneBuilder(size)
     floor = builder.quad((-1.5, 0, -1.5), (0, 0, 3), (3, 0, 0), builder.material(0.0), (16, 16))
     leds = lit(*((r, c) for r in range(3, 64, 6) for c in range(2, 64, 5)))
-    # `nearest` makes squares of the texels, the other two spread each over two by two.
+    # With `nearest` a lit texel is a square; the bilinear lookups of the other two spread it over 2 x 2
+    # texels.
     looks = (
         (RED, lit((50, 5)), 1.0, {}),
         (GREEN, lit((20, 40)), 5.0, {"wrap": ("mirror", "mirror")}),
@@ -53,7 +58,7 @@ def panels(size=48):
 
 
 def spots():
-    """Return for each panel the middles (n, 2) of lit spots, as shares of its sides, and a spot's share."""
+    """Return for each panel the uv centres (n, 2) of lit spots, and the area of a spot, texels."""
     one = np.array([[5.5, 50.5]]) / N
     way = np.arange(5)
     fold = [np.where(way % 2 == 0, way + s, way + 1 - s) / 5 for s in (40.5 / N, 20.5 / N)]
@@ -64,7 +69,7 @@ def spots():
 
 
 def irradiance(points, panel):
-    """E of one panel at points (..., 3) of the floor; each spot is a hundredth of its distance across."""
+    """Return E of one panel at floor points (..., 3); spots count as points, being small against 1 m."""
     place, share = spots()[panel]
     middle = np.array(PANELS[panel]) + (place - 0.5) * SIDE
     away = points[..., None, [0, 2]] - middle
@@ -78,7 +83,7 @@ def test_lit_texels_give_the_right_light_everywhere():
     for panel in range(3):
         truth = floor.texel_mean(lambda p, k=panel: irradiance(p, k))
         away = value[..., panel] / truth - 1
-        # 256 samples a texel share out among three panels; 25 and 143 spots add to the noise of their choice.
+        # Noise: the 256 samples of a texel are divided among three panels and their 1, 25 and 143 spots.
         assert abs(away.mean()) < 0.003
         assert away.std() < 0.02
         assert np.abs(away).max() < 0.08
@@ -94,12 +99,12 @@ def test_the_reference_finds_a_lit_texel():
             truth = irradiance(points, panel)
             error = mean[..., panel].std(axis=1) / math.sqrt(32)
             assert (np.abs(mean[..., panel].mean(axis=1) - truth) < critical(27) * error + 1e-3 * truth).all()
-            # One path of a copy that found a spot by chance would be some hundred times the truth.
+            # A copy with a path that hit a spot by chance would be some hundred times the truth.
             assert mean[..., panel].max() < 2.0 * truth.max()
 
 
 def test_estimators_agree_on_a_screen():
-    """Coarse enough for rays by chance, in a room, with holes beside the lit texels."""
+    """In a room, a coarse texture with lit texels, which random rays can hit, and with holes."""
     image = np.zeros((3, 4, 4), np.float32)
     image[1, 2], image[0, 1], image[2, 0] = (9, 2, 4, 1), (3, 8, 3, 1), (5, 5, 5, 0)
     base = np.ones((3, 4, 4), np.float32)
@@ -125,7 +130,7 @@ def test_estimators_agree_on_a_screen():
 
 @pytest.mark.parametrize("nearest", [False, True])
 def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
-    """Gather rays that meet a lit texel find the density with which it is aimed at."""
+    """For gather rays that hit a lit texel, the MIS density is correct, so there are no bright outliers."""
     builder = SceneBuilder(32)
     floor = builder.quad((-0.3, 0, -0.3), (0, 0, 0.6), (0.6, 0, 0), builder.material(0.0), (12, 12))
     image = np.zeros((16, 16, 3))
@@ -135,7 +140,8 @@ def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
     builder.materials[material] = replace(builder.materials[material], emission_texture=texture)
     builder.quad((-0.3, 0.1, -0.3), (0.6, 0, 0), (0, 0, 0.6), material, (4, 4))
     value = floor.values(builder.bake(samples=256, bounces=0))[..., 0]
-    # Nine square emitters of 3.75 cm; a bilinear one is a tent of the same volume, a little softer.
+    # Truth for nine square emitters with sides of 3.75 cm. Bilinear lookups make them tents of the same
+    # integral.
     axis = (np.arange(4, 12, 3) + 0.5) / 16 * 0.6 - 0.3
     step = (np.arange(8) + 0.5) / 8 * 0.0375 - 0.01875
     place = (axis[:, None] + step).reshape(-1)
@@ -147,5 +153,5 @@ def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
 
     truth = floor.texel_mean(light)
     assert value.mean() == pytest.approx(truth.mean(), rel=0.01)
-    # Texels that are whole parts shine in closed form, others are sampled.
+    # With `nearest` the parts are uniform and their light is analytic; otherwise it is sampled.
     assert np.abs(value / truth - 1).max() < (0.02 if nearest else 0.15)

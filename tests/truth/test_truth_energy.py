@@ -1,4 +1,4 @@
-"""Conservation, and every number of bounces against the Neumann series of an explicit matrix."""
+"""Energy is conserved, and bounces are terms of the Neumann series of an explicit matrix."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.radiosity.solve import solve_radiosity
 
 
 def open_room(albedo=0.7, texels=12):
-    """A room without a ceiling, an emitter, a one-sided screen and a double-sided one."""
+    """Return a builder and its quads: room without ceiling, emitter, one-sided and double-sided screen."""
     builder = SceneBuilder(64)
     walls = builder.material((albedo, 0.5 * albedo, 0.1))
     quads = builder.box((0, 0, 0), (3, 2, 2), walls, texels, inward=True)
@@ -33,13 +33,13 @@ def test_what_is_emitted_is_absorbed_or_escapes(albedo, sky):
     energy = solve["energy"]
     assert energy["emitted"] > 0
     assert energy["escaped"] > 0.02 * energy["emitted"]
-    # Rows are balanced to a few parts in 10,000, the solver stops at 3e-5.
+    # Row sums of the matrix have errors of a few 1e-4, and the solver stops at 3e-5.
     assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-3)
     assert solve["residual"] < 1e-4
 
 
 def test_closed_black_room_absorbs_the_flux_of_its_lights():
-    """The audit's emitted flux is that of the lights: 4 pi I and pi L A."""
+    """`solve["energy"]["emitted"]` is the flux of the lights, 4 pi I + pi L A."""
     emitted = []
     for seed in range(6):
         builder = SceneBuilder(64)
@@ -51,13 +51,13 @@ def test_closed_black_room_absorbs_the_flux_of_its_lights():
         energy = builder.bake(seed=seed).solve["energy"]
         emitted.append(energy["emitted"])
         assert energy["absorbed"] == pytest.approx(energy["emitted"], rel=1e-6)
-    # 16 points a texel sample the light of a point 30 cm away: 0.3 %.
+    # `slack`: direct light of a point light 30 cm away, sampled at 16 points a texel, has an error of 0.3 %.
     assert_unbiased(emitted, 4 * np.pi * 3.0 + 2 * np.pi * 8.0, least=0.01, slack=0.003)
 
 
 @pytest.fixture(scope="module")
 def system():
-    """Form factors of the room, with albedo and exitance of the first reflection."""
+    """Return patches, form factors, albedo, and exitance after the first reflection, of the open room."""
     builder, _ = open_room(texels=6)
     world, patches, matrix = form_factors(builder, n_rays=128)
     weight = np.maximum(world.texels.area, 1e-12)
@@ -69,7 +69,7 @@ def system():
 
 @pytest.mark.parametrize("bounces", [0, 1, 2, 3, 7])
 def test_bounces_are_terms_of_the_neumann_series(system, bounces):
-    """E = F (s + rho F s + ...), one product less than there are bounces: the gather adds one."""
+    """E = F (s + rho F s + ...) with one product less than bounces; the final gather adds a bounce."""
     patches, matrix, albedo, source, full = system
     found = solve_radiosity(matrix, source, albedo, patches.area, bounces=bounces, progress=silent)
     term, total = source, np.zeros_like(source)
@@ -86,13 +86,13 @@ def test_converged_solution_is_that_of_the_dense_system(system):
     for c in range(3):
         exitance = np.linalg.solve(np.eye(patches.n) - albedo[:, c, None] * full, source[:, c])
         truth = full @ exitance
-        # The solver stops at an error of 3e-5 of each patch's own light.
+        # The solver stops when the error of each patch is 3e-5 of its light.
         assert np.linalg.norm(found.irradiance[:, c] - truth) < 1e-4 * np.linalg.norm(truth)
     assert found.residual < 1e-4
 
 
 def test_furnace_after_each_bounce():
-    """pi L (1 + rho + ... + rho^N) after N bounces; pi L with none."""
+    """E = pi L (1 + rho + ... + rho^N) after N bounces."""
     rho = 0.6
     for bounces in (0, 1, 4):
         means = []
@@ -107,13 +107,14 @@ def test_furnace_after_each_bounce():
 def test_many_bounces_converge_to_the_default():
     builder, _quads = open_room(0.8)
     default = builder.bake(samples=32)
-    # The rings around charts are extrapolated: only texels on surfaces count.
+    # Compare only texels on surfaces; dilated texels are extrapolated.
     on = (default.status != 0) & (default.status != 2)
     page = default.lightmaps["irradiance"].value[on]
     before = np.inf
     for bounces in (0, 1, 3, 40):
         value = builder.bake(samples=32, bounces=bounces).lightmaps["irradiance"].value[on]
-        # Every bounce only adds light, and all rays are the same; the solver stops at 1e-5 of the whole.
+        # Each bounce adds light, and the rays do not depend on `bounces`; the tolerance is that of the
+        # solver.
         assert (value <= page + 1e-4 * page.max()).all()
         away = float((page - value).max())
         assert away < before

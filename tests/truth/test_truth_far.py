@@ -1,4 +1,4 @@
-"""Rooms far from the origin are lit as at the origin, in the bake, the reference, pictures and diff."""
+"""Rooms far from the origin get the same light as at the origin, in bake, reference, pictures and diff."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from baker.pathtracer.scene import build_reference
 from baker.pipeline.bake import bake
 from baker.verification.verify import VerifySettings, verify
 
-# Whole numbers in binary, so that single precision can hold what the room's own coordinates are.
+# Translation of the far room, metres; multiples of powers of two, so that float32 positions stay exact.
 FAR = np.array([131_072.0, 0.0, -65_536.0])
 SETTINGS = make_settings({
     "resolution": 64, "uv": "keep", "padding": 2, "threads": 2, "samples": 32, "denoise": False,
@@ -29,7 +29,7 @@ SETTINGS = make_settings({
 
 
 def room(at=None):
-    """Return a lit room with a crate; `at`: translation of its nodes."""
+    """Return a scene of a lit room with a crate; `at` is the translation of its nodes."""
     builder = SceneBuilder(64)
     white = builder.material(0.6)
     builder.box((-1, 0, -1), (1, 2, 1), white, 12, inward=True)
@@ -51,7 +51,7 @@ def room(at=None):
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    """Bake the room at the origin and far from it."""
+    """Bake the room at the origin and at `FAR`, and return folders and results."""
     place = tmp_path_factory.mktemp("far")
     found = {"near": place / "near", "far": place / "far"}
     found["results"] = [
@@ -66,7 +66,7 @@ def test_the_maps_are_the_same(folders):
     for name in ("irradiance", "ao"):
         one, two = near.lightmaps[name].value, far.lightmaps[name].value
         assert one.max() > 0
-        # The origin of the far bake is a whole number of metres off: coordinates end in other bits.
+        # The origin of the far bake differs from `FAR`, so its coordinates are rounded differently.
         covered = near.status == 1
         away = np.abs(one - two)[covered] / one[covered].mean()
         assert np.median(away) < 1e-4, name
@@ -127,7 +127,7 @@ def test_a_wall_of_a_centimetre_shades_the_floor_whatever_is_around(around):
     wide = 3 * h / 16
     d = (np.arange(16)[:, None] + (np.arange(64) + 0.5) / 64) * wide
     truth = (0.5 * (1 + d / np.hypot(d, h))).mean(axis=1)
-    # The ends of the wall, half a metre away, and 8192 rays: at most half a per cent of noise.
+    # The finite wall, whose ends are 0.5 m away, and the noise of 8192 rays change AO by at most 0.005.
     np.testing.assert_allclose(found, truth, atol=0.012)
 
 

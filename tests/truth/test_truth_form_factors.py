@@ -1,4 +1,4 @@
-"""Form factors against the textbook's closed forms, conservation and reciprocity."""
+"""Form factors compared with closed forms, conservation and reciprocity."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def dense(patches, matrix):
 
 
 def between(group, patches, matrix):
-    """Return F (G, G) between groups of patches: (A_I F_IJ) summed, over A_I."""
+    """Return F (G, G) between groups: the sum of A_i F_ij over both groups / area of the first."""
     full = dense(patches, matrix).astype(np.float64) * patches.area[:, None]
     member = np.eye(group.max() + 1)[group]
     return (member.T @ full @ member) / (member.T @ patches.area)[:, None]
@@ -37,7 +37,7 @@ def two_squares(build, truth):
         build(builder, builder.material(0.5))
         world, patches, matrix = form_factors(builder, seed=seed)
         found.append(between(by_instance(world, patches), patches, matrix))
-    # Flat squares see nothing of themselves, and what they miss of each other is sky.
+    # A flat square has F_ii = 0; rays that miss the other square leave to the sky.
     assert_unbiased(found, [[0.0, truth], [truth, 0.0]], least=0.005)
 
 
@@ -79,13 +79,14 @@ def test_inside_a_sphere_every_pair_depends_on_the_target_only():
     texels = world.texels
     triangle = texels.entry[texels.first[:-1]]
     group = np.zeros(patches.n, int)
-    # Refinement keeps a face's children in its row of each block of 20.
+    # `icosphere` stores the children of icosahedron face k at indices k modulo 20.
     group[patches.patch] = triangle % 20
     area = np.bincount(group, patches.area)
     found = between(group, patches, matrix)
     ratio = found / (area / area.sum())
-    # A pair of groups has 16 x 6 x 512 x 0.05 = 2400 hits, both ways: 1.4 % noise at most. 320 flat faces
-    # lie within 2 % of the sphere; a group sees itself less, as each of its 16 faces misses itself (1 / 16).
+    # A pair of groups has 16 x 6 x 512 x 0.05 = 2400 hits in each direction, so at most 1.4 % noise. The 320
+    # flat faces differ from the sphere by up to 2 %. A group has less than the sphere's form factor to
+    # itself, because each of its 16 flat faces has none to itself.
     apart = ratio[~np.eye(20, dtype=bool)]
     assert np.abs(apart - 1).max() < 0.04
     assert apart.std() < 0.015
@@ -93,7 +94,7 @@ def test_inside_a_sphere_every_pair_depends_on_the_target_only():
 
 
 def unequal_room(builder):
-    """A closed room, 1 x 2 x 5, with a slab inside, and texels of very different sizes."""
+    """Build a closed room of 1 x 2 x 5 m with a slab inside, and texels of very different sizes."""
     material = builder.material(0.5)
     low, high = np.zeros(3), np.array([5.0, 2.0, 1.0])
     for axis, texels in enumerate(((5, 9), (16, 6), (11, 4))):
@@ -104,7 +105,7 @@ def unequal_room(builder):
         far = low.copy()
         far[axis] = high[axis]
         builder.quad(far, v, u, material, texels)
-    # A slab hangs in the room: not everything sees everything.
+    # A slab in the room blocks some pairs of patches.
     builder.box((2.0, 0.5, 0.3), (3.5, 0.7, 0.6), material, 4)
 
 
@@ -114,10 +115,10 @@ def test_closed_room_of_unequal_areas_loses_nothing(n_rays):
     unequal_room(builder)
     _world, patches, matrix = form_factors(builder, n_rays=n_rays)
     assert patches.area.max() / patches.area.min() > 3
-    # Rays aimed at edges do not leak: not one of all rays finds the sky or the outside of a wall.
+    # No ray leaks through an edge: none hits the sky or the outside of a wall.
     assert matrix.sky.max() == 0
     assert matrix.lost.max() == 0
-    # Thirty balancing sweeps bring rows to 1 within 0.1 %; float32 values stay reciprocal to their rounding.
+    # Thirty balancing sweeps bring row sums to 1 within 0.1 %. Float32 values are reciprocal up to rounding.
     assert np.abs(matrix.row_sums() - 1).max() < 1e-3
     flux = dense(patches, matrix).astype(np.float64) * patches.area[:, None]
     assert np.abs(flux - flux.T).max() <= 3e-7 * flux.max()
@@ -140,7 +141,7 @@ def test_open_scene_rows_close_with_the_sky():
     builder = SceneBuilder(64)
     material = builder.material(0.5)
     builder.quad((0, 0, 0), (0, 0, 1), (1, 0, 0), material)
-    # The second square shows its back to the first: it takes light away and gives none.
+    # The back of the second square faces the first: it blocks light but reflects none.
     builder.quad((0, 1, 0), (0, 0, 1), (1, 0, 0), material)
     world, patches, matrix = form_factors(builder)
     assert np.allclose(matrix.row_sums() + matrix.sky + matrix.lost, 1, atol=1e-6)
@@ -152,7 +153,7 @@ def test_open_scene_rows_close_with_the_sky():
 
 
 def test_estimates_of_both_directions_agree():
-    """The reciprocity error shrinks with more rays: it is noise, no bias."""
+    """The reciprocity error falls with the number of rays, so it is noise and not bias."""
     error = []
     for n_rays in (32, 128, 512):
         builder = SceneBuilder(64)

@@ -1,4 +1,4 @@
-"""Furnaces: where everything emits, E = pi L / (1 - rho) everywhere; under an even sky, E = pi L."""
+"""Furnaces: E = pi L / (1 - rho) if all surfaces emit L, and E = pi L under a uniform sky."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def furnace_box(albedo, size=32, texels=6):
 
 
 def covered(result, channel="irradiance"):
-    """Return (n, C) of all texels that lie on a surface."""
+    """Return (n, C) values of all texels on surfaces."""
     return result.lightmaps[channel].value[result.status == 1].astype(np.float64)
 
 
@@ -34,14 +34,15 @@ def test_closed_box_emits_the_same_everywhere(albedo, denoise):
         value = np.concatenate([q.values(result).reshape(-1, 3) for q in quads])
         assert len(value) == 6 * 36
         means.append(value.mean())
-        # Noise of 64 rays a texel: the emitters' half of the estimate has under 2 % (the rest is even).
+        # With 64 rays a texel, the sampled light of the emitters has a noise under 2 %; the rest is constant.
         assert value.std() < 0.02 * truth
         assert np.abs(value - truth).max() < 0.12 * truth
-        # The three colours see the same rays; the denoiser, a network, shifts the colour of texels slightly.
+        # The rays are the same for all three colours. The denoiser changes the colour of texels slightly.
         spread = np.ptp(value, axis=1) / value.mean(axis=1)
         assert np.median(spread) < (0.003 if denoise else 1e-6)
         assert spread.max() < (0.02 if denoise else 1e-5)
-    # 0.5 % of the truth: the direct light of all patches shares no sample, so six bakes average well.
+    # `least` is 0.5 %: patches have independent samples of direct light, so the mean of six bakes has little
+    # noise.
     assert_unbiased(means, truth, least=0.005)
 
 
@@ -56,7 +57,7 @@ def test_inward_sphere_emits_the_same_everywhere(smooth):
         value = covered(result) / (2 * np.pi)
         means.append(value.mean())
         assert value.std() < 0.03
-    # Smooth normals lean from the faces by up to 20 degrees; a hemisphere about them still sees only walls.
+    # Smooth normals deviate from face normals by up to 20 degrees, but all rays still hit walls.
     assert_unbiased(means, 1.0, least=0.005)
 
 
@@ -81,7 +82,7 @@ def test_convex_body_under_an_even_sky(shape):
     else:
         builder.triangles(icosphere(2), material, 4)
     result = builder.bake(sky="0.5,1,2", channels=["irradiance", "ao"], ao_distance="inf")
-    # Every ray of every texel leaves the scene: there is no noise, only float32 sums of 64 terms.
+    # All rays leave the scene, so the only error is the rounding of float32 sums of 64 terms.
     assert np.allclose(covered(result), np.pi * np.array(sky), rtol=2e-6)
     assert (covered(result, "ao") == 1.0).all()
 
@@ -89,19 +90,19 @@ def test_convex_body_under_an_even_sky(shape):
 def test_sky_over_a_floor_beside_a_wall_is_half_hidden():
     builder = SceneBuilder(64)
     black = builder.material(0.0)
-    # The wall is 2000 times as high and wide as the floor's farthest texel is away from it.
+    # Height and half width of the wall are 2000 times the largest distance of a floor texel.
     builder.quad((0, -2000, -2000), (0, 4000, 0), (0, 0, 4000), black, (8, 8))
     floor = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), black, (16, 16))
     assert floor.normal @ [0, 1, 0] == 1
     values = [floor.values(builder.bake(seed=seed, sky="1", samples=64))[..., 0] for seed in range(4)]
     assert_unbiased([v.mean() for v in values], np.pi / 2, least=0.002)
-    # Which rays go left is decided by one stratified coordinate: texels are off by a few strata.
+    # One stratified coordinate determines which rays hit the wall, so a texel has an error of a few strata.
     assert np.abs(np.array(values) - np.pi / 2).max() < np.pi / 8
 
 
 def test_sky_light_bounces_once_from_a_wall():
-    """A floor beside an endless white wall: half sky, half wall; the wall itself sees half a sky above
-    the floor's level only if the floor is endless: here it is a speck, so the wall has E = pi."""
+    """Half of a floor texel's hemisphere is sky, the other half a huge white wall. The floor is so small that
+    the wall has E = pi, as without a floor."""
     builder = SceneBuilder(64)
     builder.quad((0, -2000, -2000), (0, 4000, 0), (0, 0, 4000), builder.material(0.6), (8, 8))
     speck = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))
@@ -111,7 +112,7 @@ def test_sky_light_bounces_once_from_a_wall():
 
 @pytest.mark.parametrize("denoise", [False, True])
 def test_rough_ground_under_an_even_sky_is_never_brighter_than_flat_ground(denoise):
-    """E <= pi L and 0 <= AO <= 1 at every texel: ends of charts and what they grow into are no brighter."""
+    """E <= pi L and 0 <= AO <= 1 at every texel, also at chart borders and in dilated texels."""
     builder = SceneBuilder(64)
     rng = np.random.default_rng(5)
     for texels in ((40.3, 17.6), (23.7, 25.2), (11.4, 9.7)):
@@ -123,10 +124,10 @@ def test_rough_ground_under_an_even_sky_is_never_brighter_than_flat_ground(denoi
     )
     for channel, most in (("irradiance", np.pi), ("ao", 1.0)):
         value = result.lightmaps[channel].value
-        # Rounding of sums of 32 rays.
+        # The tolerance covers the rounding of sums over 32 rays.
         assert value.max() <= most * (1 + 1e-5)
         assert value.max() > 0.95 * most
         assert value.min() >= 0.0
         assert value[result.status == 1].min() > 0.05 * most
-        # A stray value of the filter, or of a slope, would stand out from its surroundings.
+        # The denoiser and the extrapolation leave no dilated texel black.
         assert value[result.status == 2].min() > 0.0

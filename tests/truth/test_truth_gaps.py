@@ -1,4 +1,4 @@
-"""Gaps narrower than a texel on a noisy floor: the denoiser carries no light into them."""
+"""The denoiser blurs no light into gaps narrower than a texel on a noisy floor."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from scenes import SceneBuilder
 
 HEIGHT, SLOT, SIDE = 0.001, 0.5, 1.0 / 16.0
 COLUMNS = 32
-# Texels (column, row) under plates of 2 x 2 texels each.
+# (column, row) of the first of the 2 x 2 floor texels under each plate.
 UNDER = [(c, r) for c in (4, 12, 20, 28) for r in (4, 12, 20, 28)]
 
 
 def _floor_with_plates():
-    """A floor 2 m wide, plates 1 mm above it, a canopy 1 m over x > 0.5, shut at x = 20; all black."""
+    """Return a builder and its floor: 2 m wide, with plates 1 mm above it; all surfaces are black.
+
+    A canopy 1 m above the floor covers x > 0.5 and is closed at x = 20."""
     builder = SceneBuilder(160)
     black = builder.material(0.0, double_sided=True)
     builder.quad((SLOT, 1, -50), (20 - SLOT, 0, 0), (0, 0, 100), black, (4, 4))
@@ -26,7 +28,7 @@ def _floor_with_plates():
 
 
 def _sky_share(x):
-    """Return the share of the sky's light at x: (1 + sin b) / 2 up to the canopy's edge at the angle b."""
+    """Return the share of the sky's light at x: (1 + sin b) / 2, b the angle from zenith to canopy edge."""
     return (1.0 + (SLOT - x) / np.hypot(SLOT - x, 1.0)) / 2.0
 
 
@@ -41,14 +43,15 @@ def test_gaps_stay_dark_and_the_floor_has_its_light(denoise):
     under = np.zeros((COLUMNS, COLUMNS), bool)
     for column, row in UNDER:
         under[row : row + 2, column : column + 2] = True
-    # At a distance d from an edge a point sees (1 - d / hypot(d, h)) / 2 of the sky past it: h / SIDE / 2 on
-    # the mean over a texel, at most, and each of these texels lies at two edges.
+    # Below a plate at height h, a point at a distance d from an edge receives (1 - d / hypot(d, h)) / 2 of
+    # the sky's light through that edge. The mean over a texel is at most h / SIDE / 2, and each texel has two
+    # edges.
     assert found[under].mean() < HEIGHT / SIDE
     x = (np.arange(COLUMNS * 64) + 0.5) / (COLUMNS * 64) * 2.0
     want = _sky_share(x).reshape(COLUMNS, 64).mean(axis=1)
-    # Plates 1 mm above the floor hide nothing from texels beside them.
+    # Plates 1 mm above the floor occlude no texels beside them.
     free = np.where(under, np.nan, found)
     wrong = np.nanmean(free, axis=0) / want - 1.0
-    # 64 x 64 rays a column. The filter takes light from texels beside plates, and gives it to others.
+    # A column has 64 x 64 rays. The denoiser moves light from texels beside plates to other texels.
     assert np.abs(wrong).max() < (0.075 if denoise else 0.045)
     assert np.nanmean(free) == pytest.approx(np.nanmean(np.where(under, np.nan, want)), rel=0.01)

@@ -1,4 +1,4 @@
-"""Turned, scaled and mirrored instances of one mesh get the light that hand-placed copies get."""
+"""Rotated, scaled and mirrored instances of a mesh get the same light as copies with transformed vertices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LIGHT = np.array([0.4, 2.5, 0.3])
 
 
 def body():
-    """Return a builder with one lopsided closed body: a box with its top sheared."""
+    """Return a builder with one asymmetric closed body, a box whose top is sheared."""
     builder = SceneBuilder(64)
     builder.box((0, 0, 0), (1, 0.6, 0.4), builder.material((0.7, 0.5, 0.3)), 10)
     position = np.concatenate([m.position for m in builder.meshes])
@@ -38,7 +38,7 @@ def body():
 
 
 def matrices():
-    """Return placements: as it is, turned, mirrored, mirrored and turned, unevenly scaled."""
+    """Return transforms: identity, rotation, reflection, reflection with rotation, non-uniform scale."""
     found = []
     turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     for k, linear in enumerate(
@@ -53,7 +53,7 @@ def matrices():
 
 @pytest.fixture(scope="module")
 def both():
-    """Return probes into a bake of instances and one of copies written out by hand."""
+    """Return probes of a bake of instances and of a bake of copies with transformed vertices."""
     builder, mesh = body()
     light = PunctualLight("point", "", 0, (30.0, 20.0, 10.0), position=tuple(LIGHT))
     scene = replace(builder.build(), meshes=(mesh,), lights=(light,))
@@ -64,7 +64,7 @@ def both():
         position = (mesh.position.astype(float) @ linear.T + matrix[:3, 3]).astype(np.float32)
         normal = mesh.normal.astype(float) @ np.linalg.inv(linear)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        # A mirror turns faces over; whoever writes the copy out turns them back.
+        # A reflection reverses the winding, so the copy reverses it again.
         triangle = mesh.triangle[:, [0, 2, 1]] if np.linalg.det(linear) < 0 else mesh.triangle
         copies.append(replace(mesh, position=position, normal=normal.astype(np.float32), triangle=triangle))
     hand = replace(
@@ -82,7 +82,8 @@ def test_instances_are_lit_as_copies_are(both, k):
     for channel in ("irradiance", "ao"):
         a, b = (np.array([p.at(x, n, channel) for x, n in zip(point, normal, strict=True)]) for p in both)
         size = max(float(b.max()), 1.0)
-        # Other charts, other noise; shadow edges fall on other texels: 2 % in the middle, some outliers.
+        # The bakes have different charts and noise, and shadow edges cross different texels, so some points
+        # differ more.
         assert np.median(np.abs(a - b)) < 0.01 * size
         assert np.abs(a - b).mean() < 0.02 * size
         assert abs(a.mean() / b.mean() - 1) < 0.02
@@ -90,7 +91,7 @@ def test_instances_are_lit_as_copies_are(both, k):
 
 @pytest.mark.parametrize("k", range(5))
 def test_open_faces_get_sky_and_light_by_closed_form(both, k):
-    """Where AO is 1, nothing is near: pi times the sky, plus the light if it is seen, plus some bounce."""
+    """Where AO is 1, E is pi times the sky, plus the light if visible, plus a little reflected light."""
     placed, _ = both
     point, normal = placed.surface_points(f"copy{k}", 80, np.random.default_rng(k))
     above = np.array([placed.at(x, n)[1] for x, n in zip(point, normal, strict=True)])
@@ -98,7 +99,7 @@ def test_open_faces_get_sky_and_light_by_closed_form(both, k):
     free = np.array([placed.at(x, n, "ao")[0] for x, n in zip(point, normal, strict=True)]) > 0.999
     assert free.sum() > 10
     truth = 3 * np.pi + direct[free]
-    # Other bodies hide a share of the sky beyond a metre, and give back a part of it.
+    # Other bodies, more than 1 m away, block some of the sky and reflect a part of that light.
     assert np.median(np.abs(above[free] / truth - 1)) < 0.08
     assert (above[free] < 1.2 * truth).all()
 

@@ -1,4 +1,4 @@
-"""No light comes through the edges and corners of a closed hull."""
+"""No light leaks through the edges and corners of a closed mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from baker.trace.embree import RayScene
 
 
 def turn(angles):
-    """Return a rotation matrix (3, 3): no edge of a turned box is aligned to an axis."""
+    """Return the rotation matrix (3, 3) of angles about x, y and z."""
     matrix = np.eye(3)
     for k, angle in enumerate(angles):
         c, s = np.cos(angle), np.sin(angle)
@@ -23,7 +23,7 @@ def turn(angles):
 
 
 def cube(matrix):
-    """Return (12, 3, 3) inward triangles of a turned cube that share their corners to the bit."""
+    """Return (12, 3, 3) triangles of a rotated cube, fronts inwards; shared corners are bit-identical."""
     point = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) @ matrix.T
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     corner = np.array([[point[list(t)] for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))] for q in quads])
@@ -49,7 +49,7 @@ def test_rays_aimed_at_edges_and_corners_do_not_leak(name):
     at = np.concatenate([corner, np.roll(corner, -1, axis=1)], axis=2).reshape(-1, 2, 3)
     pick = at[rng.integers(0, len(at), 40_000)]
     share = rng.random((len(pick), 1))
-    # A quarter aims at corners exactly, the rest at points of edges.
+    # A quarter of the rays aim exactly at corners, the others at points on edges.
     share[::4] = np.round(share[::4])
     target = pick[:, 0] * (1 - share) + pick[:, 1] * share
     origin = middle + 0.5 * unit(rng.normal(size=target.shape)) * rng.random((len(target), 1))
@@ -74,7 +74,7 @@ def test_dark_inside_a_hull_however_bright_outside(name):
 
 
 def test_dark_in_a_room_of_separate_walls():
-    """Six quads that only share edges, the emitter outside: their texels at edges and corners stay dark."""
+    """A room of six separate quads with the emitter outside: its texels at edges and corners stay dark."""
     builder = SceneBuilder(128)
     quads = builder.box((0, 0, 0), (4, 3, 2), builder.material(0.9), 20, inward=True)
     builder.quad((1, 3.5, 0.5), (1, 0, 0), (0, 0, 1), builder.material(0.0, 1.0e4), (6, 6))

@@ -1,4 +1,4 @@
-"""The reference against closed forms: each within three of its own standard errors and within 0.2 %."""
+"""The reference differs from closed forms by at most three of its standard errors and at most 0.2 %."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]]) - (0.5, 0.5, 0)
 
-# Samples of a pass: one way alone needs more.
+# {estimator: samples of a pass}. Estimators that only hit or only sample lights need more samples.
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
-# Albedo of each colour, and passes of 256 x 64 paths. Directions that do not follow the cosine make the
-# variance endless where albedo^2 > 3 / 4; between walls that meet, aiming alone does so at any albedo: it has
-# a sphere of its own.
+# {estimator: (albedo of each colour, passes of 256 x 64 paths)}. With uniform directions the variance is
+# infinite if albedo^2 > 3 / 4. `light` alone has infinite variance between walls that meet, for any albedo,
+# so it is tested in a sphere below.
 FURNACE = {
     "uniform": ((0.5, 0.35, 0.2), 48),
     "cosine": ((0.95, 0.8, 0.5), 140),
@@ -42,7 +42,7 @@ FURNACE = {
 
 @pytest.mark.parametrize("estimator", FURNACE)
 def test_furnace(estimator):
-    # Every wall emits 1 / pi: E = 1 / (1 - albedo) everywhere.
+    # Every wall emits 1 / pi, so E = 1 / (1 - albedo) everywhere.
     albedo, passes = FURNACE[estimator]
     emissive = Material(base_colour=(*albedo, 1.0), emission=(1 / math.pi,) * 3)
     walls = box_quads((0, 0, 0), (1, 2, 3), inward=True, material=emissive)
@@ -85,7 +85,7 @@ def test_beside_a_perpendicular_square(estimator):
 
 
 def test_form_factors_agree_with_quadrature():
-    """Lambert's formula, averaged over the square by Gauss points; towards an edge it converges slowly."""
+    """Gauss quadrature of Lambert's formula gives the form factors; at a common edge it converges slowly."""
     spot, weight = np.polynomial.legendre.leggauss(64)
     x, y = np.meshgrid(spot / 2, spot / 2)
     place = np.stack([x, y, 0 * x], axis=-1)
@@ -100,7 +100,7 @@ def test_form_factors_agree_with_quadrature():
 @pytest.mark.parametrize("estimator", ["mis", "bdpt"])
 @pytest.mark.parametrize("perpendicular", [False, True])
 def test_form_factor_of_unit_squares(perpendicular, estimator):
-    """Over the whole square, E / (pi L) is the form factor: 0.19982 face to face, 0.20004 at an edge."""
+    """The mean of E / (pi L) over the square is the form factor: parallel 0.19982, perpendicular 0.20004."""
     emitter = Quad((-0.5, 0.5, 1), (1, 0, 0), (0, -1, 0), grey(0, 1 / math.pi))
     truth, passes = parallel_squares(), 6
     if perpendicular:
@@ -117,7 +117,7 @@ def test_form_factor_of_unit_squares(perpendicular, estimator):
 
 
 def polyhedron(corner, light=(), albedo=0.5, emission=None):
-    """Return a scene of flat triangles (t, 3, 3) and their normals; `emission` (t,) bool: those that emit."""
+    """Return a scene of flat triangles (t, 3, 3), and their normals; `emission` (t,) bool: those that emit."""
     n = len(corner)
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     face /= np.linalg.norm(face, axis=1, keepdims=True)
@@ -143,7 +143,7 @@ FADED = replace(POINT, range=1.15)
 
 
 def faded_flux(corner, light):
-    """Return what arrives at triangles (t, 3, 3) from a point light of a range (midpoint rule)."""
+    """Return the flux at triangles (t, 3, 3) from a point light with a range, by the midpoint rule."""
     side = 64
     i, j = np.divmod(np.arange(side * side), side)
     up = i + j < side
@@ -153,7 +153,7 @@ def faded_flux(corner, light):
     place = corner[:, :1] + u[:, None] * edge[:, :1] + v[:, None] * edge[:, 1:]
     way = np.array(light.position) - place
     length = np.linalg.norm(way, axis=2)
-    # Twice the area, with its direction.
+    # Normal of a triangle, with twice its area as length.
     cross = np.cross(edge[:, 0], edge[:, 1])
     window = np.clip(1 - (length / light.range) ** 4, 0, 1)
     return float((np.einsum("tpx,tx->tp", way, cross) * window / length**3).sum() / 2 / side**2)
@@ -168,7 +168,7 @@ def faded_flux(corner, light):
     ],
 )
 def test_flux_in_a_closed_room(kind, estimator, albedo, passes):
-    """Whatever its shape, the mean over all walls is flux / area / (1 - albedo): here of 80 triangles."""
+    """In a closed room of any shape, here 80 triangles, mean E = flux / (area (1 - albedo))."""
     corner = icosphere(1, inward=True)
     area = areas(corner)
     emits = corner[:, :, 2].mean(axis=1) > 0.6
@@ -187,10 +187,11 @@ def test_flux_in_a_closed_room(kind, estimator, albedo, passes):
     [("light", 0.5, 10), ("mis", 0.2, 4), ("mis", 0.6, 20), ("bdpt", 0.5, 4)],
 )
 def test_integrating_sphere(estimator, albedo, passes):
-    """E = D + flux / (4 pi) albedo / (1 - albedo), at each place of the wall.
+    """E = D + flux / (4 pi) albedo / (1 - albedo) at each point of the wall, with direct irradiance D.
 
-    The sphere is made of 20,480 triangles. The effect of that is computed here: the first bounce from each
-    triangle by Lambert's formula, the others spread over the polyhedron's own area. It is below 0.03 %.
+    The sphere is a mesh of 20,480 triangles. The truth accounts for the mesh: the first bounce is computed
+    with Lambert's formula for each triangle, and later bounces with the area of the mesh. The difference
+    from a sphere is below 0.03 %.
     """
     corner = icosphere(5, inward=True)
     scene, face = polyhedron(corner, (POINT,), albedo)
@@ -216,7 +217,7 @@ def test_integrating_sphere(estimator, albedo, passes):
         (PunctualLight("point", "p", 0, (3.0, 2.0, 1.0), (0, 0, 1)), (3, 2, 1)),
         (PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0, 1, 1)), (0.5**1.5,) * 3),
         (PunctualLight("spot", "s", 0, (4.0, 4.0, 4.0), (0, 0, 2), (0, 0, -1), 0.2, 0.4), (1, 1, 1)),
-        # Off the axis, where the light falls: the share of the rim, squared.
+        # A point in the fall-off between the cones: the squared fraction of the way from outer to inner cone.
         (
             PunctualLight(
                 "spot", "s", 0, (8.0,) * 3, (0, 0, 2), (math.sin(0.3), 0, -math.cos(0.3)), 0.2, 0.4
@@ -224,7 +225,7 @@ def test_integrating_sphere(estimator, albedo, passes):
             (2 * ((math.cos(0.3) - math.cos(0.4)) / (math.cos(0.2) - math.cos(0.4))) ** 2,) * 3,
         ),
         (PunctualLight("directional", "d", 0, (5.0, 5.0, 5.0), direction=(0.6, 0, -0.8)), (4, 4, 4)),
-        # The window of a range: 1 - (1 / 2)^4.
+        # The factor of a light with a range, at half of the range: 1 - (1 / 2)^4.
         (PunctualLight("point", "p", 0, (3.0, 2.0, 1.0), (0, 0, 1), range=2.0), (45 / 16, 15 / 8, 15 / 16)),
         (
             PunctualLight("spot", "s", 0, (4.0,) * 3, (0, 0, 2), (0, 0, -1), 0.2, 0.4, range=4.0),
@@ -244,7 +245,7 @@ def test_lights_without_area_are_exact(light, truth, estimator):
 
 @pytest.mark.parametrize("estimator", ["light", "bdpt"])
 def test_a_point_light_over_a_square_half_in_shadow(estimator):
-    """The mean over a square is intensity x solid angle / area, less what a smaller square hides."""
+    """The mean over a square is I x (its solid angle - solid angle of the screen) / area."""
     screen = Quad((-0.1, -0.2, 0.5), (0.2, 0, 0), (0, 0.3, 0), grey(0.0, double_sided=True))
     light = PunctualLight("point", "p", 0, (2.0, 2.0, 2.0), (0.1, 0.0, 1.0))
     scene = replace(quad_scene([screen]), lights=(light,))
@@ -257,7 +258,7 @@ def test_a_point_light_over_a_square_half_in_shadow(estimator):
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_half_hidden_sky(estimator):
-    # Askew: a wall along an axis hides exactly half of a stratified square, and leaves no noise to test.
+    # The wall is not parallel to an axis; otherwise it would hide exactly half of the strata, without noise.
     wall = Quad((-150, -500, 0), (300, 1000, 0), (0, 0, 1000), grey(0.0, double_sided=True))
     found = traced(
         quad_scene([wall]),
@@ -280,7 +281,7 @@ def test_bounces_are_terms_of_a_series(bounces, albedo, estimator):
     assert_closed_form(found, sum(albedo**k for k in range(bounces + 1)))
 
 
-# Distances from a wall: far, near and close to the corner.
+# Distances of points from a wall, metres.
 NEAR = np.array([0.002, 0.01, 0.05, 0.1, 0.3, 0.8])
 
 

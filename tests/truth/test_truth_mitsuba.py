@@ -1,4 +1,4 @@
-"""The project's scenes in Mitsuba 3 and here: pictures and irradiance, within the error bars of both.
+"""Pictures and irradiance of the project's scenes agree with Mitsuba 3 within the standard errors of both.
 
 pip install -e '.[mitsuba]' && pytest -m mitsuba
 """
@@ -38,7 +38,7 @@ def mi():
 
 
 def opened(name, **change):
-    """Return a scene and the flat Lambertian reference of it."""
+    """Return a scene and its reference, with flat normals and Lambertian materials."""
     from mitsuba_scene import flat
 
     scene = replace(load_scene(ROOT / "assets" / f"{name}.glb"), **change)
@@ -46,17 +46,17 @@ def opened(name, **change):
 
 
 def batches(values):
-    """Return mean and standard error over axis 0."""
+    """Return the mean over axis 0 and its standard error."""
     return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
 
 def compare(ours, theirs, least):
-    """Check values (mean, error) against others, one by one and in all."""
-    # Neither has any noise where nothing is seen.
+    """Compare (mean, error) of both programs for single values and for the sum."""
+    # The second term avoids a division by 0 where neither program has noise.
     error = np.hypot(ours[1], theirs[1]) + 1e-9 * theirs[0].max()
     z = (ours[0] - theirs[0]) / error
     assert np.abs(z).max() < critical(z.size, BATCHES - 1)
-    # All together see a percent; colours share their paths.
+    # Use the green channel for the sum, because the colours have the same paths.
     total = (ours[0] - theirs[0])[..., 1].sum()
     spread = np.sqrt((error[..., 1] ** 2).sum())
     assert abs(total) < critical(1, BATCHES - 1) * spread
@@ -90,11 +90,11 @@ def test_pictures(mi, name, estimator):
 def test_irradiance(mi, name):
     from mitsuba_scene import mitsuba_scene
 
-    # A meter's rays never meet lights without area: emitters only.
+    # Mitsuba's irradiance meter does not sample lights without area, so use emitters only.
     scene, reference = opened(name, lights=())
     camera, side, n_places = scene.cameras[0], 0.02, 64
     with reference:
-        # Small squares on what the camera sees; what is curved or cluttered has none.
+        # Place small squares on visible surfaces that are flat and free of other objects.
         x, y = np.meshgrid((-0.5, 0.1, 0.6), (0.45, -0.1, -0.6))
         high = np.tan(0.5 * camera.fov)
         way = np.array(camera.forward) + high * (
@@ -145,7 +145,7 @@ def test_irradiance(mi, name):
 
 
 def _clear(reference, hits, i, side):
-    """Tell if a square around hit i lies flat on its triangle's plane with nothing else in the way."""
+    """Return whether the square around hit i lies on one plane and no other surface is close above it."""
     n = hits.face_normal[i]
     a = np.cross(n, (0, 1, 0) if abs(n[1]) < 0.9 else (1, 0, 0))
     a /= np.linalg.norm(a)

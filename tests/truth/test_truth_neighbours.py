@@ -1,4 +1,4 @@
-"""What happens in one room changes nothing in another one."""
+"""Lights in one room do not change the accuracy of another room."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ztest import assert_unbiased
 
 
 def room_and_ground(sun, bulb=(1.0, 1.0, 1.0)):
-    """A closed room with a point light inside, beside a sunlit ground."""
+    """Return a builder and quads of a closed room with a point light inside, beside a sunlit ground."""
     builder = SceneBuilder(96)
     white = builder.material(0.8)
     room = builder.box((0, 0, 0), (4, 2.5, 3), white, 12, inward=True)
@@ -23,7 +23,7 @@ def room_and_ground(sun, bulb=(1.0, 1.0, 1.0)):
 
 @pytest.mark.parametrize("bulb", [(1.0, 1.0, 1.0), (1.0, 1e-5, 1e-2)])
 def test_the_sun_outside_does_not_end_the_solve_of_a_room(bulb):
-    """A closed room has the same light beside a ground a million million times as bright."""
+    """A closed room has the same light beside a ground that is 1e12 times as bright."""
     light = []
     for sun in (0.0, 1e3, 1e12):
         builder, room, ground = room_and_ground(sun, bulb)
@@ -33,14 +33,14 @@ def test_the_sun_outside_does_not_end_the_solve_of_a_room(bulb):
         assert 0 < result.solve["patch_error"] <= 3e-5
         assert result.solve["iterations"] > 5
     for other in light[1:]:
-        # The solve estimates the error of each patch at 3e-5; the estimate is no bound.
+        # The solver stops at an estimated error of 3e-5 for each patch; the true error may be larger.
         np.testing.assert_allclose(other, light[0], rtol=2e-4)
     colours = np.divide(light[0], bulb)
     np.testing.assert_allclose(colours, colours[:, :1].repeat(3, axis=1), rtol=2e-4)
 
 
 def boxes(radiance):
-    """Closed rooms in a row, each with an emitter of this radiance."""
+    """Return a builder and the floors of closed rooms in a row; `radiance` has one emitter for each room."""
     builder = SceneBuilder(96)
     floors = []
     for k, emission in enumerate(radiance):
@@ -53,7 +53,7 @@ def boxes(radiance):
 
 
 def noise(radiance, room, **settings):
-    """Return the relative RMS difference of a floor between two seeds, and the mean."""
+    """Return the relative RMS difference of a room's floor between two seeds, and its mean."""
     builder, floors = boxes(radiance)
     first, second = (floors[room].values(builder.bake(seed=seed, **settings)) for seed in (1, 2))
     return float(np.sqrt(np.mean((first / second - 1.0) ** 2))), float((first + second).mean() / 2)
@@ -65,20 +65,20 @@ def test_bright_lights_next_door_take_no_samples(bright):
     alone, light = noise((1.0,), 0)
     for radiance, room in (((1.0, bright), 0), ((bright, 1.0, bright), 1)):
         beside, same = noise(radiance, room)
-        # Before, 20 times as much.
+        # Without the estimate of visibility the noise was 20 times that of `alone`.
         assert beside < 1.3 * alone
-        # The mean of one bake scatters by 0.1 %.
+        # The mean of a bake has a standard deviation of 0.1 % over seeds.
         assert same == pytest.approx(light, rel=4e-3)
 
 
 def test_light_through_a_keyhole_is_found():
-    """A hole of 8 cm lets light of an emitter 10,000 times as bright into a room with its own emitter."""
+    """Through a hole of 8 cm, an emitter next door lights a room whose own emitter is 10,000 times weaker."""
     builder = SceneBuilder(96)
     grey = builder.material(0.5)
     dim = builder.box((0, 0, 0), (2, 2, 2), grey, 12, inward=True)
     bright = builder.box((2.1, 0, 0), (4.1, 2, 2), grey, 6, inward=True)
     for wall, x in ((dim["+x"], 2.0), (bright["-x"], 2.1)):
-        # Both walls on this side become frames around the hole.
+        # Replace the two walls between the rooms by frames around the hole.
         at = next(k for k, mesh in enumerate(builder.meshes) if np.allclose(mesh.position[0], wall.origin))
         del builder.meshes[at], builder.instances[at]
         for low, high in (
@@ -102,6 +102,6 @@ def test_light_through_a_keyhole_is_found():
         result = builder.bake(seed=seed, samples=samples, bounces=0)
         return np.mean([quad.values(result).mean() for quad in own])
 
-    # The truth's own standard error is 1.5 %.
+    # The standard error of the truth is 1.5 %.
     truth = np.mean([light(seed, 2048) for seed in range(100, 104)])
     assert_unbiased([light(seed, 256) for seed in range(8)], truth, least=0.05, slack=0.03)

@@ -1,4 +1,4 @@
-"""A Cornell bake against the rough path tracer of the tests, texel by texel, within both error bars."""
+"""Texels of a Cornell bake agree with the simple path tracer of the tests within both standard errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SEEDS = 6
 
 
 def whole_texels(result, rng, n):
-    """Choose n texels that lie wholly in one triangle: (row, column), instance and triangle of each."""
+    """Choose n texels inside one triangle each, and return (row, column), instance and triangle of each."""
     found = []
     size = result.atlas.resolution
     for number, layout in enumerate(result.atlas.layouts):
@@ -36,7 +36,7 @@ def whole_texels(result, rng, n):
 
 
 def barycentric(corner, point):
-    """Return (n, 3) barycentrics of points (n, 2) in a triangle (3, 2)."""
+    """Return (n, 3) barycentric coordinates of points (n, 2) in a triangle (3, 2)."""
     a, b, c = corner
     inverse = np.linalg.inv(np.stack([b - a, c - a], axis=1))
     bc = (point - a) @ inverse.T
@@ -44,7 +44,7 @@ def barycentric(corner, point):
 
 
 def test_furnace_of_the_path_tracer_itself():
-    """The reference against a closed form: E = pi L / (1 - rho) in an emissive box."""
+    """The simple path tracer gives E = pi L / (1 - rho) in an emissive box."""
     builder = SceneBuilder(64)
     builder.box((0, 0, 0), (1, 2, 3), builder.material(0.5, 1.0), 8, inward=True)
     rng = np.random.default_rng(1)
@@ -60,7 +60,7 @@ def test_furnace_of_the_path_tracer_itself():
 def compared():
     """Return bakes (seeds, n, 3), path-traced means (n, 3) and their standard errors (n, 3)."""
     scene = baker.load(CORNELL)
-    # Large texels do: the path tracer averages over them too.
+    # Large texels are sufficient, because the path tracer averages over the area of the texel, too.
     results = [
         baker.bake(scene, resolution=96, samples=256, seed=seed, denoise=False, channels=["irradiance"])
         for seed in range(SEEDS)
@@ -82,7 +82,7 @@ def compared():
         face = np.cross(world[1] - world[0], world[2] - world[0])
         face *= np.sign(np.linalg.det(matrix[:3, :3])) / np.linalg.norm(face)
         point, normal = weight @ world, np.tile(face, (PATHS, 1))
-        # The floor under the boxes is dark; a bake fills it from around, and so the free part of a texel.
+        # Exclude texels with points under the boxes, which the bake replaces.
         free[k] = not tracer.inside_geometry(point, normal).any()
         value = tracer.irradiance(point, normal, rng)
         mean[k], error[k] = value.mean(axis=0), value.std(axis=0) / PATHS**0.5
@@ -93,12 +93,12 @@ def compared():
 def test_every_texel_agrees_within_error_bars(compared):
     bakes, mean, error = compared
     away = bakes.mean(axis=0) - mean
-    # Both errors, and 1 % for patches: bounced light after the first is constant over a few texels.
+    # Both standard errors, and 1 % because light after the first bounce is constant over a patch.
     both = np.sqrt(error**2 + bakes.var(axis=0, ddof=1) / SEEDS + (0.01 * mean) ** 2)
     assert np.median(error / mean) < 0.02
     z = np.abs(away / both)
     assert z.max() < critical(z.size)
-    # Not too good to be true either: the errors are real.
+    # A much smaller RMS would mean that the standard errors are overestimated.
     assert 0.3 < np.sqrt((z * z).mean()) < 1.5
 
 

@@ -1,4 +1,4 @@
-"""Lights without area: 1.0 lx at 1 m, inverse squares, glTF's cone, and shadows where they belong."""
+"""Lights without area: 1.0 lx at 1 m, inverse square, glTF's spot cone, and positions of shadow edges."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def floor_scene(size=64, half=2.0, texels=40, albedo=0.0):
 
 
 def assert_texels(found, truth, relative):
-    """Compare texels (rows, columns) of a smooth light: each is a mean over 16 stratified points."""
+    """Compare texels (rows, columns) with their truth; each texel is a mean over 16 stratified points."""
     assert np.abs(found - truth).max() <= relative * truth.max()
     assert abs(found.mean() / truth.mean() - 1) < 1e-3
 
@@ -29,7 +29,7 @@ def test_one_candela_gives_one_lux_at_one_metre(denoise):
     builder, floor = floor_scene(half=0.02, texels=9)
     builder.light("point", 1.0, position=(0.0, 1.0, 0.0))
     value = floor.values(builder.bake(denoise=denoise))
-    # 3 cm off the middle E is 1 - 2 * 0.028**2 = 0.9984; origins lie 1e-5 above the floor.
+    # 3 cm off the centre E is 1 - 2 * 0.028**2 = 0.9984; ray origins are 1e-5 above the floor.
     assert value[4, 4] == pytest.approx([1.0, 1.0, 1.0], abs=1e-4 if not denoise else 2e-3)
     assert value.min() > 0.997
 
@@ -40,11 +40,12 @@ def test_inverse_square_and_cosine_at_every_texel():
     builder.light("point", 3.0, position=light)
     found = floor.values(builder.bake())[..., 0]
     truth = floor.texel_mean(lambda p: 3.0 * point_irradiance(light, p, UP))
-    # Texels are 0.1 m wide, the light 0.8 m away: E changes by up to 20 % within one; 16 points remain.
+    # Texels are 0.1 m wide and the light is 0.8 m away, so E varies by up to 20 % within a texel; the error
+    # is that of the mean over 16 points.
     assert_texels(found, truth, 0.02)
     row, column = np.unravel_index(found.argmax(), found.shape)
     brightest = floor.points(1)[row, column, 0]
-    # Rows run along x, columns along z: the brightest texel lies under the light, so no axis is flipped.
+    # Rows run along x, columns along z. The brightest texel is below the light, so no axis is flipped.
     assert np.abs(brightest - [0.7, 0, -0.4]).max() < 0.2
 
 
@@ -93,7 +94,7 @@ def test_spot_falls_off_between_its_cones_as_gltf_says(inner, outer):
 
     found = floor.values(builder.bake())[..., 0]
     truth = floor.texel_mean(irradiance, 16)
-    # A cone without a soft part cuts texels: 16 points of one may miss its edge by a few.
+    # The edge of a hard cone crosses texels, where a few of the 16 points may be on the other side.
     assert_texels(found, truth, 0.03 if outer - inner > 0.1 else 0.15)
     outside = floor.points(16)
     cosine = ((outside - light) @ aim) / np.linalg.norm(outside - light, axis=-1)
@@ -115,7 +116,7 @@ def test_directional_light_is_even_and_follows_the_cosine():
 @pytest.mark.parametrize("facing", ["to the light", "away"])
 @pytest.mark.parametrize("kind", ["point", "directional"])
 def test_shadow_edges_lie_where_they_belong(kind, facing, double_sided):
-    """Every surface blocks from both sides; the blocker is off the middle, so flips and mirrors fail."""
+    """Every surface blocks light from both sides; the blocker is not centred, so a flipped axis fails."""
     builder, floor = floor_scene(half=2.0, texels=40)
     edges = ((0.0, 0.0, 0.7), (0.5, 0.0, 0.0))
     edges = edges if facing == "to the light" else edges[::-1]
@@ -150,7 +151,7 @@ def test_shadow_edges_lie_where_they_belong(kind, facing, double_sided):
     assert (found[dark] == 0).all()
     lit = ~dark & ~cut
     assert np.abs(found[lit] / truth[lit] - 1).max() < 0.02
-    # Of a cut texel's 16 points, stratified over its square, at most two or three fall on the wrong side.
+    # In a texel crossed by the edge, at most two or three of the 16 stratified points are on the other side.
     assert np.abs(found - truth)[cut].max() < 0.2 * truth.max()
     assert abs((found - truth)[cut].mean()) < 0.03 * truth.max()
 
@@ -174,5 +175,5 @@ def test_mirrored_scene_has_the_mirrored_map():
     mirrored, other = floor_scene()
     mirrored.light("point", 1.0, position=(-0.5, 0.7, 0.2))
     value, image = floor.values(builder.bake()), other.values(mirrored.bake())
-    # Texels' points differ: texel noise as above.
+    # The two texels have different points, so they differ by the noise of 16 points.
     assert np.abs(value - image[::-1]).max() < 0.03 * value.max()

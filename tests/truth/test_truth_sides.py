@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def emitter_over_floor(double_sided, face_down, **settings):
-    """An emitter of 1 x 1 m one metre above a floor of 2 x 2 m: the floor's texels."""
+    """Return the texels of a floor of 2 x 2 m under an emitter of 1 x 1 m at a height of 1 m."""
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
     edges = ((1, 0, 0), (0, 0, 1)) if face_down else ((0, 0, 1), (1, 0, 0))
@@ -36,17 +36,17 @@ def test_emitter_shines_from_its_front_and_from_both_if_double_sided(double_side
     square = [(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)]
     truth = 10.0 * floor.texel_mean(lambda p: polygon_irradiance(square, p, UP))
     assert_unbiased([f.mean(axis=0) for f in found], truth.mean(axis=0), least=0.01)
-    # 64 light rays a texel, each seeing the emitter: stratified noise under 5 %.
+    # 64 unblocked, stratified light rays a texel have a noise under 5 %.
     assert np.abs(np.mean(found, axis=0) / truth - 1).max() < 0.05
 
 
 def bounce_onto_floor(double_sided, lit_front, seed):
-    """A sunlit wall in the middle of a floor that the sun does not reach: light of the wall on the floor."""
+    """Return the light on a floor, without sun on it, from a sunlit wall that stands in its middle."""
     builder = SceneBuilder(64)
     floor = builder.quad((0, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))
     edges = ((0, 1, 0), (0, 0, 1)) if lit_front else ((0, 0, 1), (0, 1, 0))
     wall = builder.quad((0, 0, -0.5), *edges, builder.material(0.6, double_sided=double_sided))
-    # The sun moves level, along -x: it lights the wall's +x side only.
+    # Sunlight travels horizontally along -x, so it lights only the +x side of the wall.
     builder.light("directional", 100.0, direction=(-1.0, 0.0, 0.0))
     result = builder.bake(seed=seed)
     return floor.values(result)[..., 0], wall.values(result)[..., 0]
@@ -64,14 +64,14 @@ def test_wall_reflects_what_reaches_it_on_a_side_that_reflects(double_sided, lit
     for seed in range(SEEDS):
         floor, wall = bounce_onto_floor(double_sided, lit_front, seed)
         found.append(floor.mean())
-        # The map stores the front: lit, or dark though its back is lit.
+        # The map stores the irradiance of the front, which is 0 if only the back is lit.
         assert np.allclose(wall, 100.0 if lit_front else 0.0, rtol=1e-4)
-    # The wall's radiosity is 60 lx all over; form factor of perpendicular unit squares with a common edge.
+    # 60 lx is the radiosity of the wall; the factor is that of perpendicular unit squares with a common edge.
     assert_unbiased(found, 60.0 * 0.2000438, least=0.005)
 
 
 def test_double_sided_sheet_in_a_furnace_changes_nothing():
-    """A thin emissive sheet of the walls' own albedo in a furnace: still E = pi L / (1 - rho) everywhere."""
+    """With a double-sided sheet of the walls' material in a furnace, E is still pi L / (1 - rho)."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -85,7 +85,7 @@ def test_double_sided_sheet_in_a_furnace_changes_nothing():
 
 
 def test_one_sided_sheet_swallows_light_at_its_back():
-    """In the same furnace a sheet that is black behind darkens the walls behind it, and only absorbs."""
+    """A one-sided sheet in the same furnace darkens the walls behind its back, which absorbs their light."""
     builder = SceneBuilder(64)
     walls = builder.material(0.7, 1.0)
     quads = builder.box((0, 0, 0), (2, 2, 2), walls, 10, inward=True)

@@ -1,4 +1,4 @@
-"""A crate in a slab: texels at its foot are unoccluded, double-sided or not."""
+"""A crate on or in a slab: texels at its foot are correct for one-sided and double-sided materials."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scenes import SceneBuilder
 
-# The crate's floor height; the slab's top is at 0.
+# Height of the crate's bottom, metres: below the slab's top, which is at 0, or level with it.
 SUNK, EXACT = -0.3, 0.0
 
 
 def crate_in_slab(double_sided, low, *, inward=False, albedo=0.5, half=4.0):
-    """Bake a crate of 1 m in or on a slab under a sky of radiance 1; return slab, crate, result."""
+    """Bake a crate of 1 m in or on a slab under a sky of radiance 1, and return slab, crate and result."""
     builder = SceneBuilder(128)
     material = builder.material(albedo, double_sided=double_sided)
     slab = builder.box((-half, -0.5, -half), (half, 0, half), material, 26)
@@ -22,9 +22,9 @@ def crate_in_slab(double_sided, low, *, inward=False, albedo=0.5, half=4.0):
 @pytest.mark.parametrize("low", [SUNK, EXACT])
 @pytest.mark.parametrize("double_sided", [False, True])
 def test_the_foot_of_a_black_crate_sees_half_the_sky(double_sided, low):
-    """A wall on a black ground sees the upper half of its hemisphere at any height: E = pi / 2.
+    """A wall on black ground receives light from the upper half of its hemisphere: E = pi / 2 at any height.
 
-    Beyond the slab's edge, 200 m away, there is sky below the horizon, too: 0.1 % at a height of 0.15 m.
+    Beyond the slab's edge, 200 m away, sky below the horizon adds 0.1 % at a height of 0.15 m.
     """
     _, crate, result = crate_in_slab(double_sided, low, albedo=0.0, half=200.0)
     for side, axis in (("+x", 2), ("-x", 2), ("+z", 0), ("-z", 0)):
@@ -35,7 +35,7 @@ def test_the_foot_of_a_black_crate_sees_half_the_sky(double_sided, low):
             along[axis] = 0.11
             for sign in (-1, 0, 1):
                 point = np.array([middle[0], height, middle[2]]) + sign * along
-                # 256 rays, stratified: 2 % for one texel.
+                # A texel with 256 stratified rays has a noise of 2 %.
                 assert quad.value_at(result, point)[0] == pytest.approx(np.pi / 2, rel=0.04)
 
 

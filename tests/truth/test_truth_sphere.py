@@ -19,30 +19,30 @@ def sphere_bake(level, albedo, position, seed, bounces=None, texels=2):
     result = builder.bake(seed=seed, bounces=bounces)
     edge = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     area = 0.5 * np.linalg.norm(np.cross(*edge), axis=1).sum()
-    # All triangles of one level have nearly one size: texels weigh alike up to a few per cent of the spread.
+    # The triangles have nearly equal areas, so an unweighted mean over texels is accurate enough.
     return result.lightmaps["irradiance"].value[result.status == 1][:, 0].astype(np.float64), area
 
 
 @pytest.mark.parametrize("position", [(0.0, 0.0, 0.0), (0.3, 0.4, -0.2)])
 @pytest.mark.parametrize("albedo", [0.3, 0.9])
 def test_indirect_light_is_even_and_known(albedo, position):
-    """In a polyhedron the mean direct irradiance is 4 pi I / A exactly, and the bounce after a first
-    evenly spread one is 4 pi I rho / (A (1 - rho))."""
+    """The mean indirect irradiance of a polyhedron around a point light is 4 pi I rho / (A (1 - rho))."""
     indirect = []
     for seed in range(4):
         whole, area = sphere_bake(2, albedo, position, seed)
         direct, _ = sphere_bake(2, albedo, position, seed, bounces=0)
         even = 4 * np.pi * INTENSITY * albedo / (1 - albedo) / area
         indirect.append((whole - direct) / even)
-        # A sphere spreads whatever its walls reflect evenly. An icosphere of 320 faces is flat to 1 %:
-        # direct light off centre gives texels up to a few per cent more or less; 64 rays give the rest.
+        # In a sphere, indirect light is uniform. In an icosphere of 320 flat faces it varies by a few percent
+        # if the light is off the centre; the noise of 64 rays adds to that.
         assert indirect[-1].std() < 0.06
-    # 0.5 %: the share of the bounce that a flat face of the 320 cannot give itself and its neighbours.
+    # `slack`: a flat face reflects no light to itself and little to its neighbours, which changes the mean by
+    # up to 0.5 %.
     assert_unbiased([v.mean() for v in indirect], 1.0, least=0.003, slack=0.005)
 
 
 def test_error_falls_with_the_square_of_the_edge():
-    """Against the round sphere's closed form I (1 + rho / (1 - rho)) / r^2 with a light at the centre."""
+    """With the light at the centre, E converges to that of a sphere, I (1 + rho / (1 - rho)) / r^2."""
     truth = INTENSITY / (1 - 0.5)
     error = []
     for level in (0, 1, 2):
@@ -51,7 +51,7 @@ def test_error_falls_with_the_square_of_the_edge():
             for seed in range(4)
         ]
         error.append(np.mean(values) / truth - 1)
-    # Halving edges quarters the error; 2.5 to 6 leaves room for higher orders on the coarsest mesh and noise.
+    # Half the edge length gives a quarter of the error; 2.5 to 6 allows for higher orders and noise.
     assert error[0] > error[1] > error[2] > 0
     assert 2.5 < error[0] / error[1] < 6
     assert 2.5 < error[1] / error[2] < 6

@@ -1,4 +1,4 @@
-"""Light behind coloured panes: T = (1 - a) lerp(1, c, a), from every kind of light and in all bounces."""
+"""Light through coloured panes is multiplied by T = (1 - a) lerp(1, c, a), for all lights and bounces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LIGHT_AT = (0.0, 2.0, 0.0)
 
 
 def glass(builder, colour=COLOUR, alpha=HALF, *, rgba=None):
-    """Add a two-sided BLEND material; `rgba` (H, W, 4) is a linear texture."""
+    """Add a double-sided BLEND material and return its index; `rgba` (H, W, 4) is a linear texture."""
     number = builder.material(0.0, double_sided=True)
     texture = None if rgba is None else Texture(np.float32(rgba), wrap=("clamp", "clamp"))
     builder.materials[number] = replace(
@@ -35,7 +35,7 @@ def pane(colour=COLOUR, alpha=HALF, **settings):
 
 
 def passed(colour, alpha):
-    """What a surface lets through: the share 1 - alpha, mixed with its colour by alpha."""
+    """Return the transmittance T of a surface for each colour."""
     return (1 - alpha) * (1 - alpha + alpha * np.asarray(colour))
 
 
@@ -47,7 +47,7 @@ def test_each_pane_multiplies_the_light_of_a_point(panes):
     share = np.prod([passed(*p) for p in panes], axis=0)
     free_builder, free_floor = floor_under(light="point", position=LIGHT_AT)
     free = free_floor.values(free_builder.bake(bounces=0))
-    # Nothing is left to chance, in any texel and colour.
+    # The transmittance is applied without random decisions, so every texel and colour is exact.
     np.testing.assert_allclose(found, free * share, rtol=1e-5)
     assert (found / truth).mean(axis=(0, 1)) == pytest.approx(share, rel=1e-3)
 
@@ -66,7 +66,7 @@ def test_every_kind_of_light_is_coloured(light):
 
 @pytest.mark.parametrize("alpha", [0.6, 0.9])
 def test_a_light_behind_a_dense_pane_is_no_noisier_than_without(alpha):
-    """Against Lambert's formula; 64 samples of a square in the open scatter by 2 % a texel."""
+    """Compared with Lambert's formula; without a pane, 64 samples give a texel 2 % of noise."""
     square = np.array([(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)])
     builder, floor = floor_under(pane(alpha=alpha), light="", texels=24)
     builder.quad(square[0], square[1] - square[0], square[3] - square[0], builder.material(0.0, 5.0), (8, 8))
@@ -78,7 +78,7 @@ def test_a_light_behind_a_dense_pane_is_no_noisier_than_without(alpha):
 
 
 def test_sky_through_black_glass_all_around_has_no_noise():
-    """A closed box of glass that reflects nothing: each ray of the floor in it passes it once."""
+    """In a closed box of black glass, each ray of the floor crosses one pane."""
     alpha = 0.9
     builder = SceneBuilder(96)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
@@ -89,7 +89,7 @@ def test_sky_through_black_glass_all_around_has_no_noise():
 
 
 def test_a_pane_elsewhere_leaves_an_unoccluded_light_its_closed_form():
-    """No pane is between them: the light has no noise, although other objects are made of glass."""
+    """If no pane is between emitter and floor, the analytic light is used although the scene has glass."""
 
     def baked(*panes):
         builder, floor = floor_under(light="", texels=24)
@@ -102,13 +102,13 @@ def test_a_pane_elsewhere_leaves_an_unoccluded_light_its_closed_form():
 
 
 def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
-    """Texels on both sides of it hold the light of one side, and not of some points by chance."""
+    """A texel that the pane crosses stores the light of one of its sides."""
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (24, 24))
     builder.quad((0.013, -0.2, -1.2), (0, 1.6, 0), (0, 0, 2.4), glass(builder, alpha=0.9), (4, 4))
     builder.light("directional", 1.0, direction=(-(0.5**0.5), -(0.5**0.5), 0.0))
     found = floor.values(builder.bake(bounces=0, samples=16)) / 0.5**0.5
-    # Rows run along x; the pane is in row 12.
+    # Rows run along x, and the pane crosses row 12.
     np.testing.assert_allclose(found[13:], 1, rtol=1e-5)
     np.testing.assert_allclose(found[:12], np.broadcast_to(passed(COLOUR, 0.9), (12, 24, 3)), rtol=1e-5)
     assert np.ptp(found[12], axis=0).max() < 1e-5
@@ -116,7 +116,7 @@ def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
 
 
 def test_a_light_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_an_unoccluded_one():
-    """Of 256 rays all pass as a rule; each has to be asked for its colour nevertheless."""
+    """Usually none of the 256 early-out rays is blocked, but their transmittance is below 1."""
     builder, floor = floor_under(pane((1.0, 0.0, 0.0), 1 / 1024), light="")
     builder.quad((-1, 1, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 5.0), (8, 8))
     found = floor.values(builder.bake(bounces=0, samples=64))
@@ -134,18 +134,18 @@ def test_what_is_not_there_colours_nothing():
 
 
 def test_transparent_black_beside_stained_glass():
-    """A texture half opaque red of alpha 0.5, half transparent black: only the red half colours."""
+    """In a texture with one half red of alpha 0.5 and one transparent black, only the red colours light."""
     rgba = np.zeros((64, 64, 4))
     rgba[:, 32:] = 1.0, 0.0, 0.0, 0.5
     builder, floor = floor_under(pane((1, 1, 1), 1.0, rgba=rgba), direction=(0, -1, 0))
     found = floor.values(builder.bake(bounces=0))
-    # Columns of the floor and of the texture run along z; the pixels in between are blended over one of 64.
+    # Columns of floor and texture run along z; at the border, bilinear lookups blend the two halves.
     assert (found[:, :19] == 1).all()
     assert found[:, 21:].mean(axis=(0, 1)) == pytest.approx(passed((1, 0, 0), 0.5), rel=0.01)
 
 
 def room_with_a_pane(colour=COLOUR, albedo=0.7):
-    """A closed room, 8 x 8 texels a wall, cut in two by glass where texels of the walls meet."""
+    """Return a closed room with 8 x 8 texels on each wall, divided by a pane at a border between texels."""
     builder = SceneBuilder(64)
     builder.box((-1, -1, -1), (1, 1, 1), builder.material(albedo), 8, inward=True)
     builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), glass(builder, colour), (8, 8))
@@ -160,7 +160,7 @@ def test_exchange_through_a_pane_is_reciprocal_in_each_colour():
     for c in range(3):
         flux[c, row, matrix.column] = patches.area[row] * matrix.value * matrix.transmittance[:, c]
     np.testing.assert_allclose(flux, flux.transpose(0, 2, 1), rtol=1e-5)
-    # Texels of the walls lie above or below the pane; light from one half to the other passed it once.
+    # Texels are above or below the pane; light from one half to the other crosses it once.
     high = world.texels.position[:, 1][patches.member[patches.first[:-1]]]
     wall = abs(high) > 0.01
     across = wall[row] & wall[matrix.column] & (high[row] * high[matrix.column] < 0)

@@ -1,4 +1,4 @@
-"""Coloured panes in the reference: closed forms, estimators against each other, and a bake against it."""
+"""Coloured panes in the reference: closed forms, agreement of estimators, agreement with a bake."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from baker.pathtracer.scene import build_reference
 
 STAINED = Material(base_colour=(*COLOUR.tolist(), HALF), alpha_mode="BLEND", double_sided=True)
 VIEW = Camera("view", 0, (0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 0.5)
-# One for each code path: vertices one by one, paths by chance, aimed at emitters, both, both ends.
+# One estimator for each code path: scalar vertices, hits by chance, light sampling, MIS, bidirectional.
 ESTIMATORS = ("uniform", "cosine", "light", "mis", "bdpt")
 
 
 def room():
-    """A closed room with an emitter and a point light above a pane, and a block below it."""
+    """Return a closed room with an emitter and a point light above a pane, and a block below the pane."""
     walls = box_quads((0, 0, 0), (2, 2, 2), inward=True, material=grey(0.6))
     emitter = Quad((0.7, 1.3, 1.8), (0.6, 0, 0), (0, -0.6, 0), grey(0, 5.0))
     block = box_quads((0.3, 0.3, 0.01), (0.8, 0.8, 0.6), inward=False, material=grey(0.4))
@@ -53,7 +53,7 @@ def test_estimators_agree_pairwise_below_a_pane():
 @pytest.mark.parametrize("estimator", ["mis", "bdpt"])
 @pytest.mark.parametrize("place", [(0.1, 0.03, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, 0.0)])
 def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator, place):
-    """All rays from the place are the same ray: each brings the whole share, through the diagonal, too."""
+    """All shadow rays of a point are equal and are multiplied by T, also through the pane's diagonal."""
     scene = quad_scene([Quad((-1, -1, 1), (2, 0, 0), (0, 2, 0), STAINED)])
     scene = replace(scene, lights=(PunctualLight("point", "p", 0, (4.0, 4.0, 4.0), (0.0, 0.0, 2.0)),))
     found = traced(scene, copies_of(place, copies=2), estimator=estimator, max_bounces=0)
@@ -64,7 +64,7 @@ def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator, place
 
 @pytest.mark.parametrize("estimator", ["uniform", "mis", "bdpt"])
 def test_a_pane_before_the_sky_in_a_picture(estimator):
-    """What passes, T, and what the pane reflects of the sky on the viewer's side, alpha times colour."""
+    """A pane in front of the sky shows T plus the reflected sky on the viewer's side, alpha times colour."""
     pane = Quad((-4, -4, 0), (8, 0, 0), (0, 8, 0), STAINED)
     estimate = new_estimate(64, 3, 16)
     with build_reference(quad_scene([pane]), sky=(1.0, 1.0, 1.0), lambertian=True, threads=2) as reference:

@@ -1,4 +1,4 @@
-"""A closed room under a bright sky: no light gets in where walls, ceiling, beams and shelves cut texels."""
+"""A closed room under a bright sky stays dark where walls, ceiling, beams and shelves cross texels."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import pytest
 from scenes import SceneBuilder
 
 SKY = 1000.0
-# Of the sky's irradiance, everywhere in the room.
+# Largest E in the room, as a share of the sky's irradiance outside.
 DARK = 1e-4
 
 
 def room(density, thickness, double_sided, sunk=0.0):
-    """A room of 4 x 4 x 2.5 m on a floor of 7 x 7 m, with a roof; a beam and a shelf go through its walls."""
+    """Return a room of 4 x 4 x 2.5 m on a floor of 7 x 7 m, with a beam and a shelf through its walls."""
     builder = SceneBuilder(256)
     matter = builder.material(0.6, double_sided=double_sided)
 
@@ -21,7 +21,7 @@ def room(density, thickness, double_sided, sunk=0.0):
 
     floor = builder.quad((-3.5, 0, 3.5), (7, 0, 0), (0, 0, -7), matter, (n(7), n(7)))
     walls = []
-    # Not on the lines between the floor's texels.
+    # Offsets of the walls, so that they do not coincide with borders of floor texels.
     for k, shift in enumerate((0.013, 0.017, -0.021, 0.029)):
         turn = np.array([[np.cos(k * np.pi / 2), 0, np.sin(k * np.pi / 2)], [0, 1, 0],
                          [-np.sin(k * np.pi / 2), 0, np.cos(k * np.pi / 2)]])  # fmt: skip
@@ -42,7 +42,7 @@ def room(density, thickness, double_sided, sunk=0.0):
 
 
 def inside(quad, margin):
-    """Return the texels (rows, columns) of a quad that lie in the room, so far from its walls."""
+    """Return (rows, columns) bool: texels of a quad inside the room, at least `margin` from its walls."""
     place = quad.points(1)[:, :, 0]
     within = (np.abs(place[..., [0, 2]]) < 2.0 - margin).all(axis=-1)
     return within & (place[..., 1] > -1e-6) & (place[..., 1] < 2.51)
@@ -69,7 +69,7 @@ def test_no_light_crosses_the_walls_of_a_closed_room(density, thickness, double_
         assert quad.values(result)[here].max() < dark
     for quad in walls:
         values = quad.values(result)
-        # Rows of whole texels above the floor and columns between the other walls.
+        # Texels of the walls that lie wholly above the floor and between the other walls.
         place = quad.points(1)[:, :, 0]
         along = np.abs(place @ (quad.u / np.linalg.norm(quad.u))) < 2.0 - texel
         assert values[along & (place[..., 1] > 0.75 * texel)].max() < dark
@@ -77,6 +77,6 @@ def test_no_light_crosses_the_walls_of_a_closed_room(density, thickness, double_
         place = side.points(1)[:, :, 0]
         far = (np.abs(place[..., [0, 2]]) < 2.0 - 0.45).all(axis=-1)
         assert side.values(result)[far].max(initial=0.0) < dark
-    # Outside it is bright, up to the walls.
+    # The floor outside is bright, up to the walls.
     bright = floor.values(result)[(np.abs(floor.points(1)[:, :, 0][..., [0, 2]]) > 3.0).any(axis=-1)]
     assert bright.min() > 0.3 * np.pi * SKY

@@ -1,4 +1,4 @@
-"""Slow or plain counterparts of kernels, and doors into kernels, for the tests of truth."""
+"""Helpers of the truth tests that call kernels directly."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ set_ray, trace = compiled(set_ray, trace)
 
 
 def closest_hits(tracer: Tracer, origin: Any, direction: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return primitive (n,) int64, -1 for none, and distance (n,) of rays, packet by packet."""
+    """Return triangle (n,) int64, -1 for none, and distance (n,) of the closest hits of n rays."""
     origin, direction = (np.ascontiguousarray(a, np.float32) for a in (origin, direction))
     primitive, distance = np.full(len(origin), -1, np.int64), np.full(len(origin), np.inf)
     buffers = new_packet_buffers(tracer)
