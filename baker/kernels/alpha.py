@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from baker.kernels.textures import sample_alpha
 from baker.trace.jit import inner, larger, smaller
 
-# Columns of `AlphaTable.row`. EDGE_1 and EDGE_2 are the value at corner 1 or 2 minus the value at corner 0:
+# Columns of `AlphaTable.row`. Columns EDGE_1 and EDGE_2 contain the value at corner 1 and at corner 2, minus
+# the value at corner 0.
 #
 #     UV, UV_EDGE_1, UV_EDGE_2            image uv (2 each)
 #     ALPHA, ALPHA_EDGE_1, ALPHA_EDGE_2   factor times vertex alpha

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Clips triangles to the square of a texel; area of the clipped polygon, and uniform points in it.
+"""Clips triangles to the square of a texel, and computes area and uniform points of the clipped polygon.
 
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
@@ -106,7 +106,7 @@ def square_touches(corner, x0, y0):
     """Return how a triangle overlaps the texel [x0, x0 + 1] x [y0, y0 + 1].
 
     corner : (3, 2) float64, texels
-    Returns 0 if they do not touch, 1 if the triangle covers a part of the texel, 2 if it covers all of it.
+    Returns 0 if triangle and texel do not touch, 2 if the triangle covers the whole texel, else 1.
     """
     twice = (corner[1, 0] - corner[0, 0]) * (corner[2, 1] - corner[0, 1]) - (corner[2, 0] - corner[0, 0]) * (
         corner[1, 1] - corner[0, 1]

@@ -2,8 +2,7 @@
 
 Neighbouring triangles are grouped into clusters. A sample is chosen in three steps:
 
-1. a cluster, in proportion to an estimate of its contribution to a tile of texels, from the cluster's power,
-   distance and orientation;
+1. a cluster, in proportion to an estimate of its contribution to a tile of texels (`cluster_chances`);
 2. a triangle of the cluster, in proportion to its power;
 3. a point, uniform in the triangle's area.
 
@@ -25,7 +24,7 @@ from baker.kernels.texel_info import uv_at
 from baker.kernels.textures import sample_texture
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Columns of an emitter's row:
+# Columns of `Emitters.row`:
 #
 #     CORNER, CORNER_1, CORNER_2   positions of the corners, metres (3 each)
 #     NORMAL                       unit face normal (3)
@@ -37,9 +36,10 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 #     RADIANCE                     RGB, cd/m2, without the texture (3)
 #     TEXTURED                     1 if the radiance is RADIANCE times the texture, 0 if it is RADIANCE, or
 #                                  NO_CLOSED_FORM
-#     INSIDE                       position in a triangle of the scene: barycentrics b1, b2 of corner 0, and
-# edge                                  length / edge length of that triangle, negative for parts rotated by
-# 180                                  degrees; (0, 0, 1) for a whole triangle
+#     INSIDE                       position in the triangle of the scene: barycentrics b1, b2 of corner 0, and
+#                                  size (3). The size is the edge length divided by the triangle's edge
+#                                  length, negative for parts rotated by 180 degrees. (0, 0, 1) for a whole
+#                                  triangle
 CORNER, CORNER_1, CORNER_2, NORMAL, AREA, TWO_SIDED = 0, 3, 6, 9, 12, 13
 SHARE, CUMULATIVE, CLUSTER, RADIANCE, TEXTURED, INSIDE = 14, 15, 16, 17, 20, 21
 ROW_LENGTH = 24
@@ -178,10 +178,12 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 @kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
-    """Return the largest radius / distance of a cluster, with the distance from the nearest possible point.
+    """Return the largest radius / distance of a cluster as seen from points.
+
+    The distance is from the cluster's centre to the bounding sphere of the points. If this sphere touches the
+    sphere of a cluster, inf is returned.
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
-    Returns inf if the bounding sphere of the points touches the sphere of a cluster.
     """
     x, y, z, radius = bounding_sphere(origin)
     widest = 0.0
@@ -303,14 +305,14 @@ def sample_emitter(row, first, chance, cumulative, u, v, point):  # type: ignore
 
 @inner
 def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
-    """Return the emitter at barycentrics (b1, b2) of a triangle that may be subdivided, -1 where it is black.
+    """Return the emitter at barycentrics (b1, b2) of a triangle, -1 if nothing is emitted there.
 
     node : (K, 4) int32, see `Emitters`
     code : code of the triangle, see below
 
-    A code m >= 0 means emitter m. A code -1 means that nothing is emitted. A code -2 - k means a subdivision
-    into four parts with the codes node[k]: the parts at corners 0, 1 and 2, and the rotated part in the
-    middle.
+    Textured triangles are subdivided into emitters. A code m >= 0 means emitter m. A code -1 means that
+    nothing is emitted. A code -2 - k means a subdivision into four parts with the codes node[k]: the parts at
+    corners 0, 1 and 2, and the rotated part in the middle.
     """
     while code < -1:
         k = -2 - code

@@ -18,8 +18,8 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PACKET_WID
 #     SOLID_BACK    if the ray hits the back, its origin is inside a solid
 #     SOLID_FRONT   if the ray hits the front, its origin is inside a solid whose faces are wound inwards
 BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
-# Number of rays with such hits on solids that prove a point to be inside. A single ray may pass through an
-# edge.
+# Number of hits on solids from inside that prove a point to be inside. A single such hit is no proof, because
+# the ray may have passed through an edge.
 PROOF = 2
 # Factor in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside is the number of rays that hit a solid from
 # inside, n_elsewhere the number of rays that hit neither a solid from inside nor a black back.
@@ -32,8 +32,8 @@ def inside_hits(
 ):
     """Cast rays from w points of each of m texels, and count their first hits by kind.
 
-    Sixteen texels are processed together. No further rays are cast from their points with the same number
-    after it is decided for each of these points whether it is inside geometry.
+    Sixteen texels are processed together, point number after point number. The remaining rays of a point
+    number are skipped when each of the sixteen points with this number is known to be inside or outside.
 
     origin, normal : (m, w, 3) float32, metres, world, and unit; each point casts `rays_per_point`
         cosine-weighted rays

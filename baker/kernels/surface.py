@@ -24,10 +24,13 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Points of a texel.
 N_POINTS = 16
-# Factors of the offset of ray origins along the face normal. For a largest coordinate x of the point and a
-# triangle of size s, the offset is max(ROUNDING max(x, s), OFFSET min(x, s)). ROUNDING is sixteen relative
-# steps of float32. Rounding moves an origin and a hit by one step each, and faces that are meant to be
-# coplanar may be a few steps apart.
+# Factors of the offset of ray origins along the face normal. The offset is
+#
+#     max(ROUNDING max(x, s), OFFSET min(x, s))
+#
+# x is the largest coordinate of the point, and s the largest edge component of the triangle. ROUNDING is
+# sixteen times the relative spacing of float32 numbers. Rounding moves an origin and a hit by one spacing
+# each, and faces that are meant to be coplanar may be a few spacings apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Distance by which points near the border of their triangle move towards its centroid, as a multiple of the
 # offset. They move at most half way.

@@ -14,7 +14,7 @@ the first hit of the first ray. The second ray is traced in a second tree that c
 triangles.
 
 The argument `blend` of these functions is a `BlendBuffers`, or None in scenes without BLEND surfaces. With
-None, Numba compiles the functions to nothing.
+None, Numba compiles them without the code for transmittance.
 """
 
 from __future__ import annotations
@@ -45,8 +45,11 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of a row after the columns of `AlphaTable.row`: factor times vertex colour, RGB, at corner 0; the
-# values at corner 1 and at corner 2, minus the value at corner 0 (3 each).
+# Columns of `TransmittanceTable.row`. Columns 0 to 11 are those of `AlphaTable.row`.
+#
+#     COLOUR                         factor times vertex colour at corner 0, RGB (3)
+#     COLOUR_EDGE_1, COLOUR_EDGE_2   its value at corner 1 and at corner 2, minus its value at corner 0 (3
+# each)
 COLOUR, COLOUR_EDGE_1, COLOUR_EDGE_2 = 12, 15, 18
 ROW_LENGTH = 21
 
@@ -324,7 +327,10 @@ def transmittance(blend, c, lane):
 
 @inner
 def count_coloured(blend):
-    """Return the number of RGB transmittances of sixteen rays that are not 1; 0 if none crossed BLEND."""
+    """Return how many of the 3 * 16 transmittances of sixteen rays are not 1.
+
+    The number is 0 if no ray crossed a BLEND surface.
+    """
     if blend is None:
         return 0
     colour = blend.transmittance

@@ -38,7 +38,7 @@ from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Largest number of clusters. It limits the time to compute the weights of clusters for each tile of texels.
 MAX_CLUSTERS = 256
-# Largest number of parts into which textured triangles are cut, beyond one part per triangle.
+# Largest number of parts of all textured triangles, minus the number of textured triangles.
 MOST_PARTS = 32768
 # Largest total weight of the parts of one triangle when clusters are formed. An uncut triangle has weight 1.
 _CROWD = 64.0
@@ -83,7 +83,7 @@ def build_emitters(geometry: Geometry, shading: Shading, most_parts: int = MOST_
     shading : Shading
         Materials of these triangles.
     most_parts : int
-        Largest number of parts into which textured triangles are cut, beyond one part per triangle.
+        Largest number of parts of all textured triangles, minus the number of textured triangles.
 
     Returns
     -------

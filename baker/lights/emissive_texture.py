@@ -9,8 +9,8 @@ remaining parts are then samples of low variance.
 The sum is over the parts of a triangle. L is the radiance in a part, and share is the part's power divided by
 the triangle's power.
 
-Based on: Clarberg, Jarosz, Akenine-Moller and Jensen, Wavelet importance sampling, 2005 (means in a tree).
-Here the tree divides the triangle itself, so that no part has to be clipped.
+Based on: Clarberg, Jarosz, Akenine-Moller and Jensen, Wavelet importance sampling, 2005 (means of a texture
+in a tree). Here the tree divides the triangle instead of the texture, so that no part has to be clipped.
 """
 
 from __future__ import annotations
@@ -131,8 +131,8 @@ class EmissiveTextures:
         """Return `mean` (m, 3) and `spread` (m,) of parts, see `Parts`.
 
         owner (m,), inside (m, 3) : see `Parts`
-        ahead : largest number of parts in this call and all later calls, by which the remaining texel lines
-            are divided
+        ahead : largest number of parts in this call and all later calls together, which determines the share
+            of the remaining texel lines that this call may cross
         """
         corner = self.uv[owner]
         edge = corner[:, 1:] - corner[:, :1]
@@ -167,7 +167,7 @@ class EmissiveTextures:
 
 
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of R, G and B, the measure of power for parts. With luminance, blue would be noisy.
+    """Return the mean of R, G and B. With luminance instead, parts that emit blue would get few samples.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def cut(
         Size (see `Parts.inside`) up to which parts are treated as uniform, if they are also at most one texel
         wide.
     most : int
-        Largest number of parts beyond one part per triangle.
+        Largest number of parts, minus n.
 
     Returns
     -------

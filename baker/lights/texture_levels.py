@@ -49,7 +49,7 @@ class TextureLevels:
         self.size = np.array([finest.w, finest.h])
         self._texture, self._weight = texture, weight
         self._made = {(0, 0): finest}
-        # Widths, and heights, of all levels down to one texel.
+        # The widths of all levels down to one texel, then the heights.
         self._sizes = [_halvings(finest.w), _halvings(finest.h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
@@ -123,7 +123,7 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
     """
     ascending = np.sort(wanted)
     before = np.concatenate([[0.0], np.cumsum(ascending)[:-1]])
-    # Compute the limit if amount k of the ascending amounts and all larger amounts are cut.
+    # Compute the limit for the case that amount k and all larger amounts exceed it.
     equal = (total - before) / np.arange(len(wanted), 0, -1)
     short = np.flatnonzero(equal < ascending)
     return float(equal[short[0]]) if len(short) else np.inf
@@ -133,7 +133,7 @@ def finest_level(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -
     """Return the mip level of a texture from which the means of its emission are computed.
 
     This is the finest level whose width and height are at most `LARGEST_SIDE` texels, or the first level of
-    odd width or height.
+    odd width or height, whichever comes first.
 
     Parameters
     ----------

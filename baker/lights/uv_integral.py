@@ -150,7 +150,8 @@ def _running(pixels, w, weight, block, mode, j, i, out, spare):
 def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
     """Write R, G, B of the filtered texture at (x, y), and the weighted sum of their squares, to `out` (4,).
 
-    x, y : texels, at texel centres integer with bilinear filtering
+    x, y : texels; whole numbers at texel centres with bilinear filtering, at texel borders with nearest
+        filtering
     pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
     spare : (4,) float64, working memory
     """
@@ -240,7 +241,7 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
     if not along and dy == 0.0:
         return
     terms, a, b = _row_terms(), _prefix(), _texel()
-    # Limit texel lines to the texture if it is clamped.
+    # Consider only texel lines inside the texture if it is clamped.
     low_x, high_x = (-1.0, w + 1.0) if wrap[0] == 2 else (-1.0e30, 1.0e30)
     low_y, high_y = (-1.0, h + 1.0) if wrap[1] == 2 else (-1.0e30, 1.0e30)
     line_x = math.floor(x0) + 1.0 if dx > 0.0 else math.ceil(x0) - 1.0

@@ -3,8 +3,8 @@
 There are two estimates of the direct irradiance:
 
 - `weighted` is the part that MIS assigns to shadow rays. The final gather adds the other part, from its rays
-  that hit emitters. The sum is stored in the lightmap.
-- `complete` is all direct light. Surfaces reflect this light in later bounces.
+  that hit emitters. The lightmap contains both parts.
+- `complete` is all direct light. It is the light that surfaces reflect in the first bounce.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ class DirectLight:
     analytic : (n,) uint8
         1 where `weighted` already contains all light of the visible emitters.
     rays : int
-        Rays cast for emitters, plus 16 per entry and light without area, which is an upper bound.
+        Number of rays cast for emitters, plus 16 for each entry and each light without area. The second
+        number is an upper bound.
     """
 
     weighted: NDArray[np.float32]
@@ -247,7 +248,9 @@ class _EmitterLight:
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (m,) float32: the variance of (R + G + B) / 3, where R, G and B are sums of 16 batches.
+    """Return (m,) float32: the variance of (R + G + B) / 3 of m texels, estimated from 16 batches of samples.
+
+    Each of R, G and B is the sum of the batches' contributions.
 
     Parameters
     ----------

@@ -45,8 +45,9 @@ _MOST_RAYS, _FEWEST_RAYS = 32, 4
 _COST = 0.06
 # Number of clusters up to which all hidden clusters are in the separate stratum.
 _FEW = 32
-# Share of the visible clusters' total weight (power / distance^2). With more than _FEW clusters, the dimmest
-# hidden clusters, up to this total, are sampled together with the visible clusters.
+# Largest total weight (power / distance^2) of hidden clusters that are sampled together with the visible
+# clusters, as a share of the visible clusters' total weight. With more than _FEW clusters, the dimmest hidden
+# clusters are treated in this way.
 _HARMLESS = 0.25
 # Ratio of the weights of two visible clusters above which the choice is made for each block, if the brighter
 # cluster is visible from only a part of the tile.
@@ -93,8 +94,9 @@ class Choice(NamedTuple):
     """Emitter clusters that consecutive texels of a tile sample.
 
     part : slice, the texels within the tile
-    seen : visible clusters, which get the shadow rays
-    hidden : clusters that no probe ray reached, in the separate stratum; None if there are none
+    seen : visible clusters, to which `n_light` shadow rays are cast
+    hidden : clusters that no probe ray reached, to which `n_hidden` shadow rays are cast; None without such
+        clusters
     found : all clusters with the sampling densities of both strata, for MIS weights of gather rays
     view : largest radius / distance of a cluster in `seen`, see `emitters.widest_view`
     """
@@ -147,7 +149,7 @@ class EmitterChooser:
         Parameters
         ----------
         begin : int, the tile's first texel entry
-        origin, normal : (m, 16, 3) float32, metres and unit, world; the 16 points of each texel
+        origin, normal : (m, 16, 3) float32, metres, world, and unit; the 16 points of each texel
         """
         whole = slice(0, len(origin))
         all_emitters = tile_emitters(self.emitters, origin)
@@ -170,9 +172,10 @@ class EmitterChooser:
         normal: NDArray[np.float32],
         buffers: PacketBuffers,
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the parts of a tile, and (P, C) bool: the clusters that are hidden from each part.
+        """Split a tile into P parts, and find the clusters that are hidden from each part.
 
-        Part p contains the texels `bounds[p] : bounds[p + 1]` of the tile; `bounds` (P + 1,) comes first.
+        Returns bounds (P + 1,) int64 and hidden (P, C) bool. Part p contains the texels bounds[p] to
+        bounds[p + 1] - 1 of the tile. hidden[p, c] is True if cluster c is hidden from part p.
         """
         weight = self._weights(all_emitters, origin)
         blocks, broken = self._blocks(begin, origin, normal)

@@ -102,7 +102,8 @@ def final_gather(
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
 
     def work(begin: int, end: int) -> Part:
-        # Choose emitters for the same entries as `direct_light`: its last tile of fronts may contain backs.
+        # Choose emitters for all entries of the tile, as in `direct_light`. The last tile with fronts may
+        # also contain backs.
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)

@@ -40,8 +40,8 @@ from baker.radiosity.trace_job import TraceJob
 _TILE = 256
 # Largest number of passes of `sinkhorn_balance`.
 _BALANCE_STEPS = 30
-# Uncertainty of a measured row sum, in rays, if no ray of the patch hits a patch. It is scaled by the share
-# of the patch's rays that hit no patch.
+# Uncertainty of a measured row sum, as a number of rays, for a patch whose rays all miss other patches. For
+# other patches, it is multiplied by the share of their rays that miss.
 _SLACK = 4.0
 
 
@@ -92,14 +92,14 @@ class FormFactorMatrix:
         return share if self.sky_transmittance is None else share * self.sky_transmittance
 
     def row_sums(self) -> NDArray[np.float64]:
-        """Return sum_j F_ij (P,) float64."""
+        """Return (P,) float64: sum_j F_ij of each patch i."""
         running = np.concatenate([[0.0], np.cumsum(self.value, dtype=np.float64)])
         sums: NDArray[np.float64] = running[self.first[1:]] - running[self.first[:-1]]
         return sums
 
 
 def build_form_factors(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int) -> FormFactorMatrix:
-    """Cast `n_rays` from every patch and build the matrix.
+    """Cast rays from every patch, and build the form-factor matrix from their hits.
 
     Parameters
     ----------

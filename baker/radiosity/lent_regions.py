@@ -5,9 +5,9 @@ continues over a wall between a dark room and a bright outside, and its texels a
 Engines interpolate between texel centres, so bilinear lookups in the room read these texels. Filled with
 light from outside, they would appear as a bright line along the ceiling.
 
-Therefore an invalid texel gets the region whose points use it most: for each region, its bilinear weight is
-summed over the valid points of its neighbours in that region, and the largest sum decides. If all sums are 0,
-the texel gets the region of the nearest texel of its chart.
+A bilinear lookup at a point of a neighbouring texel reads the invalid texel with a certain weight. These
+weights are summed over the valid points of the neighbouring texels of each region. The invalid texel gets the
+region with the largest sum. If all sums are 0, the texel gets the region of the nearest texel of its chart.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from baker.radiosity.trace_job import TraceJob
 # if at most one ray of each texel is blocked.
 _RAYS, _EARLY_OUT = 16, 4
 # _OPEN: share of unblocked rays below which a texel lies in a gap.
-# _NEAR, _FAR: lengths of the rays, in texel sides, for gaps about as wide as a texel, and as a patch.
+# _NEAR: length of the rays, in texel sides, that find gaps about as wide as a texel.
+# _FAR: length of the rays, in texel sides, that find gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 

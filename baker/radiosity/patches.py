@@ -2,7 +2,7 @@
 
 Texels inside narrow gaps and texels outside gaps belong to different patches. In gaps about a texel wide,
 light reaches only a few gap widths deep, and a patch has a single radiosity. Therefore each texel in such a
-gap is a patch, unless these would be more than `max_patches`.
+gap is a patch, if at most `max_patches` texels lie in such gaps.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (distant transport
 needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity in complex
@@ -37,7 +37,8 @@ class PatchSet:
     member : (n,) int32
         Entries of all patches, ascending within a patch.
     cumulative : (n,) float32
-        Share of its patch's area that each entry of `member` and the entries before it cover together.
+        For each entry of `member`: the area of this entry and of the entries before it in the patch, divided
+        by the patch's area.
     area : (P,) float64, m2
         Area of each patch.
     block : int
@@ -87,7 +88,7 @@ def build_patches(
         The n entries.
     level : (n,) uint8, optional
         Gap level 0 to 2 (`narrow_gaps`). Entries of different levels belong to different patches. Entries of
-        level 2 form smaller blocks, at most `max_patches` in addition.
+        level 2 form smaller blocks, which are at most `max_patches` further patches.
     max_patches : int
         Largest number of patches outside narrow gaps.
     link : (m, 2) int32, optional
@@ -121,7 +122,7 @@ def build_patches(
 def _smallest_block(
     texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
-    """Return the smallest side of blocks, texels, for which the chosen entries form at most `max_patches`.
+    """Return the smallest side of blocks, texels, for which the chosen entries form `max_patches` or fewer.
 
     chosen : (m,) int64, entries
     """

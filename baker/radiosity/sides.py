@@ -5,9 +5,9 @@ there has points on both sides of the wall. A single value per texel would mix t
 show it on both.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
-called a side, becomes a texel entry (a row of `TexelBuffer`). The side with most points becomes the texel's
-first entry and is stored in the page. The entries of the other sides come after fronts and backs. They take
-part in light transport but are stored in no page.
+called a side, becomes a texel entry (a row of `TexelBuffer`). The side with most points gets the texel's
+original entry, a front or back; fronts are stored in the page. The other sides get new entries after all
+backs. They take part in light transport but are stored in no page.
 
 Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
 are its regions. Later filters do not mix values of different regions. Texels of a block that are not
@@ -42,13 +42,14 @@ from baker.radiosity.point_cache import points_of
 from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
-# Items per tile: texels, texels whose points are grouped, and pairs of neighbouring entries.
+# Number per tile: of texels (_TILE), of texels whose points are grouped (_SUSPECTS), of pairs of entries
+# (_PAIRS).
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Point 0: the first test of a pair of neighbours uses this point of both, the second test all points.
+# Number of the point for the first test of a pair of neighbours. The second test uses all points of both.
 _ONE = np.zeros((1, 1), np.uint8)
-# Share of rays that hit backs of one-sided surfaces above which a side lies outside a model, and the weight
-# of its points then (1 otherwise).
+# Share of rays that hit backs of one-sided surfaces above which a side is treated as outside the model, and
+# the weight of its points in that case (otherwise 1).
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -364,7 +365,7 @@ def _keep_largest(
     backs: NDArray[np.float64],
     rays: int,
 ) -> Sides:
-    """Store the largest side of each split texel in the texel's first entry, and number the regions.
+    """Store the largest side of each split texel in the texel's original entry, and number the regions.
 
     link : (m, 2) int32, pairs of neighbouring entries with mutually visible points, in the charts `cut`
     cut : (c,) int32, charts of several regions or with split texels
@@ -413,14 +414,14 @@ def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDAr
 def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
-    """Choose the side that is stored in a split texel's first entry: the side with most points.
+    """Choose the side that gets a split texel's original entry: the side with most points.
 
     If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side is
     the outside of a room with one-sided walls, or the underside of a one-sided floor. A side whose region
     contains no unsplit texel is chosen only if all sides are like this. An example is the part of a wall
     below the floor, if it is narrower than a texel.
 
-    root : (n,) int32, smallest linked entry of each entry, from `join_linked`
+    root : (n,) int32, smallest entry that is connected to each entry by links, from `join_linked`
     backs : (S, groups) float64, from `_back_share`
 
     Returns

@@ -44,8 +44,8 @@ TOLERANCE = 3e-5
 MAX_ITERATIONS = 1000
 # Smallest number of nonzero matrix elements per thread.
 _PART = 250_000
-# Share of the largest source exitance, per colour. The residual of a patch darker than that is compared with
-# this exitance, so that nearly black patches do not delay the solve.
+# Lower limit of the exitance with which a patch's residual is compared, as a share of the largest source
+# exitance of the same colour. So nearly black patches do not delay the solve.
 _DARK = 1e-15
 # Reduction of the residual norm after which conjugate gradients are restarted. By then the search directions
 # have lost orthogonality, and the updated residual differs from the true residual.

@@ -1,8 +1,10 @@
 """Warns about nearly white surfaces that mostly face each other, so that little light is absorbed.
 
-The share of a patch's light that remains after n reflections is s_n = (rho F) s_{n-1} with s_0 = 1, albedo
-rho and form factors F. In a closed room of albedo rho, s_n = rho^n, and all bounces together are 1 / (1 -
-rho) times the direct light.
+The share of a patch's light that remains after n reflections is
+
+    s_n = (rho F) s_{n-1},   s_0 = 1        rho: albedo, F: form factors
+
+In a closed room of albedo rho, s_n = rho^n, and all light is 1 / (1 - rho) times the direct light.
 """
 
 from __future__ import annotations

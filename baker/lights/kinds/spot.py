@@ -3,7 +3,7 @@
     E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
         * clamp(1 - (r / range)^4, 0, 1)
 
-r is the distance and a the angle between the spot's axis and the direction to the point.
+r is the distance, and a the angle between the spot's axis and the direction from the light to the point.
 
 Based on: KHR_lights_punctual, "Inner and Outer Cone Angles" and "Range Property".
 """

@@ -31,8 +31,11 @@ from baker.trace.packets import (
     trace_lanes,
 )  # fmt: skip
 
-# Values of `target` instead of a patch: the ray ended on a surface without a patch; it left the scene; SPLIT
-# - s: it hit the split texel in row s of the `SideTable`.
+# Values of `target` that are not patches:
+#
+#     LOST        the ray ended on a surface without a patch
+#     SKY         the ray left the scene
+#     SPLIT - s   the ray hit the split texel in row s of the `SideTable`
 LOST, SKY, SPLIT = -1, -2, -3
 # Columns of `tally`: number of rays that left the scene, and that ended on black backs or uncovered texels.
 ESCAPED, ABSORBED = 0, 1

@@ -43,8 +43,12 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Columns of `out`: indirect RGB; RGB of sky and emitters; AO; sum of the squares of the irradiance (R + G +
-# B) that each of the 16 points contributes.
+# Columns of `out`:
+#
+#     INDIRECT   irradiance from light that texels reflect (3)
+#     DIRECT     irradiance from the sky and from emitters (3)
+#     OPEN       ambient occlusion
+#     SQUARE     sum of x^2 over the 16 points, where x = R + G + B of the irradiance that a point contributes
 INDIRECT, DIRECT, OPEN, SQUARE = 0, 3, 6, 7
 N_COLUMNS = 8
 # Number of rows of `part` and `total`: INDIRECT to OPEN.

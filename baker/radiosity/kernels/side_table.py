@@ -33,8 +33,7 @@ from baker.trace.packets import (
 _f = np.float32
 # Start of a segment: distance from the hit back along the ray, or height above the hit, in texel sides.
 _BACK, _ABOVE = 0.25, 0.02
-# Rows of `hits` for `find_side`: ray origin (3), direction (3), distance, normal of the face that was hit
-# (3).
+# Rows of `hits` for `find_side`: ray origin (3), direction (3), distance (1), normal of the hit face (3).
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
 # Column of `SeenLight.image` after RGB: 1 + row of a split texel in the `SideTable`, else 0.

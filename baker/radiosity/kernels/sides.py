@@ -7,9 +7,9 @@ normals:
 
     height = min(HIGH s, headroom / 2)        s: side of the texel, metres
 
-The headroom of a point is the free distance along its normal; the lower of both heights is used. So a step
-lower than the height does not separate two points, and an opening lower than the height does not connect
-them. The same test finds the side of a ray's hit (`side_table`).
+The headroom of a point is the free distance along its normal. Both ends are raised by the smaller of their
+heights. So a step lower than this height does not separate two points, and an opening lower than this height
+does not connect them. The same test finds the side of a ray's hit (`side_table`).
 """
 
 from __future__ import annotations
