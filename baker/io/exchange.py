@@ -1,4 +1,4 @@
-"""Exchanges two folders in one step of the file system: each path has one or the other at any time.
+"""Exchanges two folders atomically: at no time is either path missing.
 
 Based on: renameat2(2) of Linux with RENAME_EXCHANGE, renamex_np(2) of macOS with RENAME_SWAP.
 """
@@ -15,7 +15,7 @@ from typing import Any
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 _RENAME_SWAP = 2
-# Errors of a system, a file system or a folder that does not allow the exchange.
+# Error codes if the operating system, the file system or one of the folders does not allow the exchange.
 _REFUSED = {
     errno.ENOSYS,
     errno.EINVAL,
@@ -34,19 +34,20 @@ def exchange_paths(one: Path, two: Path) -> bool:
     Parameters
     ----------
     one, two : Path
-        Existing paths of one file system.
+        Existing paths on the same file system.
 
     Returns
     -------
     bool
-        False, and nothing is changed, if the system, the file system or a mount point does not allow it.
+        True if the paths were exchanged. False if the operating system, the file system or one of the paths
+        does not allow the exchange; then nothing is changed.
 
     Raises
     ------
     OSError
-        If it fails for another reason; nothing is changed.
+        If the exchange fails for another reason; nothing is changed.
     """
-    # As os.rename reports itself to audit hooks.
+    # Raise the same audit event as os.rename.
     sys.audit("os.rename", one, two, -1, -1)
     library: Any = None if os.name == "nt" else ctypes.CDLL(None, use_errno=True)
     first, second = os.fsencode(one), os.fsencode(two)

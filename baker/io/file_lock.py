@@ -1,4 +1,4 @@
-"""File locks of the operating system, which end with the process that holds them."""
+"""File locks of the operating system, which are released when the process that holds them ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def try_lock(file: int) -> bool:
     Parameters
     ----------
     file : int
-        Descriptor; closing it releases the lock.
+        File descriptor; closing it releases the lock.
 
     Returns
     -------
@@ -22,7 +22,7 @@ def try_lock(file: int) -> bool:
     Raises
     ------
     OSError
-        If the file system has no locks.
+        If the file system does not support locks.
     """
     try:
         import fcntl
@@ -44,7 +44,7 @@ def is_at(file: int, path: Path) -> bool:
 
 
 def is_alive(process: int) -> bool:
-    """Return whether a process of this number exists."""
+    """Return whether a process with this id exists."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):

@@ -1,9 +1,10 @@
 """Creates and finds the temporary folders that output is written to before it is moved to its final path.
 
-The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it, or
-`.baker-{process}-{random hex digits}` in it where `out` is a folder that cannot be moved. Its process holds a
-lock on it. A folder without that lock was left by a process that was killed, even if another process has got
-the same number since. On file systems without locks the number of the process decides.
+The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it. If `out` is a
+folder that cannot be moved, the folder is `.baker-{process}-{random hex digits}` inside `out`. The process
+that creates the folder holds a lock on it. A folder that is not locked was left by a killed process, even if
+a new process has the same id. On file systems without locks, a folder was left by a killed process if no
+process with its id exists.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class TemporaryFolder:
     out : Path
         The output folder or file; an absolute path.
     inside : bool
-        Create it in `out` instead of beside it.
+        Create the folder in `out` instead of beside `out`.
 
     Attributes
     ----------
@@ -64,7 +65,7 @@ class TemporaryFolder:
         Raises
         ------
         OSError
-            If it cannot be created.
+            If the folder cannot be created.
         """
         while True:
             self.path.mkdir()
@@ -73,21 +74,22 @@ class TemporaryFolder:
                 if try_lock(self._lock) and is_at(self._lock, self.path):
                     return
             except FileNotFoundError:
-                # Another process has removed it, since it was not locked yet.
+                # Another process has removed the folder, because it was not locked yet.
                 pass
             except OSError:
-                # No locks for folders: others look at the number of the process.
+                # The file system cannot lock folders: other processes check the process id in the folder's
+                # name instead.
                 return
             self.leave()
             self.path = temporary_path(self._out, inside=self._inside)
 
     def remove(self) -> None:
-        """Remove the folder and all that is in it; may be called more than once."""
+        """Remove the folder and its content; may be called more than once."""
         shutil.rmtree(self.path, ignore_errors=True)
         self.leave()
 
     def leave(self) -> None:
-        """Release the lock and leave the folder to `recover` of any later command."""
+        """Release the lock but keep the folder, so that `recover` in a later command handles it."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -126,17 +128,17 @@ def temporaries(out: Path) -> list[Temporary]:
 
 @contextlib.contextmanager
 def claim(found: Temporary) -> Iterator[bool]:
-    """Lock a temporary folder that its process has left.
+    """Lock a temporary folder if the process that created it has ended.
 
     Parameters
     ----------
     found : Temporary
-        Any temporary folder.
+        A temporary folder of any process.
 
     Yields
     ------
     bool
-        True if the process has ended; the folder is locked within the `with` block.
+        True if the process has ended; then the folder is locked until the `with` block ends.
     """
     try:
         file = os.open(found.path, os.O_RDONLY)
@@ -198,7 +200,7 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
 
 
 def _remove_abandoned(target: Path) -> None:
-    """Remove what killed processes left of a file."""
+    """Remove the temporary folders that killed processes have left for a file."""
     for found in temporaries(target):
         with claim(found) as free:
             if free:

@@ -46,7 +46,7 @@ class OutputLock:
         try:
             file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
         except FileNotFoundError:
-            return False  # the other run has just removed an empty parent
+            return False  # another run has just removed an empty parent folder
         try:
             if try_lock(file) and is_at(file, self.path):
                 self._file = file
@@ -54,7 +54,7 @@ class OutputLock:
         except OSError:
             os.close(file)
             raise
-        # Another run holds it, or removed the file after it was opened and before it was locked here.
+        # Another run holds the lock, or it deleted the lock file between `os.open` and `try_lock`.
         os.close(file)
         return False
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-# Table of the mounts that this process sees; the fifth field of a line is the mount point.
+# Mount table of this process on Linux; the fifth field of each line is the mount point.
 _MOUNT_TABLE = Path("/proc/self/mountinfo")
 
 
 def cannot_move(folder: Path) -> bool:
     """Return whether a folder cannot be renamed.
 
-    That is so for a mount point, a folder with a mount point in it, a folder in a parent that is not
-    writable, and the current folder of this process or a parent of it, which a shell is in.
+    True for a mount point, a folder that contains a mount point, a folder in a read-only parent, and a folder
+    that is or contains the current folder of this process, because a shell may be in it.
 
     Parameters
     ----------
     folder : Path
-        An existing folder, resolved.
+        An existing folder; an absolute path without symbolic links.
     """
     if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
         return True
@@ -32,7 +32,7 @@ def cannot_move(folder: Path) -> bool:
 
 
 def _mount_points() -> list[Path]:
-    """Return the mount points, bind mounts among them; an empty list on systems without the table."""
+    """Return all mount points, including bind mounts; an empty list on systems without the table."""
     try:
         lines = _MOUNT_TABLE.read_bytes().splitlines()
     except OSError:

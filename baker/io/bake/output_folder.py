@@ -1,9 +1,9 @@
 """Replaces an output folder as a whole: after an error it contains the complete old bake.
 
-All files are written to a temporary folder beside the output folder, and both are exchanged at the end in one
-step of the file system. Where the output folder cannot be renamed (a mount point, the current folder) or the
-file system has no exchange, the files are exchanged one by one with a journal, which `recovery` undoes after
-a kill.
+All files are written to a temporary folder beside the output folder. At the end, the file system exchanges
+the two folders in one atomic step. If the output folder cannot be renamed (a mount point, the current
+folder), or the file system does not support the exchange, the files are moved one by one. A journal records
+these moves, and `recovery` undoes them if the process was killed in between.
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ class OutputFolder:
         try:
             undo(self._home.path, self.out)
         except OSError:
-            # A file cannot be moved back: the temporary folder stays, and a later command tries again.
+            # A file cannot be moved back: keep the temporary folder, so that a later command can try again.
             self._home.leave()
             raise
         self._home.remove()
@@ -227,7 +227,7 @@ def _resolved(out: Path) -> Path:
 
 
 def _check_writable(folder: Path, parent: Path, out: Path) -> None:
-    """Create and remove the temporary folder of a bake; without the parent of `folder`, one in `parent`."""
+    """Raise if the temporary folder of a bake cannot be created; `parent` exists and contains `folder`."""
     where = folder if folder.is_dir() else parent
     probe = TemporaryFolder(parent / folder.name)
     try:

@@ -24,7 +24,7 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a bake, after recovering from a command that was killed while it wrote one.
+    """Return the manifest of a bake; first call `recover`, in case a killed process was writing the folder.
 
     Parameters
     ----------

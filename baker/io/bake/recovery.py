@@ -1,8 +1,8 @@
-"""Exchanges the files of an output folder one by one, and undoes it after a kill in between.
+"""Exchanges the files of an output folder one by one, and undoes an exchange that was interrupted.
 
-It is for folders that cannot be renamed. The exchange is recorded in a journal beside the new files before
-the first file moves. The manifest moves last: until then any later command, `recover`, puts the old files
-back; from then on the new bake is complete.
+This is for folders that cannot be renamed. Before the first file is moved, the exchange is recorded in a
+journal beside the new files. The new manifest is moved last. If the process is killed before that, `recover`
+in a later command restores the old files. After that, the new bake is complete.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from baker.io.bake.lock import OutputLock
 from baker.io.temporary import claim, temporaries
 
 MANIFEST_NAME = "bake.json"
-# Parts of a temporary folder: the new files, the old ones while they are replaced, and the journal.
+# Names in a temporary folder: folder of the new files, folder of the old files during the exchange, journal.
 NEW, OLD, JOURNAL = "new", "old", "journal.json"
-# Components without separators and drive letters, none of them "." or "..".
+# Relative path with forward slashes. No component is "." or "..", or contains a backslash or a colon.
 _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def lies_inside(folder: Path, name: object) -> bool:
-    """Return whether a name with forward slashes is of a file below `folder`, no parent of it a link."""
+    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link."""
     if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
         return False
     parents = name.split("/")[:-1]
@@ -40,11 +40,11 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
     Parameters
     ----------
     home : Path
-        The temporary folder, of the file system of `out`; the new files are in its folder `NEW`.
+        The temporary folder, on the same file system as `out`. The new files are in its subfolder `NEW`.
     out : Path
         The output folder.
     old, new : collection of str
-        Paths relative to the folders; one of the new ones is the manifest.
+        Paths relative to `out` and to the folder `NEW`. One of the new files is the manifest.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
     for name in coming:
         _move(home / NEW / name, out / name)
     for path in reversed(_parents(leaving)):
-        with contextlib.suppress(OSError):  # it holds other files
+        with contextlib.suppress(OSError):  # the folder contains other files
             (out / path).rmdir()
 
 
 def undo(home: Path, out: Path) -> None:
-    """Undo an exchange that was interrupted, unless it is complete; may itself be interrupted and repeated.
+    """Undo an interrupted exchange; do nothing if it is complete. An interrupted call can be repeated.
 
     Parameters
     ----------
@@ -82,14 +82,14 @@ def undo(home: Path, out: Path) -> None:
     Raises
     ------
     OSError
-        If a file cannot be moved back; call it again later.
+        If a file cannot be moved back; call `undo` again later.
     """
     journal = _journal(home, out)
     new = journal["new"]
     if not new or not os.path.lexists(home / NEW / new[-1]):
         return
     for name in reversed(new):
-        # All new files were in `home` when the journal was written.
+        # All new files were in `home` when the journal was written, so this file of `out` is a new one.
         if os.path.lexists(out / name) and not os.path.lexists(home / NEW / name):
             _move(out / name, home / NEW / name)
     for name in reversed(journal["old"]):
@@ -98,15 +98,15 @@ def undo(home: Path, out: Path) -> None:
     for name in reversed(journal["folders"]):
         with contextlib.suppress(OSError):
             (out / name).rmdir()
-    # Without the journal nothing but the removal of `home` remains to be done.
+    # After the journal is deleted, only the removal of `home` remains to be done.
     (home / JOURNAL).unlink()
 
 
 def recover(out: Path) -> None:
-    """Complete or undo what killed processes left of an output, and remove their temporary folders.
+    """Undo the incomplete exchanges of killed processes for an output, and remove their temporary folders.
 
-    Every command that reads or writes an output folder calls it first. Where nothing can be written,
-    everything stays.
+    Every command that reads or writes an output folder calls `recover` first. If files cannot be moved or
+    removed, they are left as they are, without an error.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def recover(out: Path) -> None:
     try:
         target = out.resolve()
     except (OSError, RuntimeError, ValueError):
-        return  # a loop of links, or no path at all
+        return  # the links form a loop, or `out` is no valid path
     found = temporaries(target)
     for temporary in found:
         with claim(temporary) as free:
@@ -131,7 +131,7 @@ def recover(out: Path) -> None:
 
 
 def abandoned(out: Path) -> bool:
-    """Return whether a killed process left temporary folders of an output.
+    """Return whether a killed process has left a temporary folder for an output.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def abandoned(out: Path) -> bool:
 
 
 def _journal(home: Path, out: Path) -> dict[str, list[str]]:
-    """Return the lists of a journal, empty without one; raise OSError if baker did not write it."""
+    """Return the three lists of a journal, empty if there is none; raise OSError if it is invalid."""
     try:
         record = json.loads((home / JOURNAL).read_text("utf-8"))
         parts = {part: list(record[part]) for part in ("old", "new", "folders")}
@@ -174,6 +174,6 @@ def _manifest_first(names: Iterable[str]) -> list[str]:
 
 
 def _parents(names: Iterable[str]) -> list[str]:
-    """Return all folders of relative paths, parents before their children."""
+    """Return all parent folders of relative paths, each once, parents before their children."""
     found = {path.as_posix() for name in names for path in Path(name).parents}
     return sorted(found - {"."}, key=lambda path: (path.count("/"), path))
