@@ -254,11 +254,11 @@ class RenderKeywords(TypedDict, total=False):
 class RepairKeywords(TypedDict, total=False):
     """Keywords of `RepairSettings`."""
 
-    # Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers
+    # Fix, and also repair the shape of meshes: non-manifold edges, holes, orientation, slivers
     # (needs pip install pymeshlab).
     repair: bool
 
-    # Page width for which lightmap uv are tested and made.
+    # Width of the page for which lightmap uv are tested and made.
     resolution: int
 
     # Up axis of files in formats that do not specify it.

@@ -155,10 +155,10 @@ def repair(
         Settings by name, which replace those in `settings`:
 
         repair : bool, default False
-            Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers
-            (needs pip install pymeshlab).
+            Fix, and also repair the shape of meshes: non-manifold edges, holes, orientation, slivers (needs
+            pip install pymeshlab).
         resolution : int, texels, 16 to 16384, default 1024
-            Page width for which lightmap uv are tested and made.
+            Width of the page for which lightmap uv are tested and made.
         up : Literal["y", "z"], default 'y'
             Up axis of files in formats that do not specify it.
         scale : float, m, above 0, default 1.0

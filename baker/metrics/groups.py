@@ -1,26 +1,37 @@
-"""Deviations of a group of points as a whole: ratios of sums, with their standard errors.
+"""Deviations of a group of points from the reference, with standard errors.
 
-For the n points of a group with values v_c and reference r_c (v, r: means over colours c):
+A group is the set of points of an object, a chart or another region. Its deviations are ratios of sums over
+the group. The value of a single point is known to a few percent, and the mean of a hundred points ten times
+better. Deviations of a whole group are therefore detected far below the noise of single texels.
 
-    bias       B = sum v / sum r - 1
-    colour     S_c = (V_c / V - R_c / R) / max(R_c / R, 0.3)     V, R: sums of v, r; V_c, R_c: of one colour
-    own error  b of `spread`: relative spread of the values about the truth, without the reference's noise
-    typical    median of |v - r| / max(r, floor), floor of the group (`error_metrics`), and the same of half
-               the difference of two halves of the reference
+For the n points of a group, v_c and r_c are the value and the reference value of colour c, and v and r their
+means over colours. V, R, V_c and R_c are the sums of v, r, v_c and r_c over the group.
 
-The value of one point is known to some percent, the mean of a hundred points ten times better. So deviations
-of a whole object, colour or room are detected far below the noise of its texels. A deviation is reported
-after `z_needed(m)` of its standard errors are subtracted from its absolute value. m is the effective number
-of points, (sum w)^2 / sum w^2 with w = v + r; below `MIN_POINTS` no deviation is significant. The standard
-error is the largest of three: that of the jackknife (the change if one point is left out, which contains the
-noise of bake and reference and is large where one bright point dominates), that of the reference alone, and
-half the difference of the results of two halves of the reference. If the rms noise of a group's reference
-exceeds `_UNRELIABLE` of its mean light, its own error has the lower bound 0: light of rare paths is missing
-at most points and too strong at some. The noise of colour shifts is small, because the colours of a path are
-correlated.
+    bias       B = V / R - 1
+    colour     S_c = (V_c / V - R_c / R) / max(R_c / R, 0.3)
+    own error  relative spread b of v about the truth, without the reference's noise (`baker.metrics.spread`)
+    typical    median of |v - r| / max(r, floor), with the floor `dark_floor` of the group
+    noise      median of |d| / max(r, floor), where d is half the difference of two halves of the reference
 
-Where the reference is below three of its standard errors, differences are relative to a thousandth of the
-scene's bright light, and the standard error includes one missed path with that light.
+A deviation is reported after `z_needed(m)` of its standard errors are subtracted from its absolute value. m
+is the effective number of points, (sum w)^2 / sum w^2 with w = v + r. If m is below `MIN_POINTS`, no
+deviation is significant.
+
+The standard error of bias and colour is the largest of these:
+
+- the standard error of the jackknife, from the change if one point is left out. It contains the noise of bake
+  and reference, and is large if one bright point dominates;
+- for the bias, the standard error of the reference alone;
+- half the difference of the results of two halves of the reference.
+
+The noise of colour shifts is small, because the colours of a path are correlated.
+
+If the rms noise of a group's reference exceeds `_UNRELIABLE` of its mean light, the lower bound of its own
+error is set to 0. Light of rare paths is then missing at most points and too strong at a few.
+
+If the reference of a group is below three of its standard errors, differences are relative to at least a
+thousandth of the scene's bright light. The standard error then includes one missed path with the bright
+light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.
@@ -38,38 +49,38 @@ from numpy.typing import NDArray
 from baker.metrics.error_metrics import dark_floor
 from baker.metrics.spread import Spread, own_error
 
-# Fewest (effective) points of a group whose deviations are significant.
+# Effective number of points of a group below which no deviation is significant.
 MIN_POINTS = 8
-# Standard errors needed: a constant part and a part for 1 / n.
+# A deviation of n points is significant if it exceeds _Z + _Z_FEW / n standard errors.
 _Z, _Z_FEW = 3.0, 32.0
-# Smallest share of a colour in the light that its shift is relative to.
+# Lower limit of R_c / R in the denominator of the colour shift.
 _MIN_COLOUR_SHARE = 0.3
-# Smallest light that differences are relative to where the reference is black, as a share of the bright
-# light.
+# Lower limit of the denominator of differences if the reference is black, as a share of the bright light.
 _BLACK = 1.0e-3
-# The reference is black if it is below this many of its standard errors.
+# The reference of a group counts as black if its sum is below this many of its standard errors.
 _LIT = 3.0
-# Relative rms noise of the reference above which own errors have the lower bound 0.
+# Relative rms noise of the reference above which the lower bound of the own error is 0.
 _UNRELIABLE = 0.4
-# Smallest light that own errors are relative to, as shares of the mean light of the group and of the bright
-# light of the scene.
+# Lower limits of the denominator of the own error, as a share of the group's mean light and as a share of the
+# scene's bright light.
 _FAINT, _FAINTEST = 0.01, 1.0e-4
 
 
 class ComparedPoints(NamedTuple):
-    """Values at n points with C components beside reference values.
+    """Values and reference values of C colours at n points.
 
     Attributes
     ----------
     value, reference : (n, C) float64
+        Values of the bake, and path-traced values.
     standard_error : (n, C) float64
-        Of the reference, including light that it may have missed.
+        Standard error of the reference, including light that it may have missed.
     halves : two (n, C) float64
-        Independent halves of the reference.
+        Two independent estimates whose mean is the reference.
     samples : (n,) int64
-        Samples of the reference.
+        Number of samples of the reference.
     spread : (n, C) float64
-        Standard error of the reference as its passes show it.
+        Standard error of the reference, estimated from the differences of its passes.
     """
 
     value: NDArray[np.float64]
@@ -90,7 +101,7 @@ class ComparedPoints(NamedTuple):
 
 @dataclass(frozen=True)
 class GroupMetrics:
-    """Metrics of a group as the head of this file defines them.
+    """Metrics of a group of points, as the docstring of this module defines them.
 
     Attributes
     ----------
@@ -99,15 +110,15 @@ class GroupMetrics:
     effective : float
         Effective number of points, m.
     light : float
-        Mean of the reference.
+        Mean of the reference over points and colours.
     bias, bias_se : float
-        Relative; standard error.
+        Relative bias and its standard error.
     colour, colour_se : (C,) float64
-        Relative shift of each colour; standard errors.
+        Relative shift of each colour, and the standard errors.
     typical, typical_noise : float
-        Median relative error, and that of half the difference of the reference's halves.
+        Median relative error, and the median relative noise of the reference.
     spread : Spread
-        Own error, with bounds `z_needed(n)` standard errors from it.
+        The own error and its bounds, `z_needed(n)` standard errors below and above it.
     """
 
     texels: int
@@ -123,12 +134,12 @@ class GroupMetrics:
 
     @property
     def sure_bias(self) -> float:
-        """Return the bias less its uncertainty, 0 if it is not significant."""
+        """Return the bias, reduced by its uncertainty; 0 if it is not significant."""
         return float(self._sure(np.array(self.bias), np.array(self.bias_se)))
 
     @property
     def sure_colour(self) -> float:
-        """Return the largest colour shift less its uncertainty, with its sign."""
+        """Return the largest colour shift, reduced by its uncertainty; with its sign."""
         sure = self._sure(self.colour, self.colour_se)
         return float(sure[np.argmax(np.abs(sure))])
 
@@ -138,14 +149,14 @@ class GroupMetrics:
         return self.spread.lower
 
     def _sure(self, deviation: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return deviations whose absolute values are reduced by `z_needed` standard errors, at least 0."""
+        """Return deviations with absolute values reduced by `z_needed` standard errors, not below 0."""
         if self.effective < MIN_POINTS:
             return np.zeros_like(deviation)
         left = np.maximum(np.abs(deviation) - z_needed(self.effective) * error, 0.0)
         return np.asarray(np.sign(deviation) * left, np.float64)
 
     def as_json(self) -> dict[str, float | int | list[float]]:
-        """Return the metrics as plain values."""
+        """Return the metrics as values that JSON can represent."""
         return {
             "texels": self.texels,
             "effective": self.effective,
@@ -163,8 +174,9 @@ class GroupMetrics:
 
 
 def z_needed(n: float) -> float:
-    """Return the standard errors that a significant deviation exceeds: more for small n, where the
-    standard error itself is uncertain.
+    """Return the number of standard errors that a deviation of n points must exceed to be significant.
+
+    It is larger for small n, because the standard error itself is then uncertain.
     """
     return _Z + _Z_FEW / max(n, 1)
 
@@ -193,14 +205,14 @@ def compare_group(points: ComparedPoints, bright: float, min_light: float = 0.0)
     points : ComparedPoints
         The points of the group.
     bright : float
-        From `bright_light`.
+        The bright light of the scene, see `bright_light`.
     min_light : float
-        Smallest mean light that differences are relative to.
+        Lower limit of the mean light to which differences are relative.
 
     Returns
     -------
     GroupMetrics
-        Deviations with standard errors.
+        The metrics with their standard errors.
     """
     n = len(points.value)
     v, r = points.value.mean(axis=1), points.reference.mean(axis=1)
@@ -236,7 +248,7 @@ def compare_group(points: ComparedPoints, bright: float, min_light: float = 0.0)
 
 
 def _colour_shift(points: ComparedPoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the relative shift of each colour's share of the light, (C,), and the standard errors (C,)."""
+    """Return the relative shift of each colour's share of the light (C,), and its standard errors (C,)."""
     v, r = points.value.mean(axis=1), points.reference.mean(axis=1)
     all_sums = [a.sum(axis=0) for a in (points.value, points.reference, *points.halves)]
     if points.value.shape[1] == 1 or not all(a.mean() > 0 for a in all_sums):
@@ -252,7 +264,10 @@ def _colour_shift(points: ComparedPoints) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _jackknife(left_out: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the standard errors (m,) of m statistics from (n, m), their values without each of n points."""
+    """Return the standard errors (m,) of m statistics.
+
+    Row i of `left_out` (n, m) contains the statistics of all points except point i.
+    """
     n = len(left_out)
     error: NDArray[np.float64] = np.sqrt((n - 1) / n * ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0))
     return error

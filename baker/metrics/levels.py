@@ -1,4 +1,4 @@
-"""Detects maps that were quantised to few levels, or clamped at a maximum."""
+"""Detects maps whose values were quantised to few levels, or clamped at a maximum."""
 
 from __future__ import annotations
 
@@ -7,20 +7,22 @@ from numpy.typing import NDArray
 
 from baker.metrics.groups import ComparedPoints
 
-# Fewest distinct levels whose spacing is evaluated, and fewest texels for each level.
+# Smallest number of distinct levels, and of texels per level, for which a map is tested.
 _MIN_LEVELS, _TEXELS_PER_LEVEL = 16, 8
-# Median |log| ratio of neighbouring level distances below which levels are evenly spaced. Random values have
-# about 1.1.
+# Levels count as evenly spaced if the median of |log(d2 / d1)| is below this, where d1 and d2 are successive
+# differences of sorted levels. For random values the median is about 1.1.
 _EVEN = 0.2
-# Quantised levels are coarser than the spacing of half floats by at least this factor.
+# Largest relative spacing of half floats. Quantised levels are spaced more coarsely by at least this factor.
 _COARSE = 4.0
 _HALF_SPACING = 2.0**-10
-# Fewest texels at exactly the largest value that indicate clamping.
+# Smallest number of texels at exactly the largest value that indicates clamping.
 _MIN_CLAMPED = 8
 
 
 def few_levels(maps: NDArray[np.float32], covered: NDArray[np.bool_]) -> bool:
-    """Return whether any component of a map has few, evenly spaced levels (quantiles 10 % to 90 %).
+    """Return whether any component of a map has few, evenly spaced levels.
+
+    Values between the quantiles 10 % and 90 % are tested.
 
     Parameters
     ----------
@@ -54,7 +56,9 @@ def cut_off(
     compared: ComparedPoints,
     pixel: NDArray[np.int64],
 ) -> float:
-    """Return the relative excess of the reference over the map's largest value, at texels with that value.
+    """Return the relative excess of the reference over the map's largest value.
+
+    The reference is averaged over the texels at which the map has its largest value.
 
     Parameters
     ----------
@@ -63,14 +67,15 @@ def cut_off(
     covered : (P, H, W) bool
         Texels with a measured value.
     compared : ComparedPoints
-        Reference values of n texels.
+        Reference values of n compared texels.
     pixel : (n,) int64
-        (page * H + row) * W + column of these texels.
+        (page * H + row) * W + column of the compared texels.
 
     Returns
     -------
     float
-        Largest of the components; 0 if fewer than eight texels hold the largest value.
+        Mean reference / largest value - 1, the maximum over components. 0 if fewer than eight compared texels
+        have the largest value.
     """
     worst = 0.0
     for c in range(maps.shape[3]):

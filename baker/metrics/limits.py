@@ -1,7 +1,7 @@
 """Limits on metrics, as `fail_if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
-A limit is a condition for failure: it fails where its comparison is true. Signed metrics such as `bias` are
-compared by their absolute value, so that a bake that is too dark fails like one that is too bright.
+A limit is a condition for failure: the limit fails if its comparison is true. The absolute values of signed
+metrics such as `bias` are compared, so that a bake that is too dark fails as well as one that is too bright.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
 _LIMIT = re.compile(r"\s*([A-Za-z_]\w*)\s*\.\s*([A-Za-z_]\w*)\s*(>=|<=|>|<)\s*([^\s,]+)\s*")
-# Metrics compared by their absolute value.
+# Metrics whose absolute value is compared with a limit of 0 or more.
 _SIGNED = (
     "bias", "colour_bias", "region_bias", "region_colour", "object_bias", "object_colour", "chart_bias",
     "chart_colour", "whole_bias", "whole_colour", "edge_bias", "edge_colour",
@@ -29,7 +29,7 @@ _SIGNED = (
 
 @dataclass(frozen=True)
 class Limit:
-    """One comparison.
+    """One comparison of a metric with a number.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Verdict:
     ----------
     limit : Limit
     value : float or None
-        Value of the metric; None if it could not be computed (no texels).
+        Value of the metric; None if it could not be computed, for example without texels.
     failed : bool
     """
 
@@ -86,7 +86,7 @@ def parse_limits(text: str, channels: Iterable[str], metrics: Iterable[str]) -> 
     Raises
     ------
     SettingsError
-        If the expression is malformed, or has an unknown name.
+        If the expression is malformed or contains an unknown name.
     """
     limits = []
     channels, metrics = list(channels), list(metrics)

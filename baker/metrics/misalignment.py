@@ -1,8 +1,8 @@
 """Detects maps that are shifted against their surface, blurred, or changed by a gamma curve.
 
-A map is shifted if its difference from the reference is smaller after a shift by one texel; its error in
-smooth areas may be small. A gamma curve was applied to a map if its values are a power of the reference with
-an exponent other than 1.
+A map is shifted if moving it by one texel makes its difference from the reference smaller. The error metrics
+of such a map may be small, because the error is small in smooth areas. A gamma curve was applied to a map if
+its values are a power of the reference with an exponent other than 1.
 """
 
 from __future__ import annotations
@@ -10,24 +10,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Tested shifts (rows, columns).
+# Shifts that are tested, (rows, columns).
 _STEPS = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0)]
-# Distance in texels over which curvature is measured.
+# Distance between the samples from which curvature is computed, texels.
 _CURVATURE_STEP = 2
-# Smallest coefficient of the curvature in the error that indicates blur.
+# Coefficient of the regression of error on curvature above which a map is blurred.
 _BLUR = 0.2
-# Largest ratio of the misfits with and without a shift that indicates a shift.
+# A shift is detected if it multiplies the misfit by less than this factor.
 _BETTER = 0.9
-# Standard errors that a difference must exceed.
+# Number of standard errors that a difference must exceed to be significant.
 _Z = 4.0
-# Fewest texels of a decision.
+# Number of usable texels below which no decision is made.
 _MIN_TEXELS = 32
-# Relative error of a correct map. Squared errors are in variances of this and the noise of the reference, and
-# clipped, so that few texels with a large error or much noise do not dominate.
+# Relative error of a correct map. Squared errors are divided by the sum of its square and the variance of the
+# reference. The quotient is clipped at _CLIP, so that a few texels with large errors do not dominate.
 _TOLERANCE, _CLIP = 0.03, 9.0
-# Tested exponents, 1 in the middle.
+# Exponents that are tested, from 0.30 to 3.3; the middle one is 1.
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
-# Largest residual of a texel, natural logarithm.
+# Value at which the residual of a texel is clipped, natural logarithm.
 _MAX_RESIDUAL = 0.1
 
 
@@ -39,7 +39,7 @@ def best_shift(
     noise: NDArray[np.float64] | None = None,
     better: float = _BETTER,
 ) -> tuple[int, int]:
-    """Return the shift by which the map would fit the reference better.
+    """Return the shift by one texel with which the map fits the reference better, if there is one.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def best_shift(
     truth : (n,) float64
         Path-traced values of these texels.
     noise : (n,) float64, optional
-        Standard errors of the path-traced values; their part of the misfit is subtracted.
+        Standard errors of the path-traced values. Their contribution to the misfit is subtracted.
     better : float
-        Largest ratio of the misfits with and without a shift that indicates a shift.
+        A shift is detected if it multiplies the misfit by less than this factor.
 
     Returns
     -------
     rows, columns : int
-        (0, 0) if no shift fits better.
+        Row and column of the texel that fits, relative to the compared texel. (0, 0) if no shift fits better.
     """
     misfit = _misfits(page, covered, pixel, truth, noise)
     if misfit is None:
@@ -67,7 +67,7 @@ def best_shift(
     error, excess = misfit
     best = int(np.argmin(excess))
     gain = error[0] - error[best]
-    # Require a significant gain: where a map is constant, all shifts have the same misfit except for noise.
+    # Require a significant gain, because in a constant map the misfits of all shifts differ only by noise.
     significant = gain.mean() > _Z * gain.std() / np.sqrt(len(gain))
     return _STEPS[best] if excess[best] < better * excess[0] and significant else (0, 0)
 
@@ -78,10 +78,11 @@ def is_blurred(
     pixel: NDArray[np.int64],
     truth: NDArray[np.float64],
 ) -> bool:
-    """Return whether the map is blurred: its error is proportional to its curvature.
+    """Return whether the map is blurred.
 
-    A Gaussian blur of s texels adds s^2 / 2 times the Laplacian; noise of the map makes the coefficient
-    negative.
+    A Gaussian blur with standard deviation s texels adds s^2 / 2 times the Laplacian to a map. The error of a
+    blurred map is therefore proportional to its curvature, with a positive coefficient. Noise of the map
+    makes the coefficient negative.
 
     Parameters
     ----------
@@ -131,9 +132,10 @@ def _misfits(
     truth: NDArray[np.float64],
     noise: NDArray[np.float64] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return squared errors (k, m) of the map shifted by `_STEPS`, in variances, and their means (k,).
+    """Return the normalised squared errors of the map after each of the k shifts `_STEPS`.
 
-    The noise of the reference is subtracted from the means. None if too few texels can be used.
+    The first result is (k, m), for m usable texels. The second is the mean over texels (k,), from which the
+    contribution of the reference's noise is subtracted. None if too few texels are usable.
     """
     height, width = page.shape[1:]
     number, rest = np.divmod(pixel, height * width)
@@ -154,7 +156,7 @@ def _misfits(
 
 
 def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | None:
-    """Fit values by a power of the truth.
+    """Fit a power of the reference to the values of a map, and return the exponent.
 
     Parameters
     ----------
@@ -166,10 +168,10 @@ def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | 
     Returns
     -------
     float or None
-        The exponent; 1 unless another one halves the mean residual. None if fewer than 32 texels can be used
-        or the truth hardly varies.
+        The best exponent if its mean residual is less than half of that of exponent 1, otherwise 1. None if
+        fewer than 32 texels can be used or the reference hardly varies.
     """
-    # Leave dark texels out: small errors there are large ratios.
+    # Leave dark texels out, because small errors there are large ratios.
     lit = (value > 0) & (truth > 0.1 * np.median(truth))
     if lit.sum() < _MIN_TEXELS:
         return None

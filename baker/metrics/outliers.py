@@ -1,7 +1,8 @@
-"""Texels of a map that differ from all their neighbours, and texels where light changes most.
+"""Finds texels of a map that differ from all their neighbours, and texels where light changes most.
 
-They are few, and random sampling would miss them. Path tracing is needed to find whether they are wrong: a
-correct texel next to a gap through which light enters differs from its neighbours as much as a wrong one.
+These texels are few, so random sampling would miss them. The map alone does not show whether they are wrong:
+a correct texel next to a gap through which light enters may differ from its neighbours as much as a wrong
+texel. They are therefore compared with path-traced values.
 """
 
 from __future__ import annotations
@@ -10,30 +11,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
 
-# The eight neighbours of a texel, without the texel.
+# Footprint of the eight neighbours of a texel.
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
-# An outlier differs from its nearest neighbour by more than this factor.
+# Smallest outlier factor of an outlier, see `outlier_factor`.
 _MIN_FACTOR = 1.1
-# Smallest relative change over two texels that counts as steep.
+# Relative change over a distance of two texels above which light is steep.
 _MIN_CHANGE = 0.1
-# Light is compared as if it were at least this share of the median.
+# Share of the page's median that keeps dark texels from large ratios: added to values in `outlier_factor`,
+# and the lower limit of the denominator in `steep_texels`.
 _DARK = 0.01
 
 
 def outlier_factor(page: NDArray[np.float64], covered: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the factor by which each texel is above all its neighbours or below all of them.
+    """Return the factor by which each texel is above all its neighbours, or below all of them.
+
+    It is max(v / highest neighbour, lowest neighbour / v), with a small constant added to all values v.
 
     Parameters
     ----------
     page : (H, W) float64
         Values, not below 0.
     covered : (H, W) bool
-        Only texels with eight covered neighbours are compared.
+        Texels with a measured value. Only texels with eight covered neighbours are compared.
 
     Returns
     -------
     (H, W) float64
-        At most 1 for texels between their neighbours; 1 for those that are not compared.
+        At most 1 for texels between their neighbours, and 1 for texels that are not compared.
     """
     inside = binary_erosion(covered, np.ones((3, 3), bool))
     if not inside.any():
@@ -73,10 +77,11 @@ def outlier_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count:
 
 
 def steep_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
-    """Return the texels whose two neighbours in a row or column differ most.
+    """Return the texels at which the left and right, or upper and lower, neighbours differ most.
 
     The effect of a shift or a blur of the map is largest at these texels. The difference is relative to the
-    brighter neighbour and limited to one half, so that shadow edges have the same rank as edges of gaps.
+    brighter neighbour. For the ranking it is limited to one half, so that soft shadow edges have the same
+    rank as sharp edges of gaps.
 
     Parameters
     ----------

@@ -1,13 +1,14 @@
-"""Random choice of the texels that are compared: stratified by object, area and brightness."""
+"""Random choice of the texels that are compared, stratified by object and brightness."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Texels that every object gets, as long as three quarters of all texels are distributed by area.
+# Smallest number of texels chosen on each object. It is reduced if there are many objects, so that these
+# texels are at most a quarter of all chosen texels.
 _MIN_PER_OBJECT = 8
-# Light levels in each factor of ten.
+# Number of light levels in each factor of ten.
 LEVELS = 2
 
 
@@ -20,6 +21,8 @@ def choose_texels(
 ) -> NDArray[np.int64]:
     """Choose about n texels at random, stratified by object and brightness.
 
+    Each object gets a minimum number of texels and a share of the rest in proportion to its texels.
+
     Parameters
     ----------
     owner : (N,) int32
@@ -27,7 +30,8 @@ def choose_texels(
     eligible : (N,) bool
         Texels that may be chosen.
     brightness : (N,) float64
-        Each object's texels are sorted by this and divided into strata of equal size, one chosen in each.
+        The texels of each object are sorted by brightness and divided into strata of equal size. One texel is
+        chosen in each stratum.
     n : int
         Number of texels, approximately.
     seed : int
@@ -58,17 +62,17 @@ def choose_texels(
 
 
 def light_level(light: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the light level of values: floor(2 log10 light).
+    """Return the light level of each value: floor(2 log10 light).
 
     Parameters
     ----------
     light : (n,) float64
-        Light values; below 1e-7 of the largest they count as that.
+        Light values. Values below 1e-7 times the largest value are replaced by this.
 
     Returns
     -------
     (n,) int64
-        Number of the level, negative below 1.
+        Number of the level; negative for values below 1.
     """
     lit = light[light > 0]
     darkest = 1e-7 * float(lit.max()) if len(lit) else 1.0
@@ -82,25 +86,25 @@ def scarce_texels(
     n: int,
     seed: int,
 ) -> NDArray[np.int64]:
-    """Choose further texels so that each light level has n, or all that there are.
+    """Choose additional texels so that n texels of each light level are chosen, or all if there are fewer.
 
     Parameters
     ----------
     eligible : (N,) bool
         Texels that may be chosen.
     brightness : (N,) float64
-        Determines the light level; texels that are 0 are not chosen.
+        Brightness, which determines the light level. Texels with brightness 0 are not chosen.
     chosen : (m,) int64
-        Texels that are chosen already.
+        Texels that are already chosen.
     n : int
-        Texels of each light level, with those that are chosen already.
+        Number of texels of each light level, including those that are already chosen.
     seed : int
         Seed of the random choice.
 
     Returns
     -------
     (k,) int64, ascending
-        Indices of the further texels.
+        Indices of the additional texels.
     """
     candidate = np.flatnonzero(eligible & (brightness > 0))
     level = light_level(brightness[candidate])

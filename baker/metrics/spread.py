@@ -1,22 +1,27 @@
-"""The own error of values: their spread about the truth, without the known noise of the reference.
+"""The own error of values: their relative spread about the truth, without the noise of the reference.
 
-For a group of n points with values v, reference r and its standard error s let c = max((v + r) / 2, floor),
-and a the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own error b, relative, solves
+A group has n points with values v, reference values r, and standard errors s of the reference. Let
+c = max((v + r) / 2, floor), and let a be the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own
+error b is the solution of
 
     mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
 
-so that b^2 is the variance of the values about the truth if both errors are normal. Points with more noise
-have smaller weights, and points with large errors (shadow edges, entrances of gaps) are limited to two
-standard deviations. b is 0 where the noise of the reference explains all differences.
+where the mean is over the points, and E is the expectation. If the errors of values and reference are normal,
+b^2 is the relative variance of the values about the truth. If the noise of the reference explains all
+differences, b is 0. Points with more noise have smaller weights. Because psi is bounded, points with large
+errors, such as those at shadow edges and at entrances of gaps, count only as errors of two standard
+deviations.
 
-A common shift a of all points is bias and not part of b. In a group that is lit by rare paths, the points
-without such a path all have the same negative error, the light of these paths.
+The common shift a of all points is part of the bias and not of b. (In a group that is lit by rare paths, most
+points lack such a path. All of them have the same negative error, the light of these paths.)
 
-s is the standard error that passes show. The factor f, at least 1, corrects it: f solves the same equation
-with b = 0 for half the difference of two independent halves of the reference.
+s is estimated from the passes of the reference. The factor f, at least 1, corrects s. It is the solution of
+the same equation with b = 0 and a = 0, with v - r replaced by half the difference of two halves of the
+reference.
 
-psi is bounded, so the mean over n points has a known standard error for any distribution of the errors. The
-bounds of b solve the equation for E psi plus and minus z of these standard errors.
+psi is bounded, so the mean of psi over n points has a finite standard error for any distribution of the
+errors. The lower and upper bounds of b solve the equation with z of these standard errors subtracted from, or
+added to, the mean of psi.
 
 Based on: Huber and Ronchetti, Robust Statistics, 2009, chapter 5 (M-estimators of scale).
 """
@@ -36,15 +41,16 @@ _EXPECTED = (
     - math.sqrt(2 * _PSI_BOUND / math.pi) * math.exp(-_PSI_BOUND / 2)
     + _PSI_BOUND * math.erfc(math.sqrt(_PSI_BOUND / 2))
 )
+# Number of bisection steps with which the equation is solved.
 _BISECTIONS = 40
-# Points with less relative noise have equal weights in the median.
+# Lower limit of s / c in the weights of the median.
 _SHARP = 0.02
-# Largest own error, and smallest relative noise of a reference.
+# Upper limit of the own error (and of the factor f), and lower limit of s / c in the equation.
 _LARGEST, _SMALLEST = 4.0, 1.0e-6
 
 
 class Spread(NamedTuple):
-    """An own error, relative, with its lower and upper bound."""
+    """A relative own error with its lower and upper bound."""
 
     own: float
     lower: float
@@ -68,11 +74,11 @@ def own_error(
     noise : (n,) float64
         Standard errors of the reference, estimated from its passes.
     apart : (n,) float64
-        Half the difference of two halves of the reference, a sample of the error of their mean.
+        Half the difference of two independent halves of the reference. It has the variance of their mean.
     floor : float
-        Smallest light that errors are relative to.
+        Lower limit of the light to which errors are relative.
     z : float
-        Half the width of the bounds, in standard errors.
+        Distance of the bounds from the own error, in standard errors.
 
     Returns
     -------
@@ -88,16 +94,17 @@ def own_error(
 
 
 def _median(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
-    """Return the weighted median of (n,)."""
+    """Return the median of `value` (n,) with weights (n,)."""
     order = np.argsort(value, kind="stable")
     below = np.cumsum(weight[order])
     return float(value[order[np.searchsorted(below, 0.5 * below[-1])]])
 
 
 def _root(error: NDArray[np.float64], known: NDArray[np.float64], z: float, *, factor: bool = False) -> float:
-    """Return the b at which the mean of psi less z of its standard errors equals its expectation.
+    """Return the b for which the mean of psi minus z of its standard errors equals the expectation of psi.
 
-    With `factor` b multiplies the known errors (n,), otherwise b^2 is added to their squares.
+    psi is evaluated at error^2 / variance. The variance is b^2 + known^2, or with `factor` b^2 known^2.
+    `error` and `known` (n,) are relative errors and standard errors.
     """
     low, high = 0.0, _LARGEST
 

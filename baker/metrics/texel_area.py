@@ -1,7 +1,7 @@
-"""The object that each texel lies on, and random points on the surface inside texels.
+"""Finds the object on which each texel lies, and random surface points inside texels.
 
-This is independent of the rasteriser of the bake and uses the uv of `scene.glb` only, so that it does not
-repeat errors of the rasteriser.
+The functions use only the uv of `scene.glb` and not the rasteriser of the bake, so errors of that rasteriser
+are not repeated.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from baker.kernels.clip import MAX_CORNERS
 from baker.kernels.surface import ROUNDING
 from baker.metrics.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 
-# Smallest share of a texel's square that counts as surface.
+# Share of a texel's square that an instance must cover to own the texel.
 _MIN_AREA = 1.0e-3
-# Share of a texel's square from which it counts as covered as a whole.
+# Share of a texel's square above which it counts as completely covered.
 _WHOLE = 0.98
-# No lift from vertices whose normal deviates from the face normal by more than this (cosine): a hard edge,
-# not a smooth surface.
+# Cosine of the angle between a vertex normal and the face normal. Below it, the vertex lies at a hard edge,
+# and its tangent plane is not used in `lift`.
 _HARD_EDGE = 0.7
 
 
@@ -32,16 +32,16 @@ class SurfacePoints:
     Attributes
     ----------
     position : (n, k, 3) float64, metres, world, relative to the geometry's origin
-        On the curved surface that the shading normals describe, like the points of the bake. Rays from points
-        on the facet itself would be blocked by neighbouring facets.
+        Points on the curved surface that the shading normals describe, as in the bake. Rays from points on
+        the flat triangle would be blocked by neighbouring triangles.
     normal, face_normal : (n, k, 3) float64, unit, world
-        Shading normal and normal of the triangle, both on its front.
+        Shading normal, and normal of the triangle. Both point to its front.
     area : (n,) float64
-        Share of the texel's square that surface covers.
+        Share of each texel's square that surface covers.
     surface : (n,) float64, m2
-        World area of that surface.
+        World area of the surface inside each texel.
     offset : (n, 2) float64, texels
-        Mean of the points relative to the texel's centre, (column, row); 0 for texels covered as a whole.
+        Mean of the points relative to the texel's centre, (column, row). 0 for completely covered texels.
     """
 
     position: NDArray[np.float64]
@@ -53,12 +53,12 @@ class SurfacePoints:
 
 
 def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[np.int32]:
-    """Return the instance that covers most of each texel.
+    """Return, for each texel, the instance of the triangle that covers most of it.
 
     Parameters
     ----------
     geometry : Geometry
-        With the lightmap uv of the bake.
+        The triangles of the scene, with the lightmap uv of the bake.
     n_pages : int
         Number of pages, P.
     resolution : int, texels
@@ -67,7 +67,7 @@ def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[n
     Returns
     -------
     (P, H, W) int32
-        Index of the instance, -1 for none.
+        Index of the instance, -1 for texels without surface.
     """
     owner = np.full(n_pages * resolution * resolution, -1, np.int32)
     most = np.full(len(owner), _MIN_AREA, np.float32)
@@ -78,12 +78,12 @@ def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[n
 def surface_points(
     geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_points: int, seed: int
 ) -> SurfacePoints:
-    """Choose random points on the surface inside texels, uniformly in the area of the texels' squares.
+    """Choose random surface points inside texels, with uniform density in uv.
 
     Parameters
     ----------
     geometry : Geometry
-        With the lightmap uv of the bake.
+        The triangles of the scene, with the lightmap uv of the bake.
     pixel : (n,) int64
         (page * resolution + row) * resolution + column, without duplicates.
     resolution : int, texels
@@ -96,10 +96,10 @@ def surface_points(
     Returns
     -------
     SurfacePoints
-        n x `n_points` points.
+        `n_points` points in each of the n texels.
     """
     found, weight, covered, middle = _spread(geometry, pixel, resolution, n_points, seed)
-    # The points of a texel that is covered as a whole represent its centre.
+    # The points of a completely covered texel represent its centre, so their offset is 0.
     offset = np.where(covered[:, None] < _WHOLE, middle - 0.5, 0.0)
     corner = geometry.triangle[found]
     position = (geometry.position[corner].astype(np.float64) * weight[..., None]).sum(axis=2)
@@ -108,7 +108,7 @@ def surface_points(
     length = np.linalg.norm(normal, axis=2, keepdims=True)
     away = (length < 1e-6) | ((normal * face).sum(axis=2, keepdims=True) <= 0)
     normal = np.where(away, face, normal / np.maximum(length, 1e-12))
-    # Offset the points by some float32 spacings of their triangle's size, which callers do not have.
+    # Move the points off their triangle by a few float32 spacings of its size, against rounding errors.
     edge = geometry.position[corner[..., 1:]].astype(np.float64) - geometry.position[corner[..., :1]]
     position += lift(geometry, corner, weight, position, face)
     position += ROUNDING * np.abs(edge).max(axis=(2, 3))[..., None] * face
@@ -125,8 +125,9 @@ def lift(
 ) -> NDArray[np.float64]:
     """Return the vectors (n, k, 3) from points to the curved surface that the shading normals describe.
 
-    The vector is the sum, weighted by barycentric coordinates, of the vectors to the tangent planes of the
-    three corners, without those planes that the point is above.
+    A vector is the sum over the triangle's corners of the vector from the point to the corner's tangent
+    plane, weighted by barycentric coordinates. Planes that the point is above are left out, and so are
+    corners at hard edges.
 
     Parameters
     ----------
@@ -144,7 +145,7 @@ def lift(
     Returns
     -------
     (n, k, 3) float64, metres
-        Vectors to add to the positions.
+        The vectors to add to the positions.
     """
     result = np.zeros_like(position)
     for i in range(3):
@@ -156,21 +157,21 @@ def lift(
 
 
 def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: int) -> NDArray[np.float64]:
-    """Return the world area of one texel's square on triangles.
+    """Return the world area that one texel's square has on each triangle.
 
     Parameters
     ----------
     geometry : Geometry
-        With the lightmap uv of the bake.
+        The triangles of the scene, with the lightmap uv of the bake.
     triangle : (n, k) int64
-        Triangles that cover some of a page.
+        Triangles with uv area.
     resolution : int, texels
         Width and height of a page.
 
     Returns
     -------
     (n, k) float64, m2
-        Areas.
+        World area of each triangle / its uv area in texels.
     """
     corner = geometry.triangle[triangle]
     one, two = (
@@ -180,21 +181,21 @@ def square_metres(geometry: Geometry, triangle: NDArray[np.int64], resolution: i
     u, v = ((geometry.uv[corner[..., k]].astype(np.float64) - geometry.uv[corner[..., 0]]) for k in (1, 2))
     texels = np.abs(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]) * resolution**2
     world = np.linalg.norm(np.cross(one, two), axis=-1)
-    # The uv area is above 0, since points are chosen in proportion to it.
+    # The uv area is above 0, because triangles are chosen in proportion to it.
     return np.asarray(world / np.maximum(texels, 1e-12), np.float64)
 
 
 def one_surface_point(
     geometry: Geometry, pixel: NDArray[np.int64], resolution: int, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Choose one random point on the surface inside each texel.
+    """Choose one random surface point inside each texel.
 
     Parameters
     ----------
     geometry : Geometry
-        With the lightmap uv of the bake.
+        The triangles of the scene, with the lightmap uv of the bake.
     pixel : (n,) int64
-        (page * resolution + row) * resolution + column; each must lie on some surface.
+        (page * resolution + row) * resolution + column. Each texel must contain surface.
     resolution : int, texels
         Width and height of a page.
     seed : int
@@ -214,7 +215,11 @@ def one_surface_point(
 def _spread(
     geometry: Geometry, pixel: NDArray[np.int64], resolution: int, n_points: int, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return triangles (n, k), weights (n, k, 3), total area (n,) and mean point in the texel (n, 2)."""
+    """Choose k = `n_points` random surface points inside each of the n texels `pixel`.
+
+    Returns the triangles (n, k) of the points, their barycentric weights (n, k, 3), the covered area (n,) of
+    each texel in texels, and the mean of its points in its square (n, 2), (column, row), 0 to 1.
+    """
     wanted = np.full((int(geometry.page.max(initial=0)) + 1) * resolution * resolution, -1, np.int32)
     wanted[pixel] = np.arange(len(pixel), dtype=np.int32)
     count = np.zeros(len(pixel), np.int64)
@@ -228,7 +233,8 @@ def _spread(
     polygon, area = np.zeros((total, MAX_CORNERS, 2)), np.zeros(total)
     texel_pieces(*arrays, start[:-1].copy(), triangle, corners, polygon, np.zeros(1, np.int64), area)
     random = np.random.Generator(np.random.PCG64([seed, 7])).random((len(pixel), n_points, 3))
-    # Stratify by area, in random order, so that few passes already sample all parts of a texel.
+    # Stratify the first number, which selects the piece of surface by area. Permute the strata, so that the
+    # first few points already sample all pieces of a texel.
     random[..., 0] = (np.arange(n_points) + random[..., 0]) / n_points
     random[..., 0] = np.random.Generator(np.random.PCG64([seed, 8])).permuted(random[..., 0], axis=1)
     found = np.zeros((len(pixel), n_points), np.int64)
@@ -253,7 +259,7 @@ def look_up(
     pixel : (n,) int64
         (page * H + row) * W + column.
     offset : (n, 2) float64, texels, -0.5 to 0.5
-        (column, row), relative to the texel's centre.
+        Position of the lookup relative to the texel's centre, (column, row).
 
     Returns
     -------
@@ -263,7 +269,7 @@ def look_up(
     height, width = pages.shape[1:3]
     page, rest = np.divmod(pixel, height * width)
     row, column = np.divmod(rest, width)
-    # Find the neighbours on the side of the offset, and their weights.
+    # Find the neighbouring texels on the side of the offset, and the weights of the four texels.
     down, right = np.where(offset[:, 1] < 0, -1, 1), np.where(offset[:, 0] < 0, -1, 1)
     lower, beside = np.clip(row + down, 0, height - 1), np.clip(column + right, 0, width - 1)
     y, x = np.abs(offset[:, 1])[:, None], np.abs(offset[:, 0])[:, None]

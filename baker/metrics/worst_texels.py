@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from baker.core.scene import Instance
 from baker.metrics.error_metrics import dark_floor, relative_error
 
-# Largest number of texels returned.
+# Largest number of texels that are returned.
 _COUNT = 10
 
 
@@ -23,7 +23,7 @@ def worst_texels(
     position: NDArray[np.float64],
     channels: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
-    """Return the ten texels whose relative error less three standard errors of the reference is largest.
+    """Return the ten texels with the largest relative error minus three standard errors of the reference.
 
     Parameters
     ----------
@@ -32,18 +32,19 @@ def worst_texels(
     size : int, texels
         Width and height of a page.
     pixel : (n,) int64
-        (page * size + row) * size + column.
+        (page * size + row) * size + column of the compared texels.
     owner : (n,) int32
         Instance of each texel.
     position : (n, 3) float64, metres, world
         Position of each texel.
     channels : mapping of str to object
-        By name of channel, objects with `value`, `reference`, `standard_error`, (n, C) float64 each.
+        For each channel, by name, an object with the attributes `value`, `reference` and `standard_error`,
+        (n, C) float64.
 
     Returns
     -------
     list of dict
-        As in the JSON of `verify`, worst first.
+        One entry for each texel, as in the JSON of `verify`, the largest error first.
     """
     found = []
     for name, check in channels.items():

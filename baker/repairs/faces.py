@@ -1,8 +1,8 @@
-"""Finds the faces that can be removed without a visible change: degenerate ones and exact duplicates.
+"""Finds the faces that can be removed without a visible change: degenerate faces and exact duplicates.
 
-A duplicate is removed only if no renderer can distinguish it from the first: the same corners with the same
-attributes, in a material that does not blend. Faces that differ in any attribute stay, since which of them is
-visible depends on the renderer.
+A duplicate face is removed only if no renderer can distinguish it from the first face: both have the same
+corners with the same attributes, and the material does not blend. Faces at the same positions with different
+attributes are kept, because it depends on the renderer which of them is visible.
 """
 
 from __future__ import annotations
@@ -19,17 +19,23 @@ from baker.topology.unique_rows import first_equal
 
 @dataclass(frozen=True)
 class FaceChoice:
-    """Which faces of a primitive stay.
+    """The faces of a primitive that are kept, and the numbers of those that are removed.
 
     Attributes
     ----------
     keep : (T,) bool
-    n_unusable, n_zero_area, n_duplicate : int
-        Faces to remove: with NaN, infinite or huge coordinates, without area, duplicates of another.
+        The faces that are kept.
+    n_unusable : int
+        Removed faces with NaN, infinite or huge coordinates.
+    n_zero_area : int
+        Removed faces without area.
+    n_duplicate : int
+        Removed faces that duplicate another face.
     n_stitches : int
-        Degenerate faces that join the pieces of a triangle strip; a list of triangles does not need them.
+        Removed degenerate faces that only join the pieces of a triangle strip.
     n_unlike : int
-        Faces at the same positions as another one that stay, because the two differ or blend.
+        Faces at the positions of another face that are kept, because their attributes differ or the material
+        blends.
     """
 
     keep: NDArray[np.bool_]
@@ -41,7 +47,7 @@ class FaceChoice:
 
     @property
     def n_dropped(self) -> int:
-        """Count the defective faces to remove."""
+        """Return the number of defective faces that are removed, without `n_stitches`."""
         return self.n_unusable + self.n_zero_area + self.n_duplicate
 
 
@@ -51,10 +57,12 @@ def choose_faces(primitive: EditablePrimitive) -> FaceChoice:
     Parameters
     ----------
     primitive : EditablePrimitive
+        The primitive, which is not changed.
 
     Returns
     -------
     FaceChoice
+        The faces that are kept, and the numbers of those that are removed.
     """
     position, triangle = primitive.arrays.position, primitive.arrays.triangle
     left = np.arange(len(triangle))
@@ -81,22 +89,22 @@ def choose_faces(primitive: EditablePrimitive) -> FaceChoice:
 
 
 def _n_at_same_positions(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> int:
-    """Count the (T, 3) faces that repeat an earlier one by position."""
+    """Return how many of the faces (T, 3) have the same three positions as an earlier face."""
     material = np.zeros(len(triangle), np.int32)
     sided = np.array([primitive.double_sided], bool)
     return int(duplicates(primitive.arrays.position, triangle, material, sided).sum())
 
 
 def _exact_duplicates(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return the (T,) bool mask of (T, 3) faces that are rendered exactly like an earlier one.
+    """Return (T,) bool: the faces (T, 3) that are rendered exactly like an earlier face.
 
-    A face and its flipped twin are equal only if the material is double-sided and their normals are opposite:
-    the flipped one is then the back side of the first one.
+    A face with the same corners but opposite winding is equal only if the material is double-sided and the
+    normals are opposite. It is then the back of the earlier face.
     """
     leave_out = {"NORMAL"} if primitive.reads_lightmap_uv else {"NORMAL", "TEXCOORD_1"}
     column = [data for name, data in primitive.column.items() if name not in leave_out]
     vertex = first_equal(column, len(primitive.arrays.position))[triangle]
-    # Start each face at its lowest vertex and continue to the lower of the other two.
+    # Sort the vertices of each face, and record in `turned` whether this reverses the winding.
     row = np.arange(len(triangle))
     start = vertex.argmin(axis=1)
     order = (start[:, None] + np.arange(3)) % 3

@@ -1,4 +1,4 @@
-"""Reads a scene, fixes its meshes one by one, and makes the GLB that holds the result."""
+"""Reads a scene, fixes its meshes one by one, and makes a GLB of the result."""
 
 from __future__ import annotations
 
@@ -34,12 +34,14 @@ from baker.topology.triangle_check import face_normal, in_range
 
 @dataclass(frozen=True)
 class Fix:
-    """One change of one object.
+    """A change of the mesh of an object.
 
     Attributes
     ----------
-    object, node : str, int
-        The first node that shows the mesh.
+    object : str
+        Name of the first node that has the mesh.
+    node : int
+        Index of this node.
     change : Change
     """
 
@@ -50,7 +52,17 @@ class Fix:
 
 @dataclass(frozen=True)
 class LeftAlone:
-    """A defect that was found and not fixed, with the reason."""
+    """A defect that was found but not fixed.
+
+    Attributes
+    ----------
+    object : str
+        Name of the first node that has the mesh.
+    node : int
+        Index of this node.
+    reason : str
+        A sentence that states the defect and why it was not fixed.
+    """
 
     object: str
     node: int
@@ -64,7 +76,7 @@ class FixResult(Result):
     Attributes
     ----------
     data : bytes
-        The GLB; the very bytes of the input if that is a GLB and nothing was fixed.
+        The fixed scene as GLB. If the input is a GLB and nothing was fixed, these are the bytes of the input.
     fixed : tuple of Fix
     left_alone : tuple of LeftAlone
     """
@@ -74,11 +86,11 @@ class FixResult(Result):
     left_alone: tuple[LeftAlone, ...]
 
     def summary(self) -> dict[str, Any]:
-        """Return the rows of the short text."""
+        """Return the names and values that the short text shows."""
         return {"fixed": len(self.fixed), "left alone": len(self.left_alone)}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the keys `fixed` and `left_alone` of the object of `baker check` as JSON."""
+        """Return the keys `fixed` and `left_alone` of the JSON object that `baker check --json` prints."""
         return {
             "fixed": [
                 {"object": fix.object, "node": fix.node, **_change_json(fix.change)} for fix in self.fixed
@@ -109,9 +121,9 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     Parameters
     ----------
     path : Path
-        Of any format that can be read. It is not changed.
+        The file, in any format that can be read. It is not changed.
     settings : RepairSettings
-        Lightmap resolution, units of the file, and whether shapes are repaired.
+        Lightmap resolution, up axis and scale of the file, and whether shapes are repaired.
     progress : Progress
         Called with the stages "fix" and "repair"; a truthy return value stops the work.
 
@@ -137,7 +149,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     scene = load_scene(path, up=settings.up, scale=settings.scale, lenient=True, allow_outside=allowed)
     data: bytes | None = None
     if scene.source is None:
-        # Convert other formats to GLB, defective triangles included, and fix that.
+        # Convert other formats to GLB, defective triangles included, and fix the GLB.
         assert scene.source_scene is not None
         data = source_glb(scene, scene.source_scene)
         scene = read(data)
@@ -147,7 +159,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     result = _fix(scene, data, settings, progress, make_normals=not settings.repair)
     if settings.repair:
         result = _repair(read(result.data), result, progress)
-        # Repaired meshes may have duplicate vertices, and need normals or other lightmap uv.
+        # Fix again, because repaired meshes may have duplicate vertices, no normals or invalid lightmap uv.
         result = _joined(result, _fix(read(result.data), result.data, settings, progress))
     fixed = read(result.data)
     wrong = faces_to_flip(fixed)
@@ -157,7 +169,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
 
 
 def _joined(first: FixResult, second: FixResult) -> FixResult:
-    """Return the result of two steps; defects that both leave are listed once."""
+    """Return the result of two successive steps; a defect that neither step fixed is listed once."""
     left = dict.fromkeys((*first.left_alone, *second.left_alone))
     return FixResult(second.data, (*first.fixed, *second.fixed), tuple(left))
 
@@ -171,7 +183,11 @@ def _fix(
     make_normals: bool = True,
     inside_out: Mapping[int, Sequence[NDArray[np.bool_]]] | None = None,
 ) -> FixResult:
-    """Make invisible changes. `data` is the scene's GLB, returned if there are none; or None."""
+    """Fix a scene by changes that are not visible.
+
+    `data` are the bytes of the scene's GLB, which are returned if nothing is fixed. If it is None, a GLB is
+    always written. `inside_out` has, by mesh, the faces that `faces_to_flip` returns.
+    """
     source, source_scene = _parsed(scene)
     area = _area_shares(source_scene)
     edited: dict[tuple[int, int], EditedPrimitive] = {}
@@ -201,7 +217,7 @@ def _fix(
 
 
 def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
-    """Repair the shapes of a scene that is fixed otherwise; the fixes of `first` are listed first."""
+    """Repair the shapes of a fixed scene, whose fixes are in `first`. They are listed before the repairs."""
     source, source_scene = _parsed(scene)
     made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
@@ -226,14 +242,14 @@ def _parsed(scene: Scene) -> tuple[SourceDocument, SourceScene]:
 
 
 def _shown_meshes(source_scene: SourceScene) -> Iterator[tuple[int, SourceMesh, list[SourceInstance]]]:
-    """Yield the meshes that have triangles, with their number and the nodes that show them."""
+    """Yield each mesh that has triangles: its number, the mesh, and its instances."""
     for number, mesh in enumerate(source_scene.meshes):
         if mesh.primitives:
             yield number, mesh, [instance for instance in source_scene.instances if instance.mesh == number]
 
 
 def _names_files(source: SourceDocument) -> bool:
-    """Return whether a GLB refers to files beside it."""
+    """Return whether a glTF document refers to other files."""
     things = [*source.json.get("images", []), *source.json.get("buffers", [])]
     return any("uri" in thing and not thing["uri"].startswith("data:") for thing in things)
 
@@ -245,12 +261,12 @@ def _read_glb(path: Path, data: bytes, *, allow_outside: bool) -> Scene:
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:
-    """Return the progress of a stage inside the work on mesh `number` of `count`."""
+    """Return a progress callback that converts a fraction of mesh `number` to that of all `count` meshes."""
     return lambda stage, fraction, detail="": progress(Stage.FIX, (number + fraction) / count, detail)
 
 
 def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
-    """Return each mesh's share of the scene's area, by its first instance, (M,) float64."""
+    """Return each mesh's share of the total area in world space, (M,) float64, by its first instance."""
     area = np.zeros(len(source_scene.meshes))
     for instance in source_scene.instances:
         if area[instance.mesh] == 0.0:
@@ -265,19 +281,19 @@ def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
 
 
 def _in_range(arrays: SourcePrimitive) -> NDArray[np.bool_]:
-    """Return which faces have indices of existing vertices only, (T,) bool."""
+    """Return (T,) bool: the faces all of whose indices are those of existing vertices."""
     n = np.full(len(arrays.triangle), len(arrays.position))
     return in_range(arrays.triangle, np.zeros_like(n), n)
 
 
 def _editable(source: SourceDocument, index: int, mesh: SourceMesh) -> list[EditablePrimitive]:
-    """Return the primitives of mesh `index` of the document, with the limits of their edits."""
+    """Return the primitives of a mesh, with the limits of their edits; `index` is its number in the file."""
     document = source.json
     primitives = document["meshes"][index]["primitives"]
     found = []
     for arrays in mesh.primitives:
         primitive = primitives[arrays.index]
-        # Variants may show the primitive in several materials: an edit must be safe in all of them.
+        # A material variant may replace the material, so an edit must be invisible with every material.
         materials = [
             document["materials"][holder["material"]] if "material" in holder else {}
             for holder in material_holders(primitive)

@@ -1,4 +1,4 @@
-"""Finds the closed parts that `baker check` reports as inside out, as faces to flip."""
+"""Finds the faces to flip of closed parts that `baker check` reports as inside out."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from baker.core.settings import make_settings
 
 
 def faces_to_flip(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
-    """Return the faces of parts that are inside out: by mesh, for each primitive a (T,) bool mask.
+    """Return the faces of closed parts that are inside out.
 
     Parameters
     ----------
     scene : Scene
-        Read leniently.
+        The scene, read leniently.
 
     Returns
     -------
     dict of int to list of (T,) bool
-        Only of meshes that have such faces.
+        For each mesh with such faces, one mask of faces for each primitive.
     """
     context = CheckContext(scene, make_settings({}))
     found: dict[int, list[NDArray[np.bool_]]] = {}

@@ -1,4 +1,4 @@
-"""Unwraps meshes whose own lightmap uv (TEXCOORD_1) cannot hold a lightmap."""
+"""Unwraps meshes whose lightmap uv (TEXCOORD_1) in the file is not usable for a lightmap."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ from baker.topology.triangle_check import duplicates, usable_vertices
 from baker.uv.keep import find_fault
 from baker.uv.unwrap import unwrap_scene
 
-# Smallest page in texels for which an object is unwrapped, whatever its share of the scene.
+# Smallest width of the page for which an object is unwrapped, texels.
 _SMALLEST = 64
 
 
 @dataclass(frozen=True)
 class UvRequest:
-    """The lightmap page for which uv are tested and made.
+    """The size of the lightmap for which the uv of a mesh are tested and made.
 
     Attributes
     ----------
     resolution : int
-        Page width in texels.
+        Width of a page, texels.
     share : float
-        The mesh's part of the scene's area, 0 to 1: it will get about this part of a page.
+        The mesh's share of the scene's area, 0 to 1. In a bake, the mesh gets about this share of a page.
     threads : int or None
+        Number of threads.
     """
 
     resolution: int
@@ -40,7 +41,10 @@ class UvRequest:
     threads: int | None
 
     def unwrap_settings(self) -> BakeSettings:
-        """Return the settings that unwrap the mesh for its part of a page, a multiple of 16 texels wide."""
+        """Return settings that unwrap the mesh alone on a page as large as its share of a page.
+
+        The page is square, and its width is a multiple of 16 texels.
+        """
         width = min(self.resolution, max(_SMALLEST, 16 * round(self.resolution * np.sqrt(self.share) / 16)))
         return make_settings({"resolution": width, "uv": "unwrap", "threads": self.threads})
 
@@ -48,28 +52,31 @@ class UvRequest:
 def new_lightmap_uv(
     plan: MeshPlan, shown: Sequence[SourceInstance], request: UvRequest, progress: Progress
 ) -> tuple[MeshPlan, list[NDArray[np.float32]] | None]:
-    """Test the TEXCOORD_1 of the faces that stay of a mesh, and make a new one if it fails.
+    """Test the TEXCOORD_1 of a mesh's remaining faces, and make a new TEXCOORD_1 if the test fails.
 
     Parameters
     ----------
     plan : MeshPlan
+        The edits of the mesh.
     shown : sequence of SourceInstance
-        The nodes that show the mesh; it is unwrapped for the scale of the first one.
+        The instances of the mesh. It is unwrapped at the scale of the first instance.
     request : UvRequest
+        Size of the lightmap.
     progress : Progress
 
     Returns
     -------
     plan : MeshPlan
-        With the change, or the reason why there is none.
-    uv : list of (T, 3, 2) float32, for each primitive, or None
+        The plan, with the change added, or the reason why an invalid TEXCOORD_1 is kept.
+    uv : list of (T, 3, 2) float32, or None
+        New uv of the face corners of each primitive; None if the TEXCOORD_1 is kept.
     """
     if not any(1 in edit.primitive.arrays.texcoord for edit in plan.edits):
         return plan, None
     mesh = _mesh(plan)
     if mesh is None:
         return plan, None
-    # A bake leaves duplicates out, so they are no overlap.
+    # Leave out duplicate faces, as a bake does, so that they do not count as an overlap.
     single = ~duplicates(mesh.position, mesh.triangle.astype(np.int64), mesh.material, np.zeros(1, bool))
     fault = find_fault(replace(mesh, triangle=mesh.triangle[single]), request.resolution)
     if fault is None:
@@ -91,7 +98,7 @@ def new_lightmap_uv(
 
 
 def _obstacle(plan: MeshPlan) -> str:
-    """Return why the TEXCOORD_1 of a mesh must stay, as the end of a sentence; empty if it need not."""
+    """Return why the TEXCOORD_1 of a mesh must be kept, as the end of a sentence; empty if it may change."""
     locked = next((edit.primitive.locked for edit in plan.edits if edit.primitive.locked), "")
     if locked:
         return locked
@@ -103,7 +110,7 @@ def _obstacle(plan: MeshPlan) -> str:
 def _unwrap(
     mesh: Mesh, instance: SourceInstance, request: UvRequest, progress: Progress
 ) -> NDArray[np.float32]:
-    """Return new uv of a mesh unwrapped alone, (T, 3, 2) float32."""
+    """Unwrap a mesh alone and return the new uv of its face corners, (T, 3, 2) float32."""
     alone = Scene(
         name=mesh.name,
         path=None,
@@ -120,7 +127,7 @@ def _left(plan: MeshPlan, reason: str) -> MeshPlan:
 
 
 def _mesh(plan: MeshPlan) -> Mesh | None:
-    """Return the faces that stay of a mesh, for unwrapping; None if their coordinates are unusable."""
+    """Return the remaining faces of a mesh for unwrapping, or None if some coordinates are unusable."""
     arrays = [edit.primitive.arrays for edit in plan.edits]
     start = np.cumsum([0] + [len(a.position) for a in arrays[:-1]])
     position = np.concatenate([a.position for a in arrays])
@@ -130,14 +137,17 @@ def _mesh(plan: MeshPlan) -> Mesh | None:
     uv = np.concatenate([a.texcoord.get(1, np.zeros((len(a.position), 2), np.float32)) for a in arrays])
     zero_t, zero_v = np.zeros(len(triangle), np.int32), np.zeros(len(position), np.int32)
     row = np.arange(len(position), dtype=np.int32)
-    # Unwrapping does not use normals.
+    # Set normals to zero, because unwrapping does not use them.
     normal = np.zeros_like(position)
     corner = triangle.astype(np.int32)
     return Mesh("", position, normal, corner, zero_t, zero_t, zero_v, row, (None, uv))
 
 
 def _replaced(mesh: Mesh, uv: NDArray[np.float32], single: NDArray[np.bool_]) -> Mesh:
-    """Return the faces that the (T,) mask selects, with one vertex per corner and (T, 3, 2) lightmap uv."""
+    """Return the faces that the mask `single` (T,) selects, with new lightmap uv (T, 3, 2).
+
+    The returned mesh has one vertex for each face corner.
+    """
     flat = np.arange(3 * len(mesh.triangle), dtype=np.int32).reshape(-1, 3)[single]
     position = mesh.position[mesh.triangle].reshape(-1, 3)
     return replace(mesh, position=position, triangle=flat, texcoord=(None, uv.reshape(-1, 2)))

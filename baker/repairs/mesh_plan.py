@@ -1,7 +1,7 @@
-"""Plans the fixes of one mesh: faces to keep, faces to flip, new normals.
+"""Plans the fixes of one mesh: faces to keep, faces to flip, and new normals.
 
-The plan changes nothing. The caller may test the lightmap uv of the faces that stay and replace it before
-`apply_edit` makes the new vertices.
+Making a plan changes nothing. The caller may then test and replace the lightmap uv of the remaining faces.
+Finally `apply_edit` makes the new vertices.
 """
 
 from __future__ import annotations
@@ -19,25 +19,27 @@ from baker.repairs.winding import find_wrong_winding
 from baker.topology.triangle_check import usable_vertices, zero_area
 from baker.topology.unique_rows import first_equal
 
-# Bytes of a normal of three float32; shorter ones are normalized integers.
+# Size of a vertex normal that is stored as three float32, bytes. Smaller normals are normalized integers.
 _FLOAT_NORMAL = 12
 
 
 @dataclass(frozen=True)
 class Change:
-    """One kind of defect that was fixed in an object.
+    """The change of one kind that was made to a mesh.
 
     Attributes
     ----------
     change : str
-        Stable name.
+        Name of the kind of change, the same in all versions.
     counted : str
-        Unit of `before` and `after`, such as "faces".
+        What `before` and `after` count, such as "faces".
     before, after : int
+        Numbers before and after the change.
     distance : float or None
-        Of a repair: Hausdorff distance of the old and the new surface, metres by the first node's scale.
+        For a repair, the Hausdorff distance between the old and the new surface, metres, at the scale of the
+        first node that has the mesh.
     lost : tuple of str
-        Vertex attributes that could not be kept.
+        Names of vertex attributes that could not be kept.
     """
 
     change: str
@@ -50,15 +52,16 @@ class Change:
 
 @dataclass(frozen=True)
 class MeshPlan:
-    """The edits of a mesh.
+    """The planned edits of a mesh.
 
     Attributes
     ----------
     edits : tuple of PrimitiveEdit
         One for each primitive.
     changes : tuple of Change
+        The changes that the edits make.
     left : tuple of str
-        Sentences about defects that are not fixed, with reasons.
+        One sentence for each defect that is not fixed, with the reason.
     """
 
     edits: tuple[PrimitiveEdit, ...]
@@ -77,16 +80,17 @@ def plan_mesh(
     Parameters
     ----------
     primitives : sequence of EditablePrimitive
-        All its primitives of triangles.
+        All primitives of the mesh that consist of triangles.
     make_normals : bool
-        Make normals where there are none. False before a repair, which treats all normals as those of the
-        file.
-    inside_out : sequence of (T,) bool, one for each primitive, or None
-        Faces of closed parts that are to be flipped as a whole.
+        Whether normals are made for primitives without normals. It is False before a repair, because a repair
+        uses normals as evidence of the intended front.
+    inside_out : sequence of (T,) bool, or None
+        For each primitive, the faces of closed parts that are inside out. They are flipped.
 
     Returns
     -------
     MeshPlan
+        The edits, and the defects that are not fixed.
     """
     left: list[str] = []
     choices = [choose_faces(primitive) for primitive in primitives]
@@ -130,20 +134,24 @@ def plan_mesh(
 def _lock_empty(primitive: EditablePrimitive, choice: FaceChoice) -> EditablePrimitive:
     if primitive.locked or choice.keep.any():
         return primitive
-    # A primitive cannot be empty in glTF, and removing it would renumber the others.
+    # In glTF, a primitive cannot be empty, and removing it would change the numbers of other primitives.
     return replace(primitive, locked="nothing would be left of it; delete it in the scene it comes from")
 
 
 def _choose_flips(
     primitives: Sequence[EditablePrimitive], triangles: Sequence[NDArray[np.int64]], left: list[str]
 ) -> list[NDArray[np.bool_]]:
-    """Return the (T,) bool mask of faces to flip of each primitive, for its (T, 3) triangles."""
+    """Return, for each primitive, the mask (T,) of faces that are wound against their closed piece.
+
+    `triangles` are the faces (T, 3) of each primitive. Sentences about defects that remain are added to
+    `left`.
+    """
     nothing = [np.zeros(len(triangle), bool) for triangle in triangles]
     position = np.concatenate([p.arrays.position for p in primitives])
     start = np.cumsum([0] + [len(p.arrays.position) for p in primitives])
     joined = np.concatenate([t + s for t, s in zip(triangles, start, strict=False)])
     owner = np.repeat(np.arange(len(primitives)), [len(t) for t in triangles])
-    # Ignore faces that no renderer draws; locked primitives still have them.
+    # Ignore faces that no renderer draws, which locked primitives may still have.
     drawn = usable_vertices(position)[joined].all(axis=1)
     drawn[drawn] = ~zero_area(position, joined[drawn])
     if not drawn.any():
@@ -162,7 +170,11 @@ def _choose_flips(
 def _unless_locked(
     primitives: Sequence[EditablePrimitive], flips: list[NDArray[np.bool_]], what: str, left: list[str]
 ) -> list[NDArray[np.bool_]]:
-    """Return the (T,) masks of faces to flip; all False if a locked primitive has one of them."""
+    """Return the masks `flips`, or masks of False if a locked primitive has a face to flip.
+
+    `flips` has one mask (T,) of faces to flip for each primitive. In the second case, a sentence with the
+    defect `what` is added to `left`.
+    """
     locked = [p.locked for p, flip in zip(primitives, flips, strict=True) if p.locked and flip.any()]
     if not locked:
         return flips
@@ -171,7 +183,7 @@ def _unless_locked(
 
 
 def _mean_normal(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return the (T, 3) float32 mean of each face's vertex normals, zero without normals."""
+    """Return the mean vertex normal of each face, (T, 3) float32; zero if the primitive has no normals."""
     if primitive.arrays.normal is None:
         return np.zeros((len(triangle), 3), np.float32)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -188,10 +200,10 @@ def _normals(primitive: EditablePrimitive, triangle: NDArray[np.int64], *, make:
 
 
 def _count_doubles(primitive: EditablePrimitive, triangle: NDArray[np.int64], normals: NormalChoice) -> int:
-    """Count the vertices of (T, 3) faces that equal another used vertex in every attribute."""
+    """Return how many vertices of the faces (T, 3) equal another vertex in every attribute."""
     used = np.unique(triangle)
     if normals.n_missing:
-        # Flat normals split vertices that the file shares: count how many fewer there are in the end.
+        # Flat normals split shared vertices, so count by how many the number of vertices decreases.
         edit = PrimitiveEdit(primitive, True, triangle, normals.corner, np.zeros(triangle.shape, bool))
         made = apply_edit(edit)
         return max(0, len(used) - len(made.row)) if made is not None else 0
@@ -200,7 +212,7 @@ def _count_doubles(primitive: EditablePrimitive, triangle: NDArray[np.int64], no
 
 
 class _Totals:
-    """Adds up the changes of a mesh's primitives."""
+    """Sums of the changes over the primitives of a mesh."""
 
     def __init__(self) -> None:
         self._faces = 0

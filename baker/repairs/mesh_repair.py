@@ -1,4 +1,4 @@
-"""Repairs the meshes of a document one by one, and measures the distance of each surface from the old one."""
+"""Repairs a mesh, and measures the distance between the repaired and the original surface."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class MeshRepair:
     Attributes
     ----------
     made : dict of int to EditedPrimitive or ReplacedPrimitive
-        The new primitives by their number in the mesh; empty if it stays as it is.
+        The new primitives, by their index in the mesh. Empty if the mesh is not changed.
     changes : tuple of Change
     left : tuple of str
-        Sentences about defects that are not repaired, with reasons.
+        One sentence for each defect that is not repaired, with the reason.
     """
 
     made: dict[int, EditedPrimitive | ReplacedPrimitive]
@@ -35,19 +35,21 @@ class MeshRepair:
 
 
 def repair_mesh(primitives: list[EditablePrimitive], textured: bool, shown: SourceInstance) -> MeshRepair:
-    """Repair one mesh; it stays as it is if that would move its surface too far.
+    """Repair one mesh, unless the repair would move its surface by more than `FURTHEST` of its diagonal.
 
     Parameters
     ----------
     primitives : list of EditablePrimitive
+        The primitives of the mesh.
     textured : bool
-        A texture uses the mesh's uv, which new vertices would not have.
+        Whether a texture uses the mesh's uv. The mesh is then not remeshed, because new vertices have no uv.
     shown : SourceInstance
-        Its scale converts the distance to metres.
+        The first instance of the mesh. Its scale converts distances to metres.
 
     Returns
     -------
     MeshRepair
+        The new primitives, the changes, and the defects that remain.
     """
     mesh = weld_primitives(primitives)
     if not len(mesh.triangle):
@@ -85,7 +87,10 @@ def repair_mesh(primitives: list[EditablePrimitive], textured: bool, shown: Sour
 def _remesh(
     repair: ShapeRepair, made: dict[int, EditedPrimitive | ReplacedPrimitive], changes: list[Change]
 ) -> WeldedMesh:
-    """Remesh a repaired mesh of one primitive; add to `made` and `changes` and return the new mesh."""
+    """Remesh a repaired mesh that has one primitive, and return the new mesh.
+
+    The new primitive is added to `made`, and the changes to `changes`.
+    """
     new = remesh_primitive(repair.after, repair.edits[0])
     made[repair.edits[0].primitive.arrays.index] = new.made
     face = new.made.triangle

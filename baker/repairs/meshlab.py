@@ -1,7 +1,7 @@
-"""Repairs of surfaces by MeshLab's filters; the only file that imports pymeshlab.
+"""Repairs of surfaces with filters of MeshLab.
 
-pymeshlab is under the GPL and no dependency of baker; it is imported only when a repair runs. All meshes in
-this file have one vertex for each position.
+This is the only module that uses pymeshlab. pymeshlab is licensed under the GPL and is not a dependency of
+baker, so it is imported only if a repair runs. All meshes in this module have one vertex for each position.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 
-# Number of points on a surface at which its distance from another is measured.
+# Approximate number of points on a surface at which its distance from another surface is measured.
 _DISTANCE_SAMPLES = 20000
 
 
@@ -29,17 +29,21 @@ def require_meshlab() -> None:
 
 
 def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Choose faces so that no edge has more than two; at an edge with more, the smallest faces are removed.
+    """Choose faces to keep, so that no edge belongs to more than two faces.
+
+    At an edge with more than two faces, the smallest faces are removed.
 
     Parameters
     ----------
     position : (P, 3) float32
+        Vertices of the mesh.
     triangle : (T, 3) int64
+        Faces of the mesh.
 
     Returns
     -------
     (T,) bool
-        The faces that stay.
+        The faces to keep.
     """
     _, _, origin = _apply(position, triangle, "meshing_repair_non_manifold_edges", method="Remove Faces")
     keep = np.zeros(len(triangle), bool)
@@ -48,11 +52,11 @@ def keep_manifold(position: NDArray[np.float32], triangle: NDArray[np.int64]) ->
 
 
 def orient_by_visibility(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return the faces to flip so that fronts are on the side with the larger visibility, (T,) bool."""
+    """Return (T,) bool: the faces to flip so that every front is on the side that is less occluded."""
     _, new, origin = _apply(position, triangle, "meshing_re_orient_faces_by_geometry", rays=64)
     flip = np.zeros(len(triangle), bool)
     old = triangle[origin]
-    # Flipped faces may also start at another corner.
+    # Compare windings from the same vertex on, because the filter may also change the first corner.
     start = np.argmax(new == old[:, :1], axis=1)
     flip[origin] = np.take_along_axis(new, ((start + 1) % 3)[:, None], axis=1)[:, 0] != old[:, 1]
     return flip
@@ -61,7 +65,10 @@ def orient_by_visibility(position: NDArray[np.float32], triangle: NDArray[np.int
 def close_holes(
     position: NDArray[np.float32], triangle: NDArray[np.int64], most_edges: int
 ) -> NDArray[np.int64]:
-    """Return (K, 3) int64 new faces, of existing vertices, over holes of at most `most_edges` edges."""
+    """Return new faces (K, 3) int64 that close all holes of at most `most_edges` edges.
+
+    The new faces use existing vertices.
+    """
     _, face, origin = _apply(
         position, triangle, "meshing_close_holes", maxholesize=most_edges, refinehole=False
     )
@@ -71,23 +78,27 @@ def close_holes(
 def remesh(
     position: NDArray[np.float32], triangle: NDArray[np.int64], edge_length: float
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Return vertices and faces of the same surface in triangles of about equal sides.
+    """Remesh a surface into nearly equilateral triangles. Edges sharper than 30 degrees are kept.
 
     Parameters
     ----------
     position : (P, 3) float32
+        Vertices of the mesh.
     triangle : (T, 3) int64
+        Faces of the mesh.
     edge_length : float
-        Target length, in units of the positions.
+        Target length of the edges, in the unit of the positions.
 
     Returns
     -------
     position : (P', 3) float32
+        New vertices.
     triangle : (T', 3) int64
+        New faces.
 
     Notes
     -----
-    Hoppe, DeRose, Duchamp, McDonald, Stuetzle, Mesh Optimization, 1993; edges sharper than 30 degrees stay.
+    Based on: Hoppe, DeRose, Duchamp, McDonald, Stuetzle, Mesh Optimization, 1993.
     """
     library = _library()
     vertex, face, _ = _apply(
@@ -107,17 +118,20 @@ def largest_distance(
     sampled: tuple[NDArray[np.float32], NDArray[np.int64]],
     target: tuple[NDArray[np.float32], NDArray[np.int64]],
 ) -> float:
-    """Return the largest distance of a point of one surface from another: a one-sided Hausdorff distance.
+    """Return the largest distance from points on one surface to another surface.
+
+    This is the one-sided Hausdorff distance, measured at all vertices of the sampled faces and at about 20
+    000 points on regular grids in these faces.
 
     Parameters
     ----------
     sampled, target : (position (P, 3) float32, triangle (T, 3) int64)
-        Measured at all vertices of the sampled faces and at about 20 000 points of a fixed grid on them.
+        The surface on which the points lie, and the surface to which distances are measured.
 
     Returns
     -------
     float
-        In units of the positions; 0 without sampled faces.
+        The distance, in the unit of the positions; 0 without sampled faces.
     """
     if not len(sampled[1]):
         return 0.0
@@ -143,18 +157,23 @@ def transfer(
     value: NDArray[np.float32],
     point: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Return values at points near a surface, from the nearest points of its faces.
+    """Transfer vertex values of a mesh to other points, each from the nearest point on the mesh.
 
     Parameters
     ----------
     position : (P, 3) float32
+        Vertices of the mesh.
     triangle : (T, 3) int64
+        Faces of the mesh.
     value : (P, C) float32
+        Values at the vertices.
     point : (Q, 3) float32
+        The other points.
 
     Returns
     -------
     (Q, C) float32
+        Interpolated values at the points.
     """
     library = _library()
     out = np.zeros((len(point), value.shape[1]), np.float32)
@@ -181,10 +200,13 @@ def transfer(
 
 
 def _points_on(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return points on (T, 3) faces, in proportion to area, corners included, (N, 3) float64."""
+    """Return points of regular grids on the faces (T, 3), (N, 3) float64, including all corners.
+
+    The number of points on a face is approximately proportional to its area.
+    """
     corner = position[triangle].astype(np.float64)
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    # A grid of n steps along each side has about n^2 / 2 points.
+    # Choose the number n of steps along each side; a triangular grid with n steps has about n^2 / 2 points.
     steps = np.sqrt(2.0 * _DISTANCE_SAMPLES * area / max(float(area.sum()), 1e-300))
     steps = 2 ** np.ceil(np.log2(np.maximum(steps, 2.0))).astype(np.int64)
     points = []
@@ -207,7 +229,7 @@ def _library() -> Any:
 
 
 def _mesh(library: Any, position: NDArray[np.float32], triangle: NDArray[np.int64]) -> Any:
-    """Return a mesh whose face scalars are the face number plus one, so that new faces have 0."""
+    """Return a mesh of pymeshlab. Its face scalars are face numbers plus one; new faces will have 0."""
     return library.Mesh(
         vertex_matrix=position.astype(np.float64),
         face_matrix=triangle.astype(np.int32),
@@ -218,7 +240,11 @@ def _mesh(library: Any, position: NDArray[np.float32], triangle: NDArray[np.int6
 def _apply(
     position: NDArray[np.float32], triangle: NDArray[np.int64], filter_name: str, **parameters: Any
 ) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
-    """Run one filter; return vertices, faces, and the old number of each face (-1 for new ones)."""
+    """Run one filter of MeshLab on a mesh.
+
+    Returns the new vertices (P', 3), the new faces (T', 3), and for each new face the index of the face from
+    which it was made, -1 for additional faces.
+    """
     library = _library()
     meshes = library.MeshSet()
     meshes.add_mesh(_mesh(library, position, triangle))
@@ -226,7 +252,7 @@ def _apply(
         meshes.apply_filter(filter_name, **parameters)
     except library.PyMeshLabException as error:
         raise ResourceError(f"MeshLab's {filter_name} gave up: {error}", object="pymeshlab") from None
-    # Copy the arrays: the mesh is freed with its set.
+    # Copy the arrays, because the mesh is freed together with its mesh set.
     mesh = meshes.current_mesh()
     mesh.compact()
     return (

@@ -1,6 +1,7 @@
-"""Makes vertex normals where the file has none, or normals of zero length.
+"""Makes vertex normals for primitives without normals, and replaces unusable normals.
 
-A primitive without normals is flat-shaded (glTF 2.0, 3.7.2.1), so flat normals change nothing visible.
+glTF requires flat shading for primitives without normals (glTF 2.0, 3.7.2.1), so adding flat normals is not
+visible.
 """
 
 from __future__ import annotations
@@ -12,24 +13,24 @@ from numpy.typing import NDArray
 
 from baker.topology.triangle_check import face_normal
 
-# Deviation of a normal's length from 1 that is left as it is: rounding to single precision or short decimals.
+# Largest deviation of a normal's length from 1 that is accepted. Smaller deviations are rounding.
 LENGTH_SLACK = 1e-2
 
 
 @dataclass(frozen=True)
 class NormalChoice:
-    """Normals of the corners of faces.
+    """New normals of the face corners of a primitive, and the numbers of defective normals.
 
     Attributes
     ----------
     corner : (T, 3, 3) float32, unit, or None
-        None: the file's own normals stay.
+        Normal of each face corner. None if the normals of the file are kept.
     n_missing : int
-        Vertices without a normal.
+        Number of vertices without a normal.
     n_empty : int
-        Vertices whose normal is not finite or has no length.
+        Number of vertices whose normal is zero or not finite.
     n_long : int
-        Vertices whose normal has a direction but not unit length.
+        Number of vertices whose normal has a direction, but a length other than 1.
     """
 
     corner: NDArray[np.float32] | None
@@ -39,7 +40,7 @@ class NormalChoice:
 
     @property
     def n_made(self) -> int:
-        """Count the vertices that get another normal."""
+        """Return the number of vertices that get a new normal."""
         return self.n_missing + self.n_empty + self.n_long
 
 
@@ -50,21 +51,24 @@ def choose_normals(
     *,
     is_float: bool,
 ) -> NormalChoice:
-    """Return normals for the corners of faces.
+    """Make new normals of face corners, if normals are missing or defective.
 
     Parameters
     ----------
     position : (V, 3) float32
+        Vertices of the primitive.
     triangle : (T, 3) int64
-        Faces with area.
+        Faces of the primitive, all with area.
     normal : (V, 3) float32 or None
-        As the file has them.
+        Vertex normals of the file.
     is_float : bool
-        The file stores float32. Normalized integers cannot have unit length, and their length is not tested.
+        Whether the file stores normals as float32. The length of normalized integers is not tested, because
+        rounding changes it.
 
     Returns
     -------
     NormalChoice
+        The new normals, or None in `corner` if the normals of the file are kept.
     """
     used = np.unique(triangle)
     if normal is None:
@@ -83,13 +87,13 @@ def choose_normals(
     out[empty] = 0.0
     corner = out[triangle]
     if n_empty:
-        # Replace empty normals by the area-weighted mean of the vertex's faces.
+        # Replace an empty normal by the area-weighted mean of the normals of the vertex's faces.
         face = face_normal(position, triangle)
         smooth = np.zeros_like(given)
         for axis in range(3):
             smooth[:, axis] = np.bincount(triangle.ravel(), np.repeat(face[:, axis], 3), minlength=len(given))
         size = np.bincount(triangle.ravel(), np.repeat(np.linalg.norm(face, axis=1), 3), minlength=len(given))
-        # Where the faces cancel out, each corner takes the normal of its own face.
+        # If this mean is nearly zero, use the normal of each corner's face.
         lost = np.linalg.norm(smooth, axis=1) <= 1e-6 * size
         made = np.where(lost[triangle][..., None], face[:, None, :], smooth[triangle])
         filled = _unit(made.reshape(-1, 3)).reshape(-1, 3, 3).astype(np.float32)
@@ -98,8 +102,8 @@ def choose_normals(
 
 
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (N, 3) vectors at unit length; zero ones stay zero."""
-    # Divide by the largest component first: squares of tiny or huge components leave the exponent's range.
+    """Normalise the vectors (N, 3). Zero vectors are returned unchanged."""
+    # Divide by the largest component first, so that squares neither underflow nor overflow.
     scaled = vector / np.maximum(np.abs(vector).max(axis=1, keepdims=True, initial=0.0), 1e-300)
     length = np.sqrt((scaled * scaled).sum(axis=1, keepdims=True))
     return np.asarray(scaled / np.maximum(length, 1e-300))

@@ -1,4 +1,4 @@
-"""One primitive of a glTF mesh, and the edit that a fix or a repair makes of it."""
+"""A primitive of a glTF mesh, and the edit that a fix or a repair makes to it."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from baker.topology.unique_rows import first_equal, unique_rows
 
 @dataclass(frozen=True)
 class EditablePrimitive:
-    """A primitive as stored in its file, and the limits of its edits.
+    """A primitive with V vertices as stored in its file, and the limits of its edits.
 
     Attributes
     ----------
     arrays : SourcePrimitive
-        Positions, normals and triangles as numbers, V vertices.
+        Positions, normals, triangles and other attributes as numbers.
     column : dict of str to (V, B) uint8
-        Every vertex attribute by its name in the file: the B raw bytes of each vertex.
+        For each vertex attribute, by its name in the file, the B bytes that the file stores for each vertex.
     double_sided : bool
-        All its materials (of all variants) are double-sided.
+        Whether all materials of the primitive, including those of variants, are double-sided.
     blends : bool
-        A material is translucent: two equal faces cover more than one.
+        Whether a material has the alpha mode BLEND. Two equal faces then cover more than one face.
     reads_lightmap_uv : bool
-        A texture of the material uses TEXCOORD_1.
+        Whether a texture of a material uses TEXCOORD_1.
     locked : str
-        Why the primitive must stay as it is, as the end of a sentence; empty if it may be edited.
+        Why the primitive must not be changed, as the end of a sentence; empty if it may be edited.
     """
 
     arrays: SourcePrimitive
@@ -44,19 +44,19 @@ class EditablePrimitive:
 
 @dataclass(frozen=True)
 class PrimitiveEdit:
-    """The faces that remain of a primitive, and their new normals.
+    """The remaining faces of a primitive, and their new normals.
 
     Attributes
     ----------
     primitive : EditablePrimitive
     touched : bool
-        False: nothing is fixed, and the primitive stays as it is in the file.
-    triangle : (T, 3) int64, old vertices
-        Faces to be flipped are flipped already.
+        Whether anything is changed. If not, the primitive is written as it is in the file.
+    triangle : (T, 3) int64
+        The remaining faces, as indices of the vertices in the file. Faces to be flipped are already flipped.
     normal : (T, 3, 3) float32, unit, object space, or None
-        New normal of each corner; None keeps those of the file.
+        New normal of each face corner. None if the normals of the file are kept.
     turned : (T, 3) bool
-        Corners whose normal has changed sign.
+        The face corners whose normals are negated.
     """
 
     primitive: EditablePrimitive
@@ -74,22 +74,25 @@ def edit_with_flips(
     touched: bool,
     normals: NormalChoice | None = None,
 ) -> PrimitiveEdit:
-    """Return the edit of a primitive; normals of flipped faces are negated if they oppose the new front.
+    """Return the edit of a primitive. Normals that point away from the front of a flipped face are negated.
 
     Parameters
     ----------
     primitive : EditablePrimitive
+        The primitive as in the file.
     triangle : (T, 3) int64
-        The faces that remain, flipped already where `flip` is set.
+        The remaining faces. Those marked in `flip` are already flipped.
     flip : (T,) bool
+        The flipped faces.
     touched : bool
-        Something about the primitive is fixed.
+        Whether anything is changed.
     normals : NormalChoice or None
-        New normals of the corners, for the winding in the file.
+        New normals of the face corners, before any is negated.
 
     Returns
     -------
     PrimitiveEdit
+        The edit, for `apply_edit`.
     """
     normals = normals or NormalChoice(None)
     turned = np.zeros(triangle.shape, bool)
@@ -108,18 +111,19 @@ def edit_with_flips(
 
 
 def apply_edit(edit: PrimitiveEdit, uv: NDArray[np.float32] | None = None) -> EditedPrimitive | None:
-    """Make the new vertices of a primitive: equal ones are merged, unused ones are dropped.
+    """Make the new vertices of a primitive. Equal vertices are merged, and unused vertices are dropped.
 
     Parameters
     ----------
     edit : PrimitiveEdit
+        The remaining faces and their new normals.
     uv : (T, 3, 2) float32 or None
-        New TEXCOORD_1 of each corner.
+        New TEXCOORD_1 of each face corner. None if the TEXCOORD_1 of the file is kept.
 
     Returns
     -------
     EditedPrimitive or None
-        None if the primitive stays as it is in the file.
+        None if the primitive is not changed.
     """
     if not edit.touched and uv is None:
         return None
@@ -129,12 +133,12 @@ def apply_edit(edit: PrimitiveEdit, uv: NDArray[np.float32] | None = None) -> Ed
     column = [data for name, data in primitive.column.items() if name not in replaced]
     row = first_equal(column, len(primitive.arrays.position))[edit.triangle].reshape(-1)
     own: list[NDArray[np.generic]] = [row.reshape(-1, 1), edit.turned.reshape(-1, 1)]
-    # + 0 turns -0 into 0, which has other bits but is the same number.
+    # Add 0 to make -0 equal to 0, because bits are compared.
     normal = None if edit.normal is None else edit.normal.reshape(-1, 3) + np.float32(0.0)
     own += [] if normal is None else [normal]
     own += [] if uv is None else [uv.reshape(-1, 2)]
     corner, number = unique_rows(own, len(row))
-    # Sort the new vertices by their old ones, to keep the file's order.
+    # Sort the new vertices by the old vertices from which they are made, to keep the order of the file.
     order = np.argsort(row[corner], kind="stable")
     rank = np.zeros(len(order), np.int64)
     rank[order] = np.arange(len(order))

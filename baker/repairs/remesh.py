@@ -1,4 +1,4 @@
-"""Remeshes scans full of slivers into triangles of about equal sides."""
+"""Remeshes scans that consist largely of slivers into nearly equilateral triangles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from baker.repairs.primitive_edit import PrimitiveEdit
 from baker.repairs.welded_mesh import WeldedMesh
 from baker.topology.slivers import find_slivers
 
-# Least share of slivers and least number of faces of a mesh to remesh: a scan, not a wall of two triangles.
+# Share of slivers, and number of faces, from which a mesh is remeshed. The second excludes modelled objects
+# such as a wall of two triangles.
 MOST_SLIVERS = 0.1
 FEWEST_FACES = 500
 
@@ -24,10 +25,11 @@ class Remeshing:
     Attributes
     ----------
     made : ReplacedPrimitive
+        The new primitive.
     n_before, n_after : int
-        Slivers.
+        Number of slivers before and after.
     lost : tuple of str
-        Attributes that the new vertices do not have.
+        Names of the vertex attributes that the new vertices lack.
     """
 
     made: ReplacedPrimitive
@@ -37,34 +39,39 @@ class Remeshing:
 
 
 def needs_remeshing(mesh: WeldedMesh) -> bool:
-    """Return whether a mesh has so large a share of slivers that it is remeshed."""
+    """Return whether a mesh has enough faces, and a large enough share of slivers, to be remeshed."""
     if len(mesh.triangle) < FEWEST_FACES:
         return False
     return bool(find_slivers(mesh.corner).mean() >= MOST_SLIVERS)
 
 
 def remesh_primitive(mesh: WeldedMesh, edit: PrimitiveEdit) -> Remeshing:
-    """Remesh a mesh of one primitive into as many equilateral triangles as it has faces.
+    """Remesh a mesh that has one primitive.
+
+    The target edge length is that of equilateral triangles with the same total area and number of faces.
+    Normals and vertex colours are interpolated at the nearest points of the old surface.
 
     Parameters
     ----------
     mesh : WeldedMesh
+        The mesh.
     edit : PrimitiveEdit
-        Of its only primitive, with the mesh's faces in their order. Normals and vertex colours are taken from
-        the nearest points of the old surface.
+        The edit of the primitive. It has the same faces as the mesh, in the same order.
 
     Returns
     -------
     Remeshing
+        The new primitive, and the attributes that it lacks.
     """
     corner = mesh.corner
     area = (
         0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum()
     )
-    # An equilateral triangle of side s has the area sqrt(3) / 4 s^2.
+    # Solve area / n_faces = sqrt(3) / 4 side^2, the area of an equilateral triangle.
     side = float(np.sqrt(4.0 / np.sqrt(3.0) * area / len(mesh.triangle)))
     position, triangle = meshlab.remesh(mesh.position, mesh.triangle, side)
-    # Transfer from unshared vertices: at a crease one position has several normals.
+    # Transfer from a mesh with one vertex for each corner, because a position at a crease has several
+    # normals.
     arrays = edit.primitive.arrays
     unshared = mesh.position[mesh.triangle].reshape(-1, 3)
     own = np.arange(len(unshared)).reshape(-1, 3)

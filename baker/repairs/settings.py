@@ -9,18 +9,18 @@ from baker.core.settings_model import Settings, same_setting, setting
 
 
 class RepairSettings(Settings):
-    """Holds the settings of fixes and repairs, checked."""
+    """Settings of fixes and repairs. Values are validated when an object is created."""
 
     table: ClassVar[str] = "repair"
     what: ClassVar[str] = "repair setting"
 
     repair: bool = setting(
         False,
-        "Beside all fixes, repair the shape of meshes: non-manifold edges, holes, orientation, slivers"
+        "Fix, and also repair the shape of meshes: non-manifold edges, holes, orientation, slivers"
         " (needs pip install pymeshlab).",
     )
     resolution: int = setting(
-        1024, "Page width for which lightmap uv are tested and made.", unit="texels", ge=16, le=16384
+        1024, "Width of the page for which lightmap uv are tested and made.", unit="texels", ge=16, le=16384
     )
     up: Literal["y", "z"] = same_setting(BakeSettings, "up")
     scale: float = same_setting(BakeSettings, "scale")

@@ -1,6 +1,7 @@
-"""Repairs the shape of a mesh: edges of more than two faces, faces wound against others, small holes.
+"""Repairs the shape of a mesh: edges of more than two faces, inconsistent winding, and small holes.
 
-Faces and vertices keep all attributes of the file; the patch over a hole uses the vertices of the hole's rim.
+Faces and vertices keep all attributes of the file. The faces that close a hole, its patch, use the vertices
+at the border of the hole.
 """
 
 from __future__ import annotations
@@ -18,15 +19,17 @@ from baker.repairs.welded_mesh import WeldedMesh, distance, weld_primitives
 from baker.repairs.winding import count_edges, find_wrong_winding
 from baker.topology.weld import connected_vertices
 
-# A hole is small up to this number of edges and this share of the object's diagonal.
+# Largest hole that is closed: its number of edges, and its diagonal as a share of the mesh's diagonal.
 HOLE_EDGES = 30
 HOLE_SIZE = 0.05
-# Largest share of the object's diagonal by which a repair may move the surface, and of its area to remove.
+# Largest distance by which a repair may move the surface, as a share of the mesh's diagonal.
 FURTHEST = 0.01
+# Largest area that may be removed, as a share of the mesh's area.
 LARGEST_LOSS = 0.01
-# Cosine of the largest angle between a patch and the normals of its rim at which it takes them.
+# Cosine of the angle between the normal of a patch face and a vertex normal at the border of the hole. Below
+# it, the corner gets the normal of the face instead.
 _SAME_SIDE = 0.7
-# Share of faces without any neighbour above which a mesh is a soup.
+# Share of faces without any neighbour above which a mesh counts as a triangle soup.
 SOUP = 0.5
 
 
@@ -37,11 +40,12 @@ class ShapeRepair:
     Attributes
     ----------
     edits : tuple of PrimitiveEdit
-        One for each primitive; those that were not repaired are untouched.
+        One for each primitive. `touched` is False in the edits of primitives that were not repaired.
     before, after : WeldedMesh
+        The mesh before and after the repair.
     changes : tuple of Change
     left : tuple of str
-        Sentences about defects that are not repaired, with reasons.
+        One sentence for each defect that is not repaired, with the reason.
     """
 
     edits: tuple[PrimitiveEdit, ...]
@@ -52,15 +56,17 @@ class ShapeRepair:
 
 
 def repair_shape(primitives: Sequence[EditablePrimitive]) -> ShapeRepair:
-    """Repair a mesh of primitives none of which is locked.
+    """Repair the shape of a mesh.
 
     Parameters
     ----------
     primitives : sequence of EditablePrimitive
+        The primitives of the mesh. None of them may be locked.
 
     Returns
     -------
     ShapeRepair
+        The edits, and the defects that remain.
 
     Raises
     ------
@@ -94,7 +100,10 @@ def repair_shape(primitives: Sequence[EditablePrimitive]) -> ShapeRepair:
 
 
 def _make_manifold(mesh: WeldedMesh, changes: list[Change], left: list[str]) -> WeldedMesh:
-    """Remove faces until no edge belongs to more than two, unless that removes too much."""
+    """Remove faces so that no edge belongs to more than two faces.
+
+    The mesh is returned unchanged if this would remove too much area or move the surface too far.
+    """
     count = count_edges(mesh.triangle)
     n_bad = int((count > 2).sum())
     if not n_bad:
@@ -121,7 +130,11 @@ def _make_manifold(mesh: WeldedMesh, changes: list[Change], left: list[str]) -> 
 def _choose_flips(
     primitives: Sequence[EditablePrimitive], mesh: WeldedMesh, changes: list[Change]
 ) -> NDArray[np.bool_]:
-    """Return the (T,) mask of faces to flip, by their normals, their neighbours, or visibility."""
+    """Return (T,) bool: the faces to flip.
+
+    Connected faces are wound consistently. In a triangle soup, faces without neighbours are wound to agree
+    with their vertex normals. If these faces have no normals, their fronts are put on the less occluded side.
+    """
     normal = np.zeros(mesh.row.shape, np.float32)
     for k, primitive in enumerate(primitives):
         if primitive.arrays.normal is not None:
@@ -142,7 +155,7 @@ def _choose_flips(
 
 
 def _close_holes(mesh: WeldedMesh, changes: list[Change]) -> tuple[WeldedMesh, NDArray[np.bool_]]:
-    """Close small holes; return the mesh and the (T,) mask of its new faces, which are the last ones."""
+    """Close small holes. Return the new mesh, and the mask (T,) of added faces, which are the last ones."""
     n = len(mesh.triangle)
     n_open = int((count_edges(mesh.triangle) == 1).sum())
     if not n_open or (count_edges(mesh.triangle) > 2).any():
@@ -152,12 +165,12 @@ def _close_holes(mesh: WeldedMesh, changes: list[Change]) -> tuple[WeldedMesh, N
         new = new[_small(mesh, new)]
     if not len(new):
         return mesh, np.zeros(n, bool)
-    # A corner of a patch takes the vertex of the first face that has a corner at its position.
+    # For each corner of the patches, use the vertex of the first face with a corner at the same position.
     order = np.argsort(mesh.triangle.ravel(), kind="stable")
     at = order[np.searchsorted(mesh.triangle.ravel()[order], new.ravel())].reshape(-1, 3)
     owner = mesh.owner[at[:, 0] // 3]
     row = mesh.row.ravel()[at]
-    # Where these vertices belong to different primitives, find one that has all three positions.
+    # If the three vertices of a face are of different primitives, find a primitive with all three positions.
     for k in np.flatnonzero((mesh.owner[at // 3] != owner[:, None]).any(axis=1)):
         owner[k], row[k] = _rows_of_one_primitive(mesh, new[k], int(owner[k]))
     sound = (row >= 0).all(axis=1)
@@ -178,7 +191,10 @@ def _close_holes(mesh: WeldedMesh, changes: list[Change]) -> tuple[WeldedMesh, N
 def _rows_of_one_primitive(
     mesh: WeldedMesh, vertex: NDArray[np.int64], owner: int
 ) -> tuple[int, tuple[int, ...]]:
-    """Return the first primitive with all (3,) welded vertices, and its rows; or `owner` and -1 thrice."""
+    """Return the first primitive that has vertices at three positions, and the indices of these vertices.
+
+    `vertex` (3,) are welded vertices. Without such a primitive, `owner` and three times -1 are returned.
+    """
     for k in np.unique(mesh.owner):
         own = mesh.owner == k
         corner, row = mesh.triangle[own].ravel(), mesh.row[own].ravel()
@@ -191,9 +207,10 @@ def _rows_of_one_primitive(
 def _patch_normals(
     edit: PrimitiveEdit, patched: NDArray[np.bool_], front: NDArray[np.float64]
 ) -> PrimitiveEdit:
-    """Set normals of patches to the face normal at corners where the rim's normals differ from it.
+    """Replace vertex normals of patch faces that deviate from the face normal by too much.
 
-    `patched` is the (T,) mask of patch faces and `front` their (T, 3) area vectors.
+    `patched` (T,) marks the patch faces, and `front` (T, 3) are the area vectors of all faces. A replaced
+    normal is the face normal.
     """
     given = edit.primitive.arrays.normal
     if given is None or not patched.any():
@@ -209,7 +226,7 @@ def _patch_normals(
 
 
 def _small(mesh: WeldedMesh, new: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which (K, 3) new faces belong to patches smaller than `HOLE_SIZE`, (K,) bool."""
+    """Return (K,) bool: the new faces (K, 3) of patches that are small enough, see `HOLE_SIZE`."""
     patch = connected_vertices(new, len(mesh.position))
     n = int(patch.max()) + 1
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
@@ -222,7 +239,7 @@ def _small(mesh: WeldedMesh, new: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _area_vector(mesh: WeldedMesh) -> NDArray[np.float64]:
-    """Return face normals as long as twice the area, (T, 3) float64."""
+    """Return the face normals, scaled by twice the area, (T, 3) float64."""
     a, b, c = (mesh.position[mesh.triangle[:, k]].astype(np.float64) for k in range(3))
     return np.asarray(np.cross(b - a, c - a))
 
@@ -232,7 +249,7 @@ def _area(mesh: WeldedMesh) -> NDArray[np.float64]:
 
 
 def _without_neighbour(triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which (T, 3) faces share no edge with another, (T,) bool."""
+    """Return (T,) bool: the faces (T, 3) that share no edge with another face."""
     start, end = triangle.ravel(), np.roll(triangle, -1, axis=1).ravel()
     key = np.minimum(start, end) * (int(triangle.max(initial=0)) + 1) + np.maximum(start, end)
     _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)

@@ -1,4 +1,4 @@
-"""A mesh with one vertex for each position, for repairs, and the distance between two of them."""
+"""A mesh with one vertex for each position, and the distance between two such meshes."""
 
 from __future__ import annotations
 
@@ -16,16 +16,18 @@ from baker.topology.unique_rows import first_equal, unique_rows
 
 @dataclass(frozen=True)
 class WeldedMesh:
-    """The faces of a mesh's primitives over vertices that differ in position.
+    """The faces of all primitives of a mesh, with one vertex for each position.
 
     Attributes
     ----------
     position : (P, 3) float32, object space
-    triangle : (T, 3) int64, rows of `position`
+        The distinct positions.
+    triangle : (T, 3) int64
+        Indices into `position`.
     owner : (T,) int64
-        Primitive that each face belongs to.
+        Index of each face's primitive.
     row : (T, 3) int64
-        Vertex of each corner in its primitive.
+        Index of each corner's vertex in its primitive.
     """
 
     position: NDArray[np.float32]
@@ -35,7 +37,7 @@ class WeldedMesh:
 
     @property
     def diagonal(self) -> float:
-        """Return the diagonal of the bounding box of the faces, in object space."""
+        """Return the length of the diagonal of the faces' bounding box, in object space."""
         used = self.position[self.triangle].reshape(-1, 3)
         return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0))) if len(used) else 0.0
 
@@ -50,7 +52,7 @@ class WeldedMesh:
 
 
 def weld_primitives(primitives: Sequence[EditablePrimitive]) -> WeldedMesh:
-    """Return the drawn faces of all primitives as one mesh: those with usable coordinates and an area."""
+    """Return one mesh of all primitives, without faces that have unusable coordinates or no area."""
     start = np.cumsum([0] + [len(p.arrays.position) for p in primitives])
     position = np.concatenate([p.arrays.position for p in primitives])
     row = np.concatenate([p.arrays.triangle for p in primitives])
@@ -63,9 +65,9 @@ def weld_primitives(primitives: Sequence[EditablePrimitive]) -> WeldedMesh:
 
 
 def distance(one: WeldedMesh, two: WeldedMesh) -> float:
-    """Return the Hausdorff distance of two surfaces: the largest distance of a point of one from the other.
+    """Return the Hausdorff distance: the largest distance from a point on either surface to the other.
 
-    Faces that both have in common contribute 0 and are not sampled.
+    Faces that both meshes have contribute 0 and are not sampled.
     """
     largest = 0.0
     for sampled, target in ((one, two), (two, one)):

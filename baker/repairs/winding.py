@@ -1,8 +1,11 @@
-"""Finds faces of closed pieces that are wound against the others.
+"""Finds faces of closed pieces that are wound against the rest of their piece.
 
-A piece is closed if each of its edges belongs to exactly two faces; then one of its sides is the outside.
-If the vertex normals agree over most of the piece's area, the front is the side that they point to. Otherwise
-it is the side that most of the area has as its front in the file; if that is half of it, the outside.
+A piece is a set of faces that are connected by edges. It is closed if each of its edges belongs to exactly
+two faces. The intended front of a piece is determined by the first rule that gives an answer:
+
+1. the side to which the vertex normals point, if they agree over most of the piece's area;
+2. the side that is the front of more than half of the area in the file;
+3. the outside, by the signed volume.
 """
 
 from __future__ import annotations
@@ -14,23 +17,23 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected, number_by_first
 
-# The vertex normals decide if the mean of sign(vertex normal . face normal) over a piece's area is above
-# this, in absolute value. For the mean, all faces are wound like the first one.
+# |area-weighted mean of sign(vertex normal . face normal)| of a piece, above which rule 1 applies. The mean
+# is computed with all faces wound consistently with the first face of the piece.
 _CLEAR = 0.5
 
 
 @dataclass(frozen=True)
 class Winding:
-    """Defects of the winding of a mesh's faces.
+    """Faces of a mesh with wrong winding.
 
     Attributes
     ----------
     flip : (T,) bool
-        Faces to be flipped.
+        The faces to flip.
     n_pieces : int
-        Closed pieces with faces to be flipped.
+        Number of closed pieces with faces to flip.
     n_one_sided : int
-        Closed pieces that cannot be wound consistently (like a Klein bottle).
+        Number of closed pieces that cannot be wound consistently, such as a Klein bottle.
     """
 
     flip: NDArray[np.bool_]
@@ -51,16 +54,17 @@ def find_wrong_winding(
     ----------
     position : (P, 3) float32
     corner : (T, 3) int64
-        Rows of `position` of each face's corners. The three rows of a face differ, and corners of different
-        faces at the same position have the same row.
+        The faces, as indices into `position`. The three indices of a face differ, and corners at the same
+        position have the same index.
     normal : (T, 3) float32 or None
-        Mean of the vertex normals of each face, zero where the file has none.
+        Mean vertex normal of each face, zero for faces without vertex normals.
     open_too : bool
-        Include open pieces of which no edge belongs to more than two faces.
+        Whether open pieces are included, if no edge of the piece belongs to more than two faces.
 
     Returns
     -------
     Winding
+        The faces to flip.
     """
     n = len(corner)
     edge = _Edges(corner)
@@ -75,10 +79,10 @@ def find_wrong_winding(
 
     a, b, c = (position[corner[:, k]].astype(np.float64) for k in range(3))
     double_area = np.cross(b - a, c - a)
-    # +1: wound like the piece's first face, -1: against it.
+    # Set `sign` to +1 for faces wound consistently with the first face of their piece, and -1 for the others.
     sign = np.where(first_side, 1.0, -1.0)
     area = np.linalg.norm(double_area, axis=1)
-    # Signed volume of each piece, relative to one of its own corners to lose few digits.
+    # Compute the signed volume of each piece, relative to one of its corners to reduce rounding errors.
     anchor = np.zeros((n_pieces_all, 3))
     anchor[piece[::-1]] = a[::-1]
     a, b, c = (p - anchor[piece] for p in (a, b, c))
@@ -89,8 +93,8 @@ def find_wrong_winding(
     if normal is not None:
         agree = np.sign(np.einsum("ij,ij->i", double_area, normal.astype(np.float64)))
         by_normal = np.bincount(piece, sign * area * agree, n_pieces_all) / total
-    # `right` is +1 if the first face of the piece is wound correctly, else -1. The normals decide it; if they
-    # do not agree, the area; if that is balanced, the signed volume.
+    # Set `right` to +1 if the first face of the piece is wound correctly, else to -1, by the first rule that
+    # applies: normals, area, signed volume.
     outside = np.where(volume >= 0, 1.0, -1.0)
     leaning = np.where(np.abs(as_wound) > 1e-9, np.sign(as_wound), outside)
     right = np.where(np.abs(by_normal) > _CLEAR, np.sign(by_normal), leaning)
@@ -100,25 +104,25 @@ def find_wrong_winding(
 
 
 def count_edges(corner: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the number of faces at each edge of a mesh, (E,) int64; `corner` (T, 3) are its faces."""
+    """Return the number of faces at each edge of a mesh, (E,) int64; `corner` (T, 3) are the mesh's faces."""
     return _Edges(corner).count
 
 
 class _Edges:
-    """The edges of (T, 3) triangles, sorted so that equal ones are neighbours.
+    """The half edges of triangles (T, 3), sorted so that half edges of the same edge are consecutive.
 
     Attributes
     ----------
     face : (3T,) int64
-        Face of each sorted half edge.
+        Face of each half edge.
     rising : (3T,) bool
-        The face runs along the edge from the lower vertex to the higher one.
+        Whether the half edge runs from the vertex with the lower index to the one with the higher index.
     number : (3T,) int64
-        Edge of each half edge.
+        Edge number of each half edge.
     count : (E,) int64
-        Faces at each edge.
+        Number of faces at each edge.
     second : (K,) int64
-        Sorted half edges whose predecessor belongs to the same edge.
+        Indices of the half edges whose predecessor is of the same edge.
     """
 
     def __init__(self, corner: NDArray[np.int64]) -> None:
@@ -136,7 +140,7 @@ class _Edges:
         self.second = np.flatnonzero(~new)
 
     def pieces(self, n_faces: int, *, open_too: bool) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the (T,) piece of each face, and the (P,) mask of closed pieces.
+        """Return the piece of each face (T,), and the mask of closed pieces (P,).
 
         With `open_too`, a piece counts as closed if none of its edges belongs to more than two faces.
         """
@@ -152,12 +156,13 @@ class _Edges:
 def _orient(
     edge: _Edges, n: int, closed_face: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return the (n,) masks of faces wound like the first of their piece, and of faces of one-sided pieces.
+    """Return two masks of faces, (n,): wound like the first face of the piece, and of one-sided pieces.
 
-    A graph has two nodes for each face: as it is (f), and flipped (f + n). Neighbours that run along their
-    edge in opposite directions agree, so f is connected to g and f + n to g + n; otherwise f to g + n and
-    f + n to g. A piece that can be oriented consists of two components, one for each side; in a one-sided
-    piece f and f + n are connected.
+    A graph has two nodes for each face: node f is the face as it is, and node f + n the flipped face. The
+    edges of the graph depend on the half edges of two neighbouring faces f and g. If they run in opposite
+    directions, the faces are wound consistently, and f is connected to g, and f + n to g + n. Otherwise f is
+    connected to g + n, and f + n to g. A piece that can be oriented forms two components of the graph, one
+    for each orientation. In a one-sided piece, f and f + n are in the same component.
     """
     second = edge.second[closed_face[edge.face[edge.second]]]
     a, b = edge.face[second - 1], edge.face[second]
@@ -168,7 +173,7 @@ def _orient(
         2 * n,
     )
     one_sided = label[:n] == label[n:]
-    # Components are numbered by first occurrence, and unflipped faces come first.
+    # Components are numbered by first occurrence, so the component with the unflipped first face is lower.
     return label[:n] < label[n:], one_sided
 
 

@@ -1,4 +1,4 @@
-"""Writes a fixed scene completely or not at all; replaces an existing file only with `force`."""
+"""Writes a fixed scene to a file, either completely or not at all."""
 
 from __future__ import annotations
 
@@ -10,23 +10,24 @@ from baker.io.temporary import write_atomically
 
 
 def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
-    """Check, before the work, that a fixed scene may be written to `out`.
+    """Check that a fixed scene can be written to `out`, before the scene is fixed.
 
     Parameters
     ----------
     out : Path
-        The GLB to write.
+        The GLB file to write.
     scene : Path
-        The input, which is never written over.
+        The input file, which is never overwritten.
     force : bool
-        Also replace a file that exists.
+        Whether an existing file may be replaced.
 
     Raises
     ------
     SettingsError
-        If `out` is no GLB name, a folder, the input itself, or exists and `force` is not set.
+        If the name does not end in .glb, or `out` is a folder or the input file, or `out` exists and `force`
+        is not set.
     ResourceError
-        If nothing can be written there.
+        If the folder is not writable.
     """
     if out.suffix.lower() != ".glb":
         raise SettingsError("a fixed scene is a GLB; name a file that ends in .glb", file=str(out))
@@ -45,18 +46,18 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
 
 
 def write_fixed(out: Path, data: bytes) -> None:
-    """Write a fixed scene in one step.
+    """Write a fixed scene atomically.
 
     Parameters
     ----------
     out : Path
-        The file.
+        The file to write.
     data : bytes
-        The GLB.
+        The content, a GLB.
 
     Raises
     ------
     ResourceError
-        If it cannot be written; a file that was there is unchanged.
+        If the file cannot be written. An existing file is then unchanged.
     """
     write_atomically(out, data, "fixed scene")

@@ -1,7 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Pieces of triangles inside texels, independent of the rasteriser of the bake.
+"""Pieces of triangles inside texels.
 
-Each triangle is clipped to the square of each texel that it may touch (`baker.kernels.clip`).
+A piece is the polygon in which a triangle, in uv, overlaps the square of a texel. It is found by clipping
+(`baker.kernels.clip`), independent of the rasteriser of the bake.
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
 
@@ -24,9 +25,10 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 @inner
 def _box(corner, size):
-    """Return first column, last column, first row, last row of texels that a triangle may touch.
+    """Return the first column, last column, first row and last row of the texels that a triangle may touch.
 
-    corner : (3, 2) float64, its uv in texels; size : int, width and height of the page in texels
+    corner : (3, 2) float64, uv of the triangle's corners in texels
+    size : int, width and height of the page in texels
     """
     low_x = smaller(smaller(corner[0, 0], corner[1, 0]), corner[2, 0])
     high_x = larger(larger(corner[0, 0], corner[1, 0]), corner[2, 0])
@@ -40,12 +42,16 @@ def _box(corner, size):
 
 @kernel
 def texel_owners(uv, triangle, page, instance, size, owner, most):
-    """Find the instance that covers most of each texel.
+    """For each texel, find the instance of the triangle that covers most of it.
 
-    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32; page, instance : (T,) int32
+    N is the number of texels of all pages.
+
+    uv : (V, 2) float32, lightmap uv of the vertices, 0 to 1
+    triangle : (T, 3) int32, indices into `uv`
+    page, instance : (T,) int32, page and instance of each triangle
     size : int, width and height of a page in texels
-    owner : (N,) int32 output, the instance; unchanged where none covers more than `most`
-    most : (N,) float32 in and output, area that it covers in texels
+    owner : (N,) int32 output, the instance; unchanged if no triangle covers more than `most`
+    most : (N,) float32 in and output, largest area that a triangle covers, in texels
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
@@ -64,15 +70,20 @@ def texel_owners(uv, triangle, page, instance, size, owner, most):
 
 @kernel
 def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):
-    """Count the pieces of triangles inside wanted texels, or store them if `write` is not empty.
+    """Count the pieces of triangles inside n selected texels, or store them if `write` is not empty.
 
-    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32; page : (T,) int32
+    N is the number of texels of all pages, and m the number of pieces.
+
+    uv : (V, 2) float32, lightmap uv of the vertices, 0 to 1
+    triangle : (T, 3) int32, indices into `uv`
+    page : (T,) int32, page of each triangle
     size : int, width and height of a page in texels
-    wanted : (N,) int32, row i of each texel in the list of n wanted ones, or -1
-    at : (n,) int64 in and output, first index at which pieces of row i are stored; incremented for each piece
-    piece, corners : (m,) int64 output, triangle and number of corners of each piece
-    polygon : (m, MAX_CORNERS, 2) float64 output, its corners in the texel's square
-    area : (m,) float64 output, its area in texels
+    wanted : (N,) int32, number i of each texel among the selected texels, -1 if it is not selected
+    at : (n,) int64 in and output, index at which the next piece of texel i is stored
+    piece, corners : (m,) int64 output, triangle of each piece, and number of corners of its polygon
+    polygon : (m, MAX_CORNERS, 2) float64 output, corners of each piece, relative to the texel's square
+    write : (0 or 1,) int64, empty to count the pieces only
+    area : (m,) float64 output, area of each piece in texels
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
     for t in range(len(triangle)):
@@ -101,18 +112,19 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
 def spread_pieces(
     uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):
-    """Choose points uniformly in the area of each texel's pieces.
+    """Choose k points in the pieces of each texel, with uniform density in uv.
 
-    uv : (V, 2) float32, lightmap uv, 0 to 1; triangle : (T, 3) int32
+    uv : (V, 2) float32, lightmap uv of the vertices, 0 to 1
+    triangle : (T, 3) int32, indices into `uv`
     size : int, width and height of a page in texels
     pixel : (n,) int64, (page * size + row) * size + column
-    start : (n + 1,) int64, first piece of each texel
-    piece, corners, polygon, area : pieces as `texel_pieces` stores them
-    random : (n, k, 3) float64, 0 to 1, numbers for the piece and for the point in it
+    start : (n + 1,) int64, index of the first piece of each texel; the last entry is the number of pieces
+    piece, corners, polygon, area : the pieces, as `texel_pieces` stores them
+    random : (n, k, 3) float64, 0 to 1, random numbers: one selects the piece, two the point in it
     found : (n, k) int64 output, triangle of each point
-    weight : (n, k, 3) float64 output, its barycentric coordinates
-    covered : (n,) float64 output, area of all pieces in texels
-    middle : (n, 2) float64 in and output, mean of the points in the texel's square, 0 to 1 (column, row)
+    weight : (n, k, 3) float64 output, barycentric coordinates of each point
+    covered : (n,) float64 output, total area of each texel's pieces, in texels
+    middle : (n, 2) float64 in and output, the mean of each texel's points is added, 0 to 1 (column, row)
     """
     for i in range(len(pixel)):
         # Sum the area of the texel's pieces.
@@ -131,13 +143,13 @@ def spread_pieces(
                 e += 1
             if e >= last:
                 continue
-            # Choose a point in it, uniformly.
+            # Choose a point in the piece, uniformly.
             x, y = polygon_point(polygon[e], corners[e], random[i, k, 1], random[i, k, 2])
             middle[i, 0] += x / random.shape[1]
             middle[i, 1] += y / random.shape[1]
             x += rest % size
             y += rest // size
-            # Compute its barycentric coordinates.
+            # Compute the barycentric coordinates of the point.
             t = piece[e]
             a, b, c = triangle[t, 0], triangle[t, 1], triangle[t, 2]
             ax, ay = float(uv[a, 0]) * size, float(uv[a, 1]) * size
