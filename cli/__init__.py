@@ -1,1 +1,1 @@
-"""The command line: arguments, progress, printing; no maths."""
+"""The command line: parses arguments, calls the library, shows progress and prints results."""

@@ -1,4 +1,4 @@
-"""Lets `python -m baker.cli` be the command too."""
+"""Runs the command `baker` for `python -m baker.cli`."""
 
 from baker.cli.app import main
 

@@ -6,5 +6,5 @@ from baker.cli.bake import bake_command
 from baker.cli.command import command
 from baker.core.settings import BakeSettings
 
-# A configuration file's channels do not count.
+# `fixed` also overrides the channels of a configuration file.
 ao = command("ao", BakeSettings, fixed={"channels": "ao"})(bake_command)

@@ -1,7 +1,7 @@
-"""The `baker` command: finds the subcommand, runs it, turns failures into exit codes.
+"""The `baker` command: finds the subcommand, runs it, and converts failures to exit codes.
 
-No heavy module is imported here, so that `baker --help` is quick: the module of a subcommand, and with it the
-settings, is imported only for that subcommand.
+No module that is slow to import is imported here, so that `baker --help` is fast. The module of a subcommand
+and the settings are imported only if that subcommand runs.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from baker.cli.supervise import INTERRUPTED, supervise
 
 
 def main() -> None:
-    """Run the command line of this process; never returns."""
+    """Run the command line of this process. This function does not return; it ends the process."""
     argv = sys.argv[1:]
-    # Collect garbage less often: imports create many objects but no cycles, and collections took 5 % of the
-    # start.
+    # Collect garbage less often, because imports create many objects but no cycles. Collections took 5 % of
+    # the start-up time.
     gc.set_threshold(100_000, 20, 100)
     for stream in (sys.stdout, sys.stderr):
-        # Escape characters that the terminal's encoding lacks.
+        # Escape characters that the encoding of the terminal lacks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     stop, notes = supervise(argv)
@@ -40,13 +40,13 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
     Parameters
     ----------
     argv : list of str
-        Arguments without the program's name.
+        Arguments, without the name of the program.
     out : TextIO or None
-        Standard output.
+        Stream for standard output. None: `sys.stdout`.
     stop : StopFlag or None
-        Set by a signal; None for a run without signals.
+        Flag that is set by stopping signals. None: signals are not handled.
     notes : int or None
-        See `supervise`.
+        Descriptor of the file for `note_output`, see `supervise`.
     """
     out = out if out is not None else sys.stdout
     try:
@@ -59,7 +59,7 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         out.flush()
         return code
     except (SystemExit, BrokenPipeError):
-        # The reader (`| head`) closed the pipe; typer turns that into an exit.
+        # The reader of the pipe, such as `head`, has closed it. typer may convert this error to an exit.
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
@@ -73,7 +73,7 @@ def _dispatch(argv: list[str], session: Any) -> int:
 
     code = make_app().main(args=argv, prog_name="baker", standalone_mode=False, obj=session)
     if code == INTERRUPTED:
-        # typer turned the interrupt into an exit code; the message and the JSON are still to be written.
+        # typer converts the interrupt to an exit code. Raise it again, so that message and JSON are written.
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
 
@@ -83,13 +83,14 @@ def _asks_json(argv: list[str]) -> bool:
 
 
 def _verbosity(argv: list[str]) -> int:
-    # Count the flags in the unparsed arguments: after a usage error there is no parsed value.
+    # Count the flags in the unparsed arguments, because after a usage error there is no parsed value.
     count = argv.count("--verbose")
     return count + sum(len(word) - 1 for word in argv if word[:1] == "-" and set(word[1:]) == {"v"})
 
 
 def _reserve_stdout() -> TextIO:
-    # Native libraries may print to descriptor 1; with --json it must contain one object only.
+    # Redirect descriptor 1 to stderr, because native libraries may print to it. With --json, standard output
+    # must contain only the JSON object.
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return out
@@ -103,8 +104,8 @@ def _silence(stream: TextIO) -> None:
 
 
 def _leave(code: int) -> None:
-    # Not sys.exit: freeing compiled code and arrays one by one takes half a second, and after an interruption
-    # it would wait for kernels that still run in worker threads.
+    # Use os._exit instead of sys.exit, which takes half a second to free compiled code and arrays. After an
+    # interruption, sys.exit would also wait for kernels that still run in worker threads.
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

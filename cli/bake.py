@@ -1,4 +1,4 @@
-"""`baker bake SCENE -o OUT`: the main job."""
+"""`baker bake SCENE -o OUT`: bakes a scene."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Force = Annotated[bool, typer.Option("--force", help="Replace OUT even if baker 
 def bake_command(
     ctx: typer.Context, scene: Scene, out: Out, force: Force = False, cluster: Cluster = None
 ) -> None:
-    """Bake, show progress, and report the files written."""
+    """Bake a scene, show progress, and report the files written."""
     from baker.cli.report import bake_json, write_summary
 
     run: Run = ctx.obj
     settings = run.of(BakeSettings)
     run.session.will_write(str(out))
     with run.progress() as progress:
-        # Import here, after the progress is shown: importing the kernels takes a moment.
+        # Import these modules after progress is shown, because importing the kernels takes a moment.
         from baker.trace.numba_start import skip_blas
 
         skip_blas()
         from baker.io.bake.lock import held
         from baker.pipeline.bake import bake
 
-        # Exclude the objects that exist now from garbage collection: it took 4 % of a first bake, which
-        # compiles.
+        # Exclude the objects that exist now from garbage collection. It took 4 % of the time of a first bake,
+        # which compiles kernels.
         gc.freeze()
         spread: dict[str, Any] = (
             {} if cluster is None else {"executor": _tile_executor(cluster, settings.threads)}

@@ -24,7 +24,7 @@ def batch(
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
     cluster: Cluster = None,
 ) -> None:
-    """Bake the jobs that are not up to date, show their common progress, and report."""
+    """Bake the jobs that are not up to date, show the progress of all jobs together, and report."""
     from baker.jobs.report import run_jobs_file
     from baker.jobs.run import write_junit
 
@@ -58,7 +58,7 @@ def _on_cluster(address: str, threads: int | None) -> JobExecutor:
 
 
 def write_table(outcomes: Sequence[Outcome], stream: TextIO, *, dry_run: bool) -> None:
-    """Write a line for each job and the sums."""
+    """Write one line for each job, and a line with the number of jobs in each state."""
     words = {"baked": "would bake"} if dry_run else {}
     width = max(len(str(outcome.job.scene)) for outcome in outcomes)
     for outcome in outcomes:

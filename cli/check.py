@@ -26,7 +26,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Checked:
-    """All that a check made."""
+    """The results of `baker check`.
+
+    Attributes
+    ----------
+    reports : list of CheckReport
+        One for each scene that could be read.
+    unreadable : list of Unreadable
+        One for each scene that could not be read.
+    request : FixRequest or None
+        The request of `--fix` or `--repair`.
+    fixed : FixResult or None
+        Its result.
+    """
 
     reports: list[CheckReport]
     unreadable: list[Unreadable]
@@ -49,7 +61,7 @@ def check(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o replace a file that exists.")] = False,
 ) -> None:
-    """Check every scene and report."""
+    """Check the scenes and report the findings. With `--fix`, fix the scene first and check the result."""
     run: Run = ctx.obj
     request = fix_request(scenes, run.of(RepairSettings), fix=fix, out=out, force=force)
     found = _work(run, scenes, request)
@@ -72,14 +84,14 @@ def _work(run: Run, scenes: list[Path], request: FixRequest | None) -> _Checked:
         if request is not None:
             run.session.will_write(str(request.out))
             fixed = fix_scene(request, progress)
-            # Check the result as it was written: in metres, +Y up.
+            # Check the fixed scene with up="y" and scale=1, because it was written in metres with +Y up.
             scenes, settings = [request.out], settings.model_copy(update={"up": "y", "scale": 1.0})
         reports, unreadable = check_scenes(find_scenes(scenes), run.of(CheckSettings), settings, progress)
     return _Checked(reports, unreadable, request, fixed)
 
 
 def _report(run: Run, found: _Checked) -> None:
-    """Write the outcome as text and, if wanted, as JSON."""
+    """Write the results as text and, with `--json`, as JSON."""
     from baker.checks.report import report_json, write_text
 
     settings = run.of(CheckSettings)

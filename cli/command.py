@@ -1,4 +1,4 @@
-"""The decorator of commands: adds the flags of settings, and runs the steps that all commands share."""
+"""The decorator of subcommands: adds flags for settings, and runs the steps that all subcommands share."""
 
 from __future__ import annotations
 
@@ -26,17 +26,19 @@ _S = TypeVar("_S", bound=Settings)
 
 @dataclass
 class Run:
-    """One command line, parsed: `ctx.obj` of a command.
+    """One parsed command line. A subcommand receives it as `ctx.obj`.
 
     Attributes
     ----------
     session : Session
     as_json, quiet : bool
+        Whether `--json` and `--quiet` were given.
     verbose : int
+        How often `--verbose` was given.
     given : dict
-        Settings that were on the command line.
+        Settings that were given on the command line, by name.
     settings : dict
-        The settings by their model, from defaults, configuration file and command line.
+        Settings by model, combined from defaults, configuration file and command line.
     """
 
     session: Session
@@ -52,18 +54,18 @@ class Run:
 
     @contextmanager
     def progress(self) -> Iterator[Reporter]:
-        """Show progress; begins with the stage "start", since importing the kernels takes a moment."""
+        """Show progress. It begins with the stage "start", because importing the kernels takes a moment."""
         with self.session.reporter(quiet=self.quiet) as reporter:
             reporter(Stage.START, 0.0)
             yield reporter
 
     @property
     def text(self) -> TextIO:
-        """Return the stream for the command's text; settings in it are written as flags."""
+        """Return the stream for text output. It converts names of settings to flags."""
         return cast("TextIO", FlagStream(self.session.text_stream(as_json=self.as_json)))
 
 
-# Flags of every command.
+# Flags that every subcommand has.
 _COMMON: list[tuple[str, Any, Any]] = [
     (
         "as_json",
@@ -84,7 +86,7 @@ _COMMON: list[tuple[str, Any, Any]] = [
 ]
 _CONFIG = Annotated[Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")]
 
-# `--cluster`, of the commands that can work on more than one machine.
+# The flag `--cluster`, for subcommands that can use more than one machine.
 Cluster = Annotated[
     str | None,
     typer.Option(
@@ -98,23 +100,23 @@ Cluster = Annotated[
 def command(
     name: str, *models: type[Settings], fixed: dict[str, Any] | None = None
 ) -> Callable[[Callable[..., None]], Callable[[], Any]]:
-    """Make a subcommand of a function with a typer signature.
+    """Return a decorator that makes a subcommand of a function with a typer signature.
 
     Parameters
     ----------
     name : str
-        Of the subcommand, as in `commands.COMMANDS`.
+        Name of the subcommand, as in `commands.COMMANDS`.
     *models : type of Settings
-        Models whose fields become flags; of fields with the same name the first counts.
-        With a model that has a table, `--config` is a flag as well.
+        Models whose fields become flags. If two models have a field with the same name, the flag is that of
+        the first model. If a model has a table of the configuration file, the flag `--config` is added.
     fixed : dict, optional
-        Settings that have this value and no flag.
+        Settings with a fixed value. They have no flag.
 
     Returns
     -------
     callable
-        A decorator. The function it makes returns the subcommand; the function it takes is called with the
-        context, whose `obj` is a `Run`, and its own arguments.
+        The decorator. It replaces the function by one that returns the subcommand. The subcommand calls the
+        original function with a context, whose `obj` is a `Run`, and its further arguments.
     """
     fixed = fixed or {}
 
@@ -133,13 +135,13 @@ def command(
 
 
 class _SettingsCommand(TyperCommand):
-    """Is a command with the flags of settings beside its own."""
+    """A subcommand that has flags for settings in addition to its own arguments."""
 
     models: tuple[type[Settings], ...] = ()
     fixed: dict[str, Any]
 
     def add_settings(self, models: tuple[type[Settings], ...], fixed: dict[str, Any]) -> None:
-        """Append the flags of `models` and the common ones, without those of `fixed`."""
+        """Append the flags of `models`, except the settings `fixed`, and the flags of every subcommand."""
         self.models, self.fixed = models, fixed
         fields = {
             name: field
@@ -152,7 +154,7 @@ class _SettingsCommand(TyperCommand):
             ("config", _CONFIG, None) for _ in [0] if any(model.table for model in models)
         ]
         flags += [(name, _annotation(name, fields[name]), None) for name in ordered]
-        # typer reads a signature; that of a dataclass is made of its fields.
+        # typer makes flags from a signature. Make a dataclass, because its signature consists of its fields.
         holder = make_dataclass("Flags", [*flags, *_COMMON], kw_only=True)
         app = typer.Typer(add_completion=False)
         app.command()(holder)
@@ -160,7 +162,7 @@ class _SettingsCommand(TyperCommand):
         self.flag_names = [name for name, _, _ in flags]
 
     def invoke(self, ctx: Any) -> Any:
-        """Resolve settings and call the command with its own arguments."""
+        """Combine settings from all sources, and call the function of the subcommand."""
         from baker.cli.config import resolve
 
         session: Session = ctx.obj
@@ -180,7 +182,7 @@ class _SettingsCommand(TyperCommand):
 
 
 def _annotation(name: str, field: Any) -> Any:
-    """Return the annotation of a flag: None if it is not given, else a value that the model checks."""
+    """Return the type annotation of a flag for typer. Values are text or None; the model validates them."""
     if is_switch(field):
         option = typer.Option(flag_of(name, field), help=help_of(field), show_default=False)
         return Annotated[bool | None, option]

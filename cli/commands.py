@@ -1,8 +1,8 @@
-"""The subcommands and their summaries, in the order of the help."""
+"""The names and summaries of the subcommands, in the order of the help."""
 
 from __future__ import annotations
 
-# Subcommand -> the line shown in the list; the module of the same name in this package defines it.
+# Summary of each subcommand by its name. The module with this name in this package defines the subcommand.
 COMMANDS = {
     "bake": "Bake a scene: unwrap, trace, solve, write lightmaps and scene.glb.",
     "ao": "Bake ambient occlusion only.",

@@ -1,4 +1,4 @@
-"""Reads settings from a TOML file; the command line has the last word."""
+"""Combines settings from defaults, a TOML file and the command line, each overriding the one before."""
 
 from __future__ import annotations
 
@@ -11,34 +11,35 @@ from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings_model import Settings
 
-# Its keys may also be at the top level of the file.
+# The table whose keys may also be at the top level of the file.
 TOP_TABLE = "bake"
-# Tables of a configuration file, one for each model of settings that has one.
+# Names of all tables that a configuration file may have.
 TABLES = ("bake", "check", "verify", "render", "diff", "repair")
-# Lists of a file to which the command line adds.
+# Settings that are lists. Values from the command line are added to those of the file.
 _ADDED = {"ignore"}
 
 
 def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
-    """Return the keys of one table of a configuration file, none if it is not there.
+    """Return the contents of one table of a configuration file, empty if the table is missing.
 
     Parameters
     ----------
     path : Path
-        TOML file with a table for each kind of settings. Those of a bake may be at the top level instead.
+        TOML file with a table for each kind of settings. The settings of a bake may be at the top level
+        instead of in the table `[bake]`.
     name : str
-        Of the table.
+        Name of the table.
 
     Returns
     -------
     dict
-        Values by key, as they are written.
+        The values by key, not validated.
 
     Raises
     ------
     SettingsError
-        If the file cannot be read, is not TOML, has an unknown table or something else in place of the table,
-        or mixes settings at the top with a table `[bake]`.
+        If the file cannot be read, is not TOML or has an unknown table, if `name` is not a table, or if there
+        are settings both at the top level and in `[bake]`.
     """
     document = _read_toml(path)
     for key, value in document.items():
@@ -87,26 +88,27 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def resolve(
     models: Sequence[type[Settings]], command_line: Mapping[str, Any], config: Path | None
 ) -> dict[type[Settings], Settings]:
-    """Return the settings of a run: defaults, then the file, then the command line.
+    """Combine the settings of a run. A file overrides defaults, and the command line overrides the file.
 
     Parameters
     ----------
     models : sequence of type of Settings
-        Where one has a field of an earlier one, that one's value is its default.
+        The models. If two models have a field with the same name, the value of the first model is the default
+        of the second.
     command_line : mapping of str to object
-        Settings that were given as flags.
+        Settings that were given as flags, by name.
     config : Path or None
-        A TOML file.
+        A configuration file, TOML.
 
     Returns
     -------
     dict
-        One object for each model.
+        One settings object for each model.
 
     Raises
     ------
     SettingsError
-        For an unknown key or a value out of range, naming the file it came from.
+        If a key is unknown or a value out of range. The error names the file if the value is from a file.
     """
     found: dict[type[Settings], Settings] = {}
     shared: dict[str, Any] = {}
@@ -123,7 +125,7 @@ def resolve(
 
 
 def _table(model: type[Settings], config: Path) -> dict[str, Any]:
-    """Return the checked values of a model's table by field: errors name the file."""
+    """Return the validated values of a model's table, by field. Errors name the file."""
     table = read_config(config, model.table)
     try:
         checked = model.make(table)

@@ -1,4 +1,4 @@
-"""`baker diff A B`: how two bakes differ, on the surface."""
+"""`baker diff A B`: compares two bakes at the same surface points."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from baker.comparison.settings import DiffSettings
 if TYPE_CHECKING:
     from baker.comparison.compare import DiffReport
 
+# Number of objects, and of texels, that are shown without --verbose.
 _SHOWN = 3
 
 
@@ -24,7 +25,7 @@ def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="Output folder of a bake.")],
     b: Annotated[Path, typer.Argument(metavar="B", help="Output folder of the bake it is compared with.")],
 ) -> None:
-    """Compare the bakes and report the differences."""
+    """Compare two bakes and report the differences."""
     run: Run = ctx.obj
     with run.progress() as progress:
         from baker.comparison.compare import compare
@@ -34,7 +35,7 @@ def diff(
 
 
 def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
-    """Write manifest differences, tables of errors, the worst objects and points, and failed limits."""
+    """Write manifest differences, a table of errors, the worst objects and texels, and failed limits."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     for entry in found.differences:
@@ -60,7 +61,7 @@ def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
 
 
 def _furthest(found: DiffReport) -> list[tuple[float, str, dict[str, Any]]]:
-    """Return (p95, channel, object) of objects that differ, the furthest first."""
+    """Return (p95, channel, object) for each object with an error, the largest p95 first."""
     apart = [
         (float(figures["p95"]), name, entry)
         for entry in found.objects

@@ -1,4 +1,4 @@
-"""Reports an exception as one sentence, an exit code and, with --json, as JSON."""
+"""Reports an exception as one sentence and an exit code, and with --json also as JSON."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ FAILED_CHECK = 1
 
 
 def explain(error: BaseException) -> BakerError | None:
-    """Return the error as a `BakerError`, or None for a bug.
+    """Convert an exception to a `BakerError`. Return None if it can only be caused by a bug.
 
     Parameters
     ----------
     error : BaseException
-        Anything that a command raised.
+        The exception that a subcommand raised.
     """
     known = failure.explain(error)
     if known is not None:
@@ -43,11 +43,11 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
     Parameters
     ----------
     error : BaseException
-        Anything that a command raised.
+        The exception that a subcommand raised.
     as_json : bool
-        Also write the error object to `out`.
+        Whether the error is also written to `out` as JSON.
     traceback : bool
-        Print the traceback (-vv).
+        Whether the traceback is printed (-vv).
     out : TextIO
         Stream for JSON.
     """
@@ -76,9 +76,10 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
 
 
 def _line(error: BakerError) -> str:
-    """Return file, object and message in one line, without the object if the message begins with it.
+    """Return file, object and message of an error in one line.
 
-    The object of a wrong setting that no file holds is written as a flag.
+    The object is left out if the message begins with it. If the object is a setting that is not from a file,
+    it is written as a flag.
     """
     if error.object and error.message.startswith((f"`{error.object}`", f"'{error.object}'")):
         parts = [error.file, error.message]

@@ -1,10 +1,11 @@
-"""The fields of settings models in words, for the help and the docs: ranges, defaults, placeholders."""
+"""Describes the fields of settings models for the help and the docs: ranges, defaults, placeholders."""
 
 from __future__ import annotations
 
 from typing import Any, Literal, get_args, get_origin
 
-# `field` below is a pydantic FieldInfo: pydantic is imported by `core.settings_model` alone.
+# `field` is a pydantic FieldInfo. It is annotated as Any, because only `core.settings_model` imports
+# pydantic.
 
 
 def _extra(field: Any, key: str) -> Any:
@@ -12,7 +13,7 @@ def _extra(field: Any, key: str) -> Any:
 
 
 def range_of(field: Any) -> str:
-    """Return a setting's range in words, empty if it has none."""
+    """Return the range of a setting as text, such as "1 to 10" or "above 0"; empty if it has none."""
     bound = {}
     for item in field.metadata:
         bound.update({key: getattr(item, key) for key in ("ge", "gt", "le", "lt") if hasattr(item, key)})
@@ -23,7 +24,7 @@ def range_of(field: Any) -> str:
 
 
 def default_of(field: Any) -> str:
-    """Return a setting's default as it is typed on the command line, empty for None and an empty list."""
+    """Return the default of a setting as typed on the command line; empty for None and an empty list."""
     value = field.default
     if value is None:
         return ""
@@ -40,7 +41,7 @@ def unit_of(field: Any) -> str:
 
 
 def kinds_of(field: Any) -> list[Any]:
-    """Return the types that a setting's value may have, None aside; the choices of a Literal."""
+    """Return the types that the value of a setting may have, without None; for a Literal, its choices."""
     kinds: list[Any] = []
     stack = [field.annotation]
     while stack:
@@ -60,7 +61,7 @@ def kinds_of(field: Any) -> list[Any]:
 
 
 def metavar_of(field: Any) -> str:
-    """Return the placeholder of a setting's value in the help: `N`, `X`, `a|b` or `TEXT`."""
+    """Return the placeholder for the value of a setting in the help: `N`, `X`, `a|b` or `TEXT`."""
     metavar = _extra(field, "metavar")
     if metavar:
         return str(metavar)
@@ -73,7 +74,7 @@ def metavar_of(field: Any) -> str:
 
 
 def is_switch(field: Any) -> bool:
-    """Return whether a setting is on or off."""
+    """Return whether a setting is a switch, which is on or off."""
     return kinds_of(field) == [bool]
 
 
@@ -83,7 +84,7 @@ def is_repeated(field: Any) -> bool:
 
 
 def flag_of(name: str, field: Any) -> str:
-    """Return the flag of a setting; a switch that is on by default has a second one that turns it off."""
+    """Return the flag of a setting. A switch that is on by default also has a flag that turns it off."""
     dashed = name.replace("_", "-")
     return f"--{dashed}/--no-{dashed}" if is_switch(field) and field.default else f"--{dashed}"
 

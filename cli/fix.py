@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FixRequest:
-    """The scene to be fixed and the file to write.
+    """The scene to fix and the file to write.
 
     Attributes
     ----------
     scene, out : Path
+        The input file and the output file.
     settings : RepairSettings
     """
 
@@ -33,7 +34,7 @@ class FixRequest:
 def fix_request(
     scenes: list[Path], settings: RepairSettings, *, fix: bool, out: Path | None, force: bool
 ) -> FixRequest | None:
-    """Return the request of `--fix` or `--repair`, or None for a check only.
+    """Return the request of `--fix` or `--repair`, or None if neither flag is given.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def fix_scene(request: FixRequest, progress: Progress) -> FixResult:
 
 
 def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> None:
-    """Write the changes made and the defects that were not fixed, a line each."""
+    """Write one line for each change and one line for each defect that was not fixed."""
     for fix in result.fixed:
         change = fix.change
         stream.write(
@@ -80,11 +81,11 @@ def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> 
 
 
 def fixed_json(result: FixResult, request: FixRequest) -> dict[str, Any]:
-    """Return the keys that a fix adds to `--json`."""
+    """Return the keys that `--fix` adds to the output of `--json`."""
     return {**result.to_dict(), "out": str(request.out)}
 
 
 def _more(change: Change) -> str:
-    """Return the change of the surface and the lost attributes of a repair, as text."""
+    """Return the distance by which a repair moved the surface, and the attributes lost, as text."""
     moved = "" if change.distance is None else f"; the surface moved by up to {change.distance:.3g} m"
     return moved + (f"; {', '.join(change.lost)} could not be kept" if change.lost else "")

@@ -1,6 +1,6 @@
-"""Names of settings in messages of the library, written as flags of the command line.
+"""Converts names of settings in messages of the library to flags of the command line.
 
-The library names a setting or an argument between backticks, with a value in the form of Python:
+In messages of the library, a setting or an argument is between backticks, and a value has the form of Python:
 "raise `resolution`", "pass `denoise=False`", "use `dtype='float'`".
 """
 
@@ -11,13 +11,13 @@ from functools import cache
 from typing import Any, TextIO
 
 _NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
-# Arguments of commands that are no settings.
+# Arguments of subcommands that have a flag but are not settings.
 _ARGUMENTS = frozenset({
     "cluster", "config", "fix", "force", "junit", "out", "port", "report", "sarif", "three",
 })  # fmt: skip
-# Arguments whose flag is another word.
+# Flags of arguments whose flag has another name.
 _SHORT = {"out": "-o"}
-# The name of an export, too: a flag only with a value.
+# This argument has the same name as an export, so it is converted only if it has a value.
 _AMBIGUOUS = "three"
 
 
@@ -28,7 +28,7 @@ def flag_names() -> frozenset[str]:
     Returns
     -------
     frozenset of str
-        With underscores.
+        The names, with underscores.
     """
     from baker.checks.settings import CheckSettings
     from baker.comparison.settings import DiffSettings
@@ -45,12 +45,12 @@ def flag_names() -> frozenset[str]:
 
 
 def in_flags(text: str, quote: str = "") -> str:
-    """Return a message of the library with its settings as flags.
+    """Return a message of the library with names of settings converted to flags.
 
     Parameters
     ----------
     text : str
-        With settings between backticks.
+        The message, with settings between backticks.
     quote : str
         Written before and after each flag.
 
@@ -67,12 +67,12 @@ def in_flags(text: str, quote: str = "") -> str:
 
 
 def in_keys(text: str) -> str:
-    """Return a message of the library with its settings in quotes, as keys of a configuration file.
+    """Return a message of the library with names of settings converted to keys of a configuration file.
 
     Parameters
     ----------
     text : str
-        With settings between backticks.
+        The message, with settings between backticks.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def in_keys(text: str) -> str:
 
 
 def values_in_flags(value: Any) -> Any:
-    """Return plain values (dicts, lists, texts, numbers) with `in_flags` applied to each text.
+    """Apply `in_flags` to each text in nested dictionaries and lists.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def values_in_flags(value: Any) -> Any:
     Returns
     -------
     object
-        Of the same shape.
+        A copy with converted texts.
     """
     if isinstance(value, str):
         return in_flags(value)
@@ -105,18 +105,19 @@ def values_in_flags(value: Any) -> Any:
 
 
 class FlagStream:
-    """Writes texts of the library to a stream with settings as flags.
+    """A text stream that converts names of settings to flags.
 
     Parameters
     ----------
     stream : TextIO
+        The stream to which the converted text is written.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text; settings between backticks become flags."""
+        """Write a text in which settings between backticks are converted to flags."""
         return self._stream.write(in_flags(text))
 
     def flush(self) -> None:

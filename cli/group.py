@@ -1,4 +1,4 @@
-"""The list of subcommands, each imported when it is called for."""
+"""The group of all subcommands, which imports the module of a subcommand only when it runs."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class LazyGroup(TyperGroup):
     """Lists every subcommand with its summary, and imports only the one that runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names in the order of the table."""
+        """Return the names of the subcommands in the order of `COMMANDS`."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the subcommand; while help is made, a placeholder with its summary."""
+        """Import and return a subcommand. While the help is written, return a placeholder instead."""
         if cmd_name not in COMMANDS:
             return None
         if self._listing:
@@ -32,14 +32,14 @@ class LazyGroup(TyperGroup):
     _listing = False
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help without importing any subcommand."""
+        """Write the help, without importing any subcommand."""
         self._listing = True
         super().format_help(ctx, formatter)
         self._listing = False
 
 
 def make_app() -> Any:
-    """Return the whole command line."""
+    """Return the command `baker` with all its subcommands."""
     app = typer.Typer(
         cls=LazyGroup, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
     )

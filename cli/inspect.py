@@ -10,13 +10,14 @@ import typer
 from baker.cli.command import Run, command
 from baker.core.settings import InspectSettings
 
-# Longest list shown item by item; the rest is counted (all of it with -v and with --json).
+# Largest number of items shown of a list without -v and --json. The number of further items is printed.
 SHOWN = 20
-# Longest text in a table, which leaves a hash its beginning; -v shows all of it.
+# Length to which texts in a table, such as hashes, are truncated, characters. -v shows them in full.
 LONGEST = 24
 
 
-# No ray is traced here; the settings are taken so that scripts can pass the same flags to every command.
+# No ray is traced here, but the flags of ray tracing are accepted, so that scripts can pass them to all
+# commands.
 @command("inspect", InspectSettings)
 def inspect(
     ctx: typer.Context,
@@ -42,11 +43,13 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
     Parameters
     ----------
     value : dict or list
+        The values to write.
     stream : TextIO
+        Stream to write to.
     depth : int
-        Levels of indentation.
+        Number of levels of indentation.
     limit : int or None
-        Most entries shown of one list; None for all.
+        Largest number of entries shown of a list; None for all.
     """
     pad = "  " * depth
     if isinstance(value, dict):
@@ -72,7 +75,7 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
 
 
 def _write_table(rows: list[dict[str, Any]], stream: TextIO, *, pad: str, short: bool) -> None:
-    """Write rows under their keys; `short` truncates long values such as hashes."""
+    """Write dictionaries as a table with a column for each key. `short` truncates long values."""
     keys = list(dict.fromkeys(key for row in rows for key in row))
     cells = [[_cell(key, _words(row.get(key, "")), short=short) for key in keys] for row in rows]
     widths = [max(len(line[index]) for line in [keys, *cells]) for index in range(len(keys))]
@@ -87,12 +90,12 @@ def _write_table(rows: list[dict[str, Any]], stream: TextIO, *, pad: str, short:
 
 def _cell(key: str, words: str, *, short: bool) -> str:
     if key == "message":
-        return words  # a sentence is there to be read
+        return words  # never truncate messages
     return words[: LONGEST - 3] + "..." if short and len(words) > LONGEST else words
 
 
 def _plain(value: Any) -> bool:
-    # Short rows of numbers or words (a colour, a list of names) stay on one line.
+    # Write lists of up to four numbers or words, such as a colour, on one line.
     if isinstance(value, list | tuple):
         return len(value) <= 4 and all(not isinstance(part, dict | list | tuple) for part in value)
     return not (isinstance(value, dict) and value)

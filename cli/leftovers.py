@@ -1,4 +1,4 @@
-"""Records the state of an output before a command writes it, and restores it if the command is killed."""
+"""Records the state of an output path before a command writes to it, and restores it after a kill."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from baker.io.bake.recovery import recover
 
 
 def survey(out: str) -> bytes:
-    """Return the state of an output before a command writes it, for `restore`.
+    """Record the state of an output path before a command writes to it.
 
     Parameters
     ----------
     out : str
-        Output folder or file, which need not exist.
+        Output folder or file. It need not exist.
 
     Returns
     -------
     bytes
-        One line: the output, and its parents that do not exist yet.
+        One line for `restore`: the path, and its parent folders that do not exist yet.
     """
     target = Path(out).resolve()
     missing = [str(parent) for parent in target.parents if not parent.exists()]
@@ -28,12 +28,12 @@ def survey(out: str) -> bytes:
 
 
 def restore(note: bytes) -> None:
-    """Restore the output, and remove the files and folders that the command made.
+    """Restore the output path, and remove temporary files and folders that the command made.
 
     Parameters
     ----------
     note : bytes
-        One line of `survey`.
+        The line that `survey` returned.
     """
     before = json.loads(note)
     target = Path(before["out"])
@@ -42,4 +42,4 @@ def restore(note: bytes) -> None:
         try:
             parent.rmdir()
         except OSError:
-            return  # it holds something, or was never created
+            return  # the folder is not empty, or was never created

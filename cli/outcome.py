@@ -1,4 +1,4 @@
-"""Shared by `verify` and `diff`: the report of an outcome, lines on worst places and limits."""
+"""Text output that `verify` and `diff` share: worst texels and limits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def report_outcome(found: VerifyReport | DiffReport, run: Run, as_text: Callable[..., None]) -> None:
-    """Write an outcome as text and, with --json, as JSON; exit with `FAILED_CHECK` if it did not pass.
+    """Write a report as text and, with --json, as JSON. Exit with `FAILED_CHECK` if it did not pass.
 
-    as_text : called with the outcome, a stream and `verbose`
+    `as_text(report, stream, verbose=...)` writes the text.
     """
     if not run.quiet:
         as_text(found, run.text, verbose=run.verbose)
@@ -40,7 +40,7 @@ def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
 
 
 def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
-    """Write the limits that were applied, and with each the figure that was compared with it."""
+    """Write the limits that were applied, each with the value of its metric."""
     by_channel: dict[str, list[str]] = {}
     for verdict in verdicts:
         limit = verdict.limit

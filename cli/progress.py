@@ -1,4 +1,4 @@
-"""Shows progress: a bar on a terminal, plain lines every few seconds elsewhere."""
+"""Shows progress: a bar if the stream is a terminal, otherwise a line every few seconds."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from typing import TYPE_CHECKING, Any, TextIO
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
-# Seconds between two plain lines; a log of a long bake stays readable.
+# Shortest time between two lines, seconds, so that the log of a long bake stays readable.
 PLAIN_INTERVAL = 3.0
 
 
 class Reporter:
-    """The progress callback of a command, and its context manager.
+    """The progress callback of a command. It is also the context manager that shows and removes the bar.
 
     Parameters
     ----------
     quiet : bool
-        Show nothing.
+        Whether nothing is shown.
     stopped : callable
-        Returns whether a signal has arrived; the callback returns the same.
+        Returns whether a stopping signal has arrived. The callback returns this value.
     stream : TextIO
-        Stream of the progress; default: stderr.
+        Stream on which progress is shown; by default stderr.
+    clock : callable
+        Returns the time, seconds.
     """
 
     def __init__(
@@ -62,9 +64,9 @@ class Reporter:
             self._bar = None
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> bool:
-        """Show that `fraction` of `stage` is done; return whether to stop."""
+        """Show that `fraction` of `stage` is done, and return whether the work must stop."""
         if not self._quiet:
-            # Tiles report from several threads.
+            # Use a lock, because several threads report the progress of their tiles.
             with self._lock:
                 self._show(stage, min(max(fraction, 0.0), 1.0), detail)
         return self._stopped()

@@ -1,4 +1,4 @@
-"""`baker render SCENE -o IMAGE`: the reference path tracer through a pinhole camera."""
+"""`baker render SCENE -o IMAGE`: renders a scene with the reference path tracer and a pinhole camera."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def render(
     scene: Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="IMAGE", help="EXR or PNG file to write.")],
 ) -> None:
-    """Render, and report the files written."""
+    """Render a scene, and report the image written."""
     run: Run = ctx.obj
     settings = run.of(RenderSettings)
     with run.progress() as progress:
@@ -39,7 +39,7 @@ def render(
 
 
 def write_text(picture: Picture, out: Path, settings: RenderSettings, stream: TextIO) -> None:
-    """Write warnings, the size of the image, rays per second, and the tone mapping of a PNG."""
+    """Write warnings, the size of the image, the number of rays per second, and the tone mapping of a PNG."""
     from baker.rendering.write import tone_of
 
     for warning in picture.warnings:

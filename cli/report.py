@@ -1,4 +1,4 @@
-"""The report of a bake: a short text for people, parts of the manifest for scripts."""
+"""The report of a bake: a short text, and for `--json` parts of the manifest."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ def bake_json(result: BakeResult) -> dict[str, Any]:
 
 
 def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> None:
-    """Write files, seconds per stage and warnings.
+    """Write the names and sizes of the files, the duration of each stage, and the warnings.
 
     Parameters
     ----------
     result : BakeResult
+        The finished bake.
     stream : TextIO
+        Stream to write to.
     verbose : int
-        From 1 on, statistics and ray counts too.
+        If 1 or more, statistics and numbers of rays are written as well.
     """
     manifest: dict[str, Any] = result.manifest
     if result.out is not None:

@@ -1,4 +1,4 @@
-"""Shared by all commands of one run: where text and JSON go, and whether to stop."""
+"""State that a run of the command line shares with its subcommand: the output streams and the stop flag."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from baker.cli.supervise import StopFlag, note_output
 
 @dataclass
 class Session:
-    """The streams and the stop flag of one run; made by `app.run`, passed to commands in their context.
+    """The output streams and the stop flag of one run. `app.run` makes it and passes it in the context.
 
     Attributes
     ----------
     out : TextIO
-        Standard output: the JSON object, or the text of a command.
+        Standard output. It receives the JSON object or the text of the subcommand.
     stop : StopFlag
     notes : int or None
-        Descriptor of the file that lists output folders for the parent process, see `supervise`.
+        Descriptor of the file that lists outputs for the parent process, see `supervise`.
     as_json : bool
         Whether `--json` was given before the subcommand.
     """
@@ -33,17 +33,17 @@ class Session:
     as_json: bool = False
 
     def reporter(self, *, quiet: bool) -> Reporter:
-        """Return the progress callback for a piece of work."""
+        """Return a progress callback that returns whether a stopping signal has arrived."""
         return Reporter(quiet=quiet, stopped=lambda: self.stop.requested)
 
     def will_write(self, out: str) -> None:
-        """Note that `out` is about to be written, so that the parent can clean up after a kill."""
+        """Record that `out` will be written, so that the parent process can clean up after a kill."""
         note_output(self.notes, out)
 
     def write_json(self, value: dict[str, Any]) -> None:
-        """Write the one object of `--json`; settings in its texts are written as flags."""
+        """Write the JSON object of `--json`. Names of settings in its texts are converted to flags."""
         self.out.write(json.dumps(values_in_flags(value), indent=2, allow_nan=False) + "\n")
 
     def text_stream(self, *, as_json: bool) -> TextIO:
-        """Return the stream for a command's text."""
+        """Return the stream for text output: stderr if JSON is written to `out`, else `out`."""
         return sys.stderr if as_json else self.out

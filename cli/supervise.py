@@ -1,10 +1,10 @@
-"""Runs the command in a child process, so that it can be stopped while a library is busy.
+"""Runs the command in a child process, so that it can be stopped while a native library is busy.
 
-Some C++ libraries hold Python's global lock while they work (xatlas does so for minutes on a large mesh): no
-signal handler or thread written in Python can run during that time. The parent process only waits, so it
-always receives Ctrl-C. It forwards the signal, gives the child `GRACE` seconds to stop, then kills it and
-every process that it started, and removes unfinished output. The parent also reports a crash of native code,
-or a kill for lack of memory, in one sentence.
+Some C++ libraries hold Python's global interpreter lock while they work. xatlas does so for minutes on a
+large mesh. No signal handler or thread written in Python can run during that time. The parent process only
+waits, so it can always handle Ctrl-C. It forwards the signal and gives the child `GRACE` seconds to stop.
+Then it kills the child and every process that the child started, and removes unfinished output. The parent
+also reports a crash of native code, or a kill for lack of memory, in one sentence.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import sys
 import tempfile
 from types import FrameType
 
-# Seconds for the child to stop by itself; everything together takes at most one second.
+# Time that the child has to stop by itself after a signal, seconds.
 GRACE = 0.6
+# Exit codes.
 INTERRUPTED = 130
 RESOURCE = 4
 
@@ -25,48 +26,48 @@ _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class StopFlag:
-    """Records that a stopping signal has arrived.
+    """A flag that stopping signals set.
 
     Attributes
     ----------
     requested : bool
-        Whether a signal has arrived; progress callbacks return it.
+        Whether a signal has arrived. Progress callbacks return this value.
     """
 
     def __init__(self) -> None:
         self.requested = False
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Set the flag; the first signal also interrupts running Python code."""
+        """Set the flag. The first signal also raises KeyboardInterrupt in the running Python code."""
         if not self.requested:
             self.requested = True
             raise KeyboardInterrupt
 
     def install(self) -> None:
-        """Handle the stopping signals in this process."""
+        """Install the handler of the stopping signals in this process."""
         for name in _STOPPING:
             number = getattr(signal, name, None)
-            # Leave SIGHUP ignored, as `nohup` sets it. SIGINT is handled even if ignored: shells do that for
-            # background jobs.
+            # Keep ignoring SIGHUP if it is ignored, because `nohup` sets this. Handle SIGINT even if it is
+            # ignored, because shells ignore it for background jobs.
             if number is not None and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
                 signal.signal(number, self.handle)
 
 
 def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
-    """Fork: the child returns and does the work, the parent waits and never returns.
+    """Fork the process. In the child, this function returns. The parent waits for the child and then exits.
 
     Parameters
     ----------
     argv : list of str
-        The command line; with `--json`, a failure is reported as JSON.
+        The arguments. If they contain `--json`, the parent reports failures as JSON.
 
     Returns
     -------
     stop : StopFlag
-        Set by a stopping signal in the working process.
+        Flag that stopping signals set in the child.
     notes : int or None
-        Descriptor for `note_output`, shared with the parent; None without `fork`, where this process does the
-        work.
+        Descriptor of a file for `note_output` that the parent also reads. None on systems without `fork`, on
+        which the function returns in the only process.
     """
     stop = StopFlag()
     if not hasattr(os, "fork"):
@@ -74,11 +75,12 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
         return stop, None
     sys.stdout.flush()
     sys.stderr.flush()
-    # Not a pipe: the parent reads at the end only, and a batch may note more folders than a pipe holds.
+    # Use a file instead of a pipe, because the parent reads it only at the end, and a batch may write more
+    # than the buffer of a pipe.
     with tempfile.TemporaryFile() as file:
         notes = os.dup(file.fileno())
     blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
-    # Block signals until the handlers are installed.
+    # Block signals until the handlers of parent and child are installed.
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     parent = os.getpid()
     child = os.fork()
@@ -94,7 +96,7 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
 
 
 def note_output(notes: int | None, out: str) -> None:
-    """Record the state of an output folder, before it is written, for the parent process."""
+    """Record the state of an output path for the parent process, before a command writes to it."""
     if notes is not None:
         from baker.cli.leftovers import survey
 
@@ -102,8 +104,8 @@ def note_output(notes: int | None, out: str) -> None:
 
 
 def _settle_child(parent: int) -> None:
-    # Its own process group: the terminal's Ctrl-C reaches the parent only, which forwards it once, and the
-    # parent can kill processes that the child started.
+    # Make a new process group. Ctrl-C then reaches only the parent, which forwards it once. The parent can
+    # also kill all processes that the child started.
     os.setpgid(0, 0)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     if sys.platform == "linux":
@@ -116,7 +118,7 @@ def _settle_child(parent: int) -> None:
 
 
 class _Watch:
-    """The parent's side: forwards signals, waits, and cleans up after a kill."""
+    """The parent process: forwards signals to the child, waits for it, and cleans up after a kill."""
 
     def __init__(self, child: int, notes: int, as_json: bool) -> None:
         self.child = child
@@ -125,7 +127,7 @@ class _Watch:
         self.stopping = False
 
     def install(self) -> None:
-        with contextlib.suppress(OSError):  # the child has done it already, or has ended
+        with contextlib.suppress(OSError):  # the child has already made the group, or has ended
             os.setpgid(self.child, self.child)
         for name in _STOPPING:
             number = getattr(signal, name)
@@ -143,7 +145,7 @@ class _Watch:
         if self.stopping:
             return
         self.stopping = True
-        # Signal the child only: its own child processes would print further messages.
+        # Send the signal only to the child, because its child processes would print further messages.
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.child, signal.SIGINT)
         signal.setitimer(signal.ITIMER_REAL, GRACE)
@@ -163,7 +165,7 @@ class _Watch:
         _, status = os.waitpid(self.child, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
         if self.stopping or not os.WIFEXITED(status):
-            self._send(signal.SIGKILL)  # child processes that outlived it
+            self._send(signal.SIGKILL)  # end processes that the child started and that still run
             self._tidy()
         if os.WIFEXITED(status):
             return os.WEXITSTATUS(status)

@@ -1,4 +1,4 @@
-"""`baker verify OUT`: the error of a bake, against path tracing."""
+"""`baker verify OUT`: measures the error of a bake against path tracing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def verify(
     ] = None,
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
 ) -> None:
-    """Verify the bake and report the figures."""
+    """Verify a bake and report the error metrics."""
     run: Run = ctx.obj
     with run.progress() as progress:
         from baker.verification.verify import verify
@@ -42,7 +42,7 @@ def verify(
 
 
 def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
-    """Write a table of errors, the failed criteria, and the worst texels."""
+    """Write a table of metrics, the worst regions and texels, the limits, and those that failed."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     columns = (

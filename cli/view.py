@@ -1,4 +1,4 @@
-"""`baker view OUT`: a local web page that shows a bake."""
+"""`baker view OUT`: shows a bake in a local web page."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from baker.cli.command import Run, command
 from baker.core.settings_model import RunSettings
 
 
-# No ray is traced here; the settings are taken so that scripts can pass the same flags to every command.
+# No ray is traced here, but the flags of ray tracing are accepted, so that scripts can pass them to every
+# command.
 @command("view", RunSettings)
 def view(
     ctx: typer.Context,
@@ -30,7 +31,7 @@ def view(
         typer.Option("--three", metavar="PATH", help="Your own three.js: its file, or npm's folder."),
     ] = None,
 ) -> None:
-    """Serve the page until Ctrl-C, which ends the command without a failure."""
+    """Serve the web page until Ctrl-C, which ends the command with exit code 0."""
     from baker.io.bake.read_bake import read_bake
     from baker.viewer.script import find_three
     from baker.viewer.server import make_server
@@ -49,7 +50,7 @@ def view(
         text.write(f"{server.url} shows {out}; Ctrl-C ends it\n")
         text.flush()
     if browser and not run.as_json and sys.stderr.isatty():
-        # In a thread: a browser that is a terminal program would hold the server up.
+        # Open the browser in a thread, because a browser that runs in the terminal would block the server.
         threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
     try:
         server.serve_forever(poll_interval=0.2)
