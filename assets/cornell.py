@@ -1,4 +1,4 @@
-"""The Cornell box: two boxes in a room open to the front, lit by one area light.
+"""The Cornell box: two boxes in a room that is open at the front, lit by one area light.
 
 Based on: Goral, Torrance, Greenberg, Battaile, Modeling the Interaction of Light Between
 Diffuse Surfaces, 1984.
@@ -13,19 +13,19 @@ SIDE = 2.0
 WHITE = (0.73, 0.71, 0.68)
 RED = (0.61, 0.06, 0.06)
 GREEN = (0.12, 0.45, 0.15)
-# Radiance of the light, cd/m2: about 250 lx on the floor below it.
+# Radiance of the light, cd/m2. It causes about 250 lx on the floor below.
 EMISSION = (4200.0, 3300.0, 2100.0)
 NO_BOTTOM = ("-x", "+x", "+y", "-z", "+z")
 
 
 def make_cornell() -> GlbBuilder:
-    """Return the scene: 32 triangles in 8 objects, one-sided, seen from +z."""
+    """Return the scene: 32 one-sided triangles in 8 objects, with a camera at +z."""
     glb = GlbBuilder()
     for name, colour in (("white", WHITE), ("red", RED), ("green", GREEN)):
         glb.material(name, colour)
     glb.material("lamp", (0.78, 0.78, 0.78), emission=EMISSION)
     half = SIDE / 2
-    # The room's faces point inwards: those of a box, with their corners in reverse order.
+    # The room is a box whose faces point inwards, so reverse the order of their corners.
     face = box_faces((-half, 0.0, -half), (half, SIDE, half))
     walls = (
         ("floor", "-y", "white"),
@@ -36,7 +36,7 @@ def make_cornell() -> GlbBuilder:
     )
     for name, side, colour in walls:
         glb.place(name, glb.mesh(name, [(quads([face[side][::-1]]), colour)]))
-    # The boxes stand on the floor and have no bottom face, which nobody can see.
+    # The boxes stand on the floor and have no bottom face, because it would be invisible.
     short = glb.mesh("short_box", [(box((0.6, 0.6, 0.6), faces=NO_BOTTOM), "white")])
     tall = glb.mesh("tall_box", [(box((0.6, 1.2, 0.6), faces=NO_BOTTOM), "white")])
     glb.place("short_box", short, (0.33, 0.0, 0.39), turn=-17.0)

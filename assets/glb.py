@@ -1,6 +1,6 @@
-"""Writes meshes, materials, nodes and lights as one GLB, the same bytes every time.
+"""Writes meshes, materials, nodes and lights to a GLB. The output is deterministic.
 
-Deliberately independent of the importer it is used to test.
+This module is independent of the importer, because its files are used to test the importer.
 """
 
 from __future__ import annotations
@@ -63,13 +63,13 @@ class GlbBuilder:
         emission : 3 floats or None
             Radiance, cd/m2.
         texture : (H, W, 3 or 4) uint8 or None
-            sRGB and alpha, multiplied with `colour` and `alpha`.
+            Colours, sRGB, and alpha, multiplied with `colour` and `alpha`.
         roughness : float
         alpha : float
         mode : "OPAQUE", "MASK" (opaque where alpha is at least 0.5) or "BLEND"
         double_sided : bool
         emission_texture : (H, W, 3) uint8 or None
-            sRGB, multiplied with `emission`.
+            Colours, sRGB, multiplied with `emission`.
         """
         surface: dict[str, Any] = {
             "baseColorFactor": [*colour, alpha],
@@ -95,7 +95,7 @@ class GlbBuilder:
         return name
 
     def mesh(self, name: str, parts: list[tuple[Surface, str]]) -> str:
-        """Add a mesh of one primitive per (surface, material name) and return its name."""
+        """Add a mesh and return its name. It has one primitive for each pair (surface, material name)."""
         primitives = []
         for surface, material in parts:
             if len(surface.position) > 65535:
@@ -123,7 +123,7 @@ class GlbBuilder:
         turn: float = 0.0,
         scale: float = 1.0,
     ) -> None:
-        """Put a mesh into the scene: position in metres, turn about +Y in degrees."""
+        """Add a node with a mesh: `at` is its position in metres, `turn` its rotation about +Y in degrees."""
         node: dict[str, Any] = {"name": name, "mesh": self._meshes[mesh]}
         if any(at):
             node["translation"] = list(at)
@@ -144,7 +144,11 @@ class GlbBuilder:
         at: tuple[float, float, float] = (0.0, 0.0, 0.0),
         towards: tuple[float, float, float] | None = None,
     ) -> None:
-        """Add a punctual light: cd for point, lx for directional; `towards` is where it shines to."""
+        """Add a light of KHR_lights_punctual.
+
+        `intensity` is in cd for point lights and in lx for directional lights. `towards` is the direction in
+        which a directional light travels.
+        """
         extension = self._json.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})
         self._use("KHR_lights_punctual")
         node: dict[str, Any] = {"name": name}
@@ -161,14 +165,14 @@ class GlbBuilder:
     def camera(
         self, at: tuple[float, float, float], target: tuple[float, float, float], field_of_view: float
     ) -> None:
-        """Add a pinhole camera; vertical field of view in degrees."""
+        """Add a pinhole camera at `at` that looks to `target`; vertical field of view in degrees."""
         perspective = {"yfov": _rounded(math.radians(field_of_view)), "znear": 0.01}
         self._json["cameras"] = [{"type": "perspective", "perspective": perspective}]
         towards = (target[0] - at[0], target[1] - at[1], target[2] - at[2])
         self._node({"name": "camera", "camera": 0, "translation": list(at), "rotation": _looking(towards)})
 
     def write(self, path: Path) -> None:
-        """Write the file."""
+        """Write the GLB file."""
         self._json["buffers"] = [{"byteLength": len(self._bytes)}]
         text = json.dumps(self._json, separators=(",", ":"), sort_keys=True).encode()
         text += b" " * (-len(text) % 4)
@@ -225,7 +229,7 @@ class GlbBuilder:
 
 
 def png(pixel: NDArray[np.uint8]) -> bytes:
-    """Return a PNG that is not compressed, so that its bytes do not hang on a zlib version.
+    """Encode a PNG without compression, so that its bytes do not depend on the version of zlib.
 
     Parameters
     ----------
@@ -248,12 +252,13 @@ def png(pixel: NDArray[np.uint8]) -> bytes:
 
 
 def _rounded(value: float) -> float:
-    # Seven digits, as float32 holds: the last bits of sin and cos differ between C libraries.
+    # Round to seven digits, the precision of float32, because the last bits of sin and cos differ between C
+    # libraries.
     return round(value, 7)
 
 
 def _looking(towards: tuple[float, float, float]) -> list[float]:
-    """Return the quaternion that turns -Z to `towards` without rolling: first about Y, then about X."""
+    """Return the quaternion (x, y, z, w) that turns -Z to the direction `towards` without roll."""
     x, y, z = towards
     half_yaw = math.atan2(-x, -z) / 2
     half_pitch = math.atan2(y, math.hypot(x, z)) / 2

@@ -1,6 +1,6 @@
-"""A hall with two rows of columns, balls and rings: 70 k triangles, most of them instances.
+"""A hall with two rows of columns, balls and rings: 70 000 triangles, most of them in instances.
 
-Lit by a panel, a point light and the sun through high windows; give it a sky with `--sky`.
+It is lit by a panel, a point light, and the sun through high windows. `--sky` adds light of the sky.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from shapes import Surface, ball, box, join, lathe, rooms, rounded_box, torus
 
 REST = 0.002
 LENGTH, WIDTH, HEIGHT = 24.0, 12.0, 6.0
-# Distance of columns along the hall, in two rows at +-AISLE.
+# Distance between the columns of a row, and distance of the two rows from the middle of the hall, metres.
 SPACING, AISLE = 3.0, 3.2
 
 
@@ -44,7 +44,7 @@ def make_hall() -> GlbBuilder:
 
 def _building(glb: GlbBuilder) -> None:
     half_x, half_z, wall = LENGTH / 2, WIDTH / 2, 0.4
-    # One window in each bay of the long wall at +z, high up, where the sun comes from.
+    # Put one high window into each bay of the long wall at +z, from where the sun shines.
     edges = [
         round(-half_x + SPACING * bay + offset, 3)
         for bay in range(int(LENGTH / SPACING))
@@ -74,7 +74,7 @@ def _building(glb: GlbBuilder) -> None:
 
 
 def _column() -> Surface:
-    """Return base, shaft with entasis, rings and capital: one lathe profile between two slabs."""
+    """Return a column: a lathed base, shaft with entasis, rings and capital, between two slabs."""
     shaft = []
     for k in range(13):
         share = k / 12
@@ -119,7 +119,7 @@ def _balls_and_rings(glb: GlbBuilder) -> None:
             if (k + (z > 0)) % 2:
                 glb.place(f"ball_{name}", kinds[k % 3], (x, 0.8 + 2 * REST + 0.45, z))
             else:
-                # Two rings, one on the other, the upper one smaller.
+                # Stack two rings, the upper one smaller.
                 glb.place(f"ring_{name}", ring, (x, 0.8 + 2 * REST + 0.15, z))
                 glb.place(f"ring_{name}_top", ring, (x, 1.19, z), scale=0.75)
     for k, (x, z, radius) in enumerate(

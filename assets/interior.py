@@ -9,13 +9,13 @@ from glb import GlbBuilder
 from numpy.typing import NDArray
 from shapes import Surface, ball, box, join, lathe, rooms, rounded_box, torus
 
-# Gap between objects that touch, metres: the light of coincident surfaces is undefined.
+# Gap between objects that touch, metres, because the light of coincident surfaces is undefined.
 REST = 0.002
 HEIGHT = 2.6
 
 
 def make_interior() -> GlbBuilder:
-    """Return the scene: a living room and a study, walls 20 cm thick, furnished."""
+    """Return the scene: a furnished living room and a furnished study, with walls 20 cm thick."""
     glb = GlbBuilder()
     _materials(glb)
     _building(glb)
@@ -118,7 +118,7 @@ def _study(glb: GlbBuilder) -> None:
         (0.0, 0.008),
     ]
     handle = torus(0.026, 0.006, 24, 10)
-    # A torus lies flat and the handle is upright: swapping y and z reverses the winding.
+    # Swap y and z to make the flat torus an upright handle. This reverses the winding, so reverse it again.
     upright = Surface(handle.position[:, [0, 2, 1]], handle.normal[:, [0, 2, 1]], handle.triangle[:, ::-1])
     cup = join(lathe(mug, 32), upright.moved((0.069, 0.05, 0.0)))
     glb.place("mug", glb.mesh("mug", [(cup, "enamel")]), (6.5, 0.757, 0.55), turn=35.0)
@@ -159,7 +159,7 @@ def _chair() -> Surface:
 
 def _standing_light(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
     stand = [(0.0, 0.0), (0.14, 0.0), (0.14, 0.015), (0.03, 0.03), (0.011, 0.05), (0.011, 1.42), (0.0, 1.425)]
-    # The shade is a thin closed shell, open at both ends.
+    # The shade is a truncated cone, open at both ends, whose thin wall is a closed surface.
     shade = [(0.205, 1.3), (0.12, 1.62), (0.117, 1.62), (0.202, 1.3), (0.205, 1.3)]
     parts = [
         (lathe(stand, 32), "oak"),
@@ -192,7 +192,7 @@ def _plant(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
 
 
 def _bookcase(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
-    """Place a bookcase that looks towards -x, and its books."""
+    """Place a bookcase whose front points to -x, and its books."""
 
     def solid(x: float, y: float, z: float) -> str | None:
         shelf = any(y0 < y < y0 + 0.03 for y0 in (0.0, 0.4, 0.8, 1.2, 1.6))
@@ -224,7 +224,7 @@ def _bookcase(glb: GlbBuilder, at: tuple[float, float, float]) -> None:
 
 
 def planks() -> NDArray[np.uint8]:
-    """Return a floor of boards: (64, 64, 3) uint8, sRGB."""
+    """Return a texture of floor boards, (64, 64, 3) uint8, sRGB."""
     row, column = np.mgrid[0:64, 0:64]
     board = row // 8
     grain = (column * 7 + board * 29 + (row % 8) * (1 + board % 3)) % 16
@@ -235,7 +235,7 @@ def planks() -> NDArray[np.uint8]:
 
 
 def stripes() -> NDArray[np.uint8]:
-    """Return a woven rug: (64, 64, 3) uint8, sRGB."""
+    """Return a texture of a woven rug, (64, 64, 3) uint8, sRGB."""
     row, column = np.mgrid[0:64, 0:64]
     colour = np.array([[168, 52, 44], [222, 205, 170], [60, 74, 110], [222, 205, 170]], np.int64)
     weave = 6 * ((row + column) % 2)

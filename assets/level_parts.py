@@ -1,4 +1,4 @@
-"""What levels are built of: slabs, sheets, walls with openings, terrain, rocks, pictures of a few colours."""
+"""The parts from which levels are built: slabs, sheets, walls with openings, terrain, rocks, textures."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ from glb import GlbBuilder
 from numpy.typing import NDArray
 from shapes import FACES, Point, Surface, ball, box_faces, join, quads
 
-# Reflectances of what levels are made of.
+# Base colours of the materials of levels, linear.
 PLASTER, CONCRETE, WOOD, BLACK = (0.7, 0.7, 0.68), (0.45, 0.45, 0.45), (0.45, 0.3, 0.18), (0.0, 0.0, 0.0)
 
 
 @dataclass
 class Level:
-    """A scene, and the light that no file holds.
+    """A scene, and the sky, which a glTF file cannot contain.
 
     Attributes
     ----------
-    glb : GlbBuilder
     sky : 3 floats
         Radiance of the sky, cd/m2.
+    glb : GlbBuilder
+        The scene.
+    emitters : list of str
+        Names of the emissive materials that were added.
     """
 
     sky: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -32,24 +35,24 @@ class Level:
     def put(
         self, name: str, surface: Surface, material: str, at: Point = (0.0, 0.0, 0.0), **how: float
     ) -> None:
-        """Add a surface as an object of its own."""
+        """Add a surface as a new object."""
         self.glb.place(name, self.glb.mesh(name, [(surface, material)]), at, **how)
 
 
 def slab(low: Point, high: Point, faces: tuple[str, ...] = FACES) -> Surface:
-    """Return a box between two corners."""
+    """Return faces of the axis-aligned box between two opposite corners; fronts point outwards."""
     face = box_faces(low, high)
     return quads([face[name] for name in faces])
 
 
 def inside(low: Point, high: Point, faces: tuple[str, ...] = FACES) -> Surface:
-    """Return the faces of a box as seen from within."""
+    """Return faces of the axis-aligned box between two opposite corners; fronts point inwards."""
     face = box_faces(low, high)
     return quads([face[name][::-1] for name in faces])
 
 
 def sheet(corner: Point, u: Point, v: Point, cells: tuple[int, int] = (1, 1)) -> Surface:
-    """Return a rectangle from a corner along two edges, with uv; its front is towards u x v."""
+    """Return a rectangle with uv, given by a corner and its edge vectors u and v. Its front faces u x v."""
     a, b = np.meshgrid(np.linspace(0, 1, cells[0] + 1), np.linspace(0, 1, cells[1] + 1), indexing="ij")
     share = np.stack([a.ravel(), b.ravel()], axis=1)
     position = np.array(corner) + share[:, :1] * np.array(u) + share[:, 1:] * np.array(v)
@@ -64,13 +67,15 @@ def _grid(n: int, m: int) -> NDArray[np.int64]:
 
 
 def wall(low: Point, high: Point, *holes: tuple[float, float, float, float]) -> Surface:
-    """Return a solid wall with openings, made of boxes side by side as kits are.
+    """Return a solid wall with openings, made of adjacent boxes, as in modular kits.
 
     Parameters
     ----------
     low, high : Point
-        The wall runs along the longer of x and z.
-    holes : (start, bottom, end, top), along the wall in world metres, sorted by start
+        Opposite corners of the wall, metres. The wall runs along x or z, whichever extent is larger.
+    holes : (start, bottom, end, top)
+        The openings, in world metres: start and end along the wall, bottom and top along y. They are sorted
+        by start.
     """
     along = 0 if high[0] - low[0] > high[2] - low[2] else 2
 
@@ -101,16 +106,20 @@ def house(
     foot: float = 0.0,
     holes: dict[str, tuple[float, float, float, float]] | None = None,
 ) -> None:
-    """Add four walls and a flat roof that overlaps them; the ends of two walls lie inside the others.
+    """Add a house of four walls and a flat roof that overlaps them.
+
+    The ends of the walls at -x and +x lie inside the other two walls.
 
     Parameters
     ----------
     middle : (x, z)
+        Centre of the room, metres.
     size : Point
-        Of the room, metres.
+        Size of the room, metres.
     foot : float
-        Height at which the walls begin.
-    holes : {"-x", "+x", "-z", "+z": opening relative to the room's middle}
+        y of the lower ends of the walls, metres.
+    holes : dict of str to (start, bottom, end, top)
+        The opening of a wall, by its side "-x", "+x", "-z" or "+z". Start and end are relative to `middle`.
     """
     x, z = middle
     a, h, b = size[0] / 2, size[1], size[2] / 2
@@ -131,7 +140,7 @@ def house(
 
 
 def terrain(size: float, cells: int) -> Surface:
-    """Return rolling ground about the origin, its height given by `height`."""
+    """Return a square of rolling ground around the origin, whose height is given by `height`."""
     flat = sheet((-size / 2, 0, -size / 2), (0, 0, size), (size, 0, 0), (cells, cells))
     x, z = flat.position[:, 0], flat.position[:, 2]
     position = np.stack([x, height(x, z), z], axis=1).round(4)
@@ -141,7 +150,7 @@ def terrain(size: float, cells: int) -> Surface:
 
 
 def height(x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the height of the terrain."""
+    """Return the height of the terrain at (x, z), metres."""
     return np.asarray(0.5 * np.sin(0.45 * x) * np.cos(0.35 * z) + 0.15 * np.sin(1.1 * x + 0.7 * z))
 
 
@@ -152,7 +161,7 @@ def _slope(x: NDArray[np.float64], z: NDArray[np.float64], axis: int) -> NDArray
 
 
 def rock(radius: float, seed: int, subdivisions: int = 2) -> Surface:
-    """Return a lump: a sphere pushed about by a few waves."""
+    """Return a rock: a sphere whose radius is modulated by five random waves."""
     rng = np.random.default_rng(seed)
     sphere = ball(1.0, subdivisions)
     far = np.ones(len(sphere.position))
@@ -163,7 +172,7 @@ def rock(radius: float, seed: int, subdivisions: int = 2) -> Surface:
 
 
 def smooth(position: NDArray[np.float64], triangle: NDArray[np.int64]) -> Surface:
-    """Return triangles with the mean of their normals at each vertex."""
+    """Return a surface whose vertex normals are the area-weighted means of face normals."""
     corner = position[triangle]
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal = np.zeros_like(position)
@@ -174,7 +183,7 @@ def smooth(position: NDArray[np.float64], triangle: NDArray[np.int64]) -> Surfac
 
 
 def crossed(width: float, high: float, cards: int) -> Surface:
-    """Return upright cards that cross in the middle, with uv."""
+    """Return upright rectangles (billboards) with uv that cross in the y axis."""
     parts = []
     for k in range(cards):
         c, s = round(math.cos(math.pi * k / cards), 7), round(math.sin(math.pi * k / cards), 7)
@@ -183,7 +192,7 @@ def crossed(width: float, high: float, cards: int) -> Surface:
 
 
 def leaf_picture(size: int = 32) -> NDArray[np.uint8]:
-    """Return leaves (size, size, 4): discs that are there, nothing between them."""
+    """Return a texture of leaves, (size, size, 4) uint8: opaque discs, transparent between them."""
     row, column = np.mgrid[:size, :size]
     there = ((row % 8 - 3.5) ** 2 + (column % 8 - 3.5 + (row // 8 % 2) * 0.5) ** 2) < 11
     picture = np.zeros((size, size, 4), np.uint8)
@@ -193,7 +202,7 @@ def leaf_picture(size: int = 32) -> NDArray[np.uint8]:
 
 
 def glass_picture(size: int = 16) -> NDArray[np.uint8]:
-    """Return stained glass (size, size, 4): squares of four colours behind lead."""
+    """Return a texture of stained glass, (size, size, 4) uint8: squares of four colours between opaque lead."""
     colours = np.array([(230, 60, 40), (50, 90, 220), (240, 200, 60), (60, 180, 90)], np.uint8)
     row, column = np.mgrid[:size, :size]
     picture = np.zeros((size, size, 4), np.uint8)
@@ -205,7 +214,7 @@ def glass_picture(size: int = 16) -> NDArray[np.uint8]:
 
 
 def led_picture(size: int = 64, step: int = 16) -> NDArray[np.uint8]:
-    """Return a black sign (size, size, 3) of which one pixel in step x step shines."""
+    """Return a black emissive texture, (size, size, 3) uint8, with one white pixel in each step x step pixels."""
     picture = np.zeros((size, size, 3), np.uint8)
     picture[step // 2 :: step, step // 2 :: step] = 255
     return picture

@@ -1,4 +1,4 @@
-"""Levels under a roof: closed rooms, corridors, garages, halls, stairs, kitchens, cellars."""
+"""Indoor levels: closed rooms, corridors, a garage, halls, stairs, a kitchen, a cellar."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _panel_light(level: Level, name: str, at: Point, size: float = 0.6, radiance
 
 
 def make_closed() -> Level:
-    """Four rooms without windows on a floor that runs on outside, under a sky: no light is in any of them."""
+    """Four closed rooms without light, under a sky. They share a floor that continues outside."""
     level = _indoors(1000.0)
     level.put("floor", ground((-10, -4), (10, 4)), "plaster")
     for k, both in enumerate(("", ", both sides")):
@@ -52,7 +52,7 @@ def make_closed() -> Level:
 
 
 def make_garage() -> Level:
-    """A shut garage whose beams, shelves and machines reach through its walls."""
+    """A closed garage whose beams, shelves and machines pass through its walls."""
     level = _indoors(500.0)
     level.put("floor", ground((-6, -6), (6, 6), (3, 3)), "concrete")
     house(level, "garage", (0.03, 0.02), (6, 2.6, 5), "plaster, both sides", thick=0.05)
@@ -69,7 +69,7 @@ def make_garage() -> Level:
 
 
 def make_corridors() -> Level:
-    """Corridors that meet in a T; each wall's end lies inside another wall."""
+    """Corridors that form a T. The ends of each wall lie inside other walls."""
     level = _indoors(1500.0)
     level.put("floor", slab((-7.2, -0.2, -1.4), (7.2, 0.0, 8.2)), "concrete")
     level.put("ceiling", slab((-7.2, 2.45, -1.4), (7.2, 2.7, 8.2)), "plaster")
@@ -91,7 +91,7 @@ def make_corridors() -> Level:
 
 
 def make_storeys() -> Level:
-    """Two storeys joined by stairs; light comes in upstairs."""
+    """Two storeys connected by stairs. Light enters only through windows of the upper storey."""
     level = _indoors(2500.0)
     level.glb.light("sun", "directional", 30_000.0, towards=(0.5, -0.6, -0.6))
     level.put("yard", ground((-9, -8), (9, 8)), "concrete")
@@ -111,7 +111,7 @@ def make_storeys() -> Level:
 
 
 def make_decals(apart: float = 0.001) -> Level:
-    """Posters, notices and stains one millimetre before the walls of a room, opaque, cut out and blended."""
+    """Decals one millimetre in front of the walls and floor of a room: opaque, masked and blended."""
     level = _indoors()
     stain = np.zeros((16, 16, 4), np.uint8)
     stain[..., :3], stain[4:12, 4:12, 3] = (120, 60, 30), 160
@@ -128,7 +128,7 @@ def make_decals(apart: float = 0.001) -> Level:
 
 
 def make_tunnel() -> Level:
-    """A dark tunnel lit by signs of which one pixel in 256 shines."""
+    """A dark tunnel lit by signs. One in 256 pixels of their emissive texture is not black."""
     level = _indoors()
     level.glb.material("sign", BLACK, emission=(20_000.0, 6000.0, 1000.0), emission_texture=led_picture())
     level.put("tunnel", inside((-2, 0, -15), (2, 3, 15)), "concrete")
@@ -140,7 +140,7 @@ def make_tunnel() -> Level:
 
 
 def make_kitchen() -> Level:
-    """Cupboards pushed into each other and into the walls, all of them double-sided."""
+    """A kitchen of double-sided cupboards that intersect each other and the walls."""
     level = _indoors(1500.0)
     level.put("floor", ground((-4, -4), (4, 4)), "wood, both sides")
     house(
@@ -166,7 +166,7 @@ def make_kitchen() -> Level:
 
 
 def make_church() -> Level:
-    """A nave behind stained glass."""
+    """The nave of a church with windows of stained glass."""
     level = _indoors(1500.0)
     level.glb.material("glass", (1.0, 1.0, 1.0), texture=glass_picture(), mode="BLEND", double_sided=True)
     level.glb.light("sun", "directional", 40_000.0, towards=(-0.7, -0.6, 0.1))
@@ -205,7 +205,7 @@ def make_warehouse() -> Level:
 
 
 def make_cellar() -> Level:
-    """A cellar with one small window under its ceiling, at the bottom of a shaft."""
+    """A cellar with one small window below its ceiling, which opens to a light shaft."""
     level = _indoors(3000.0)
     level.put("cellar floor", slab((-3.1, -2.6, -4.1), (3.1, -2.4, 4.1)), "concrete")
     level.put("ceiling", slab((-3.3, -0.1, -4.3), (3.3, 0.05, 4.3)), "plaster")
@@ -230,7 +230,7 @@ def make_cellar() -> Level:
 
 
 def make_centimetres(unit: float = 100.0) -> Level:
-    """A furnished room whose file holds centimetres, as if they were metres."""
+    """A furnished room whose file contains centimetres where glTF requires metres."""
     level = _indoors()
 
     def put(name: str, surface: object, material: str) -> None:

@@ -1,4 +1,4 @@
-"""Levels under the sky: streets, terrain, rocks, plants, glass and what else lies about outdoors."""
+"""Outdoor levels: a street, terrain, rocks, trees, a greenhouse, a cave and others."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def _outdoors(sky: float, sun: float = 0.0, towards: tuple[float, float, float] 
 
 
 def ground(low: tuple[float, float], high: tuple[float, float], cells: tuple[int, int] = (1, 1)) -> Surface:
-    """Return level ground that faces up."""
+    """Return a horizontal rectangle at y = 0 between the corners (x, z) `low` and `high`, facing up."""
     return sheet((low[0], 0, low[1]), (0, 0, high[1] - low[1]), (high[0] - low[0], 0, 0), cells)
 
 
 def make_street() -> Level:
-    """A sunlit street; one house is shut, one has a window, one an emitter behind a closed door."""
+    """A sunlit street with four houses: closed, with a window, closed with a light inside, and with a door."""
     level = _outdoors(2000.0, 50_000.0)
     level.put("street", ground((-13, -7), (13, 7), (13, 7)), "concrete")
     house(level, "shut", (-8, -3), (4, 2.6, 4), "plaster")
@@ -59,7 +59,7 @@ def make_street() -> Level:
 
 
 def make_huts() -> Level:
-    """Two huts on rolling ground that runs through them; one of them is shut."""
+    """Two huts, one closed and one open, on rolling ground that continues inside them."""
     level = _outdoors(1500.0, 30_000.0)
     level.put("terrain", terrain(20.0, 32), "concrete")
     house(level, "shut", (-4, -2), (3.2, 2.6, 3.2), "plaster", foot=-1.2)
@@ -71,7 +71,7 @@ def make_huts() -> Level:
 
 
 def make_greenhouse() -> Level:
-    """Glass of one sheet a pane on all sides, with a frame that the panes pass through."""
+    """A greenhouse whose panes are single sheets of glass that pass through the frame."""
     level = _outdoors(1000.0, 20_000.0, (0.0, -1.0, 0.0))
     level.glb.material("glass", (1.0, 1.0, 1.0), alpha=0.25, mode="BLEND", double_sided=True)
     level.put("soil", ground((-8, -8), (8, 8)), "wood")
@@ -95,7 +95,7 @@ def make_greenhouse() -> Level:
 
 
 def make_rocks() -> Level:
-    """A kit of rocks pushed into each other and into the ground."""
+    """Rocks that intersect each other and the ground."""
     level = _outdoors(2000.0, 40_000.0)
     level.put("ground", ground((-7, -7), (7, 7)), "concrete")
     rng = np.random.default_rng(5)
@@ -108,7 +108,7 @@ def make_rocks() -> Level:
 
 
 def make_grove() -> Level:
-    """Trees of crossing cards whose leaves are cut out by alpha."""
+    """Trees made of crossing billboards whose leaves are cut out by alpha (MASK)."""
     level = _outdoors(3000.0, 30_000.0)
     level.glb.material("leaves", (1.0, 1.0, 1.0), texture=leaf_picture(), mode="MASK", double_sided=True)
     level.put("meadow", ground((-8, -8), (8, 8)), "concrete")
@@ -122,7 +122,7 @@ def make_grove() -> Level:
 
 
 def make_skybox() -> Level:
-    """A yard inside a mesh that shines as the sky: what lies free has pi times its radiance."""
+    """A yard inside an emissive sphere, a skybox: the irradiance of unoccluded surfaces is pi x radiance."""
     level = _outdoors(0.0)
     level.glb.material("sky", BLACK, emission=(1000.0, 1000.0, 1000.0))
     dome = ball(300.0, 2)
@@ -135,7 +135,7 @@ def make_skybox() -> Level:
 
 
 def make_hulls(hulls: bool = True) -> Level:
-    """A yard with what an engine collides with still in the file: boxes about things, not to be seen."""
+    """A yard with objects and their invisible collision hulls; without `hulls`, the objects only."""
     level = _outdoors(1000.0, 20_000.0)
     level.glb.material("hull", (1.0, 1.0, 1.0), alpha=0.0, mode="BLEND")
     level.put("yard", ground((-6, -6), (6, 6)), "concrete")
@@ -158,7 +158,7 @@ def make_hulls(hulls: bool = True) -> Level:
 
 
 def make_balcony() -> Level:
-    """A slab that passes through a house's front, with rails; a door behind it."""
+    """A house with a balcony: a slab with rails that passes through the front, at a door."""
     level = _outdoors(2000.0, 40_000.0, (0.3, -0.7, -0.5))
     level.put("street", ground((-8, -6), (8, 8)), "concrete")
     house(level, "flat", (0, 0), (5, 5.4, 4), "plaster", holes={"+z": (-1.0, 2.8, 1.0, 4.9)})
@@ -173,7 +173,7 @@ def make_balcony() -> Level:
 
 
 def make_cave() -> Level:
-    """A tube of rock that is open at one end, with a fire at the other."""
+    """A cave: a tube of rock that is open at one end and has a fire at the other."""
     level = _outdoors(2000.0, 30_000.0, (0.1, -0.35, -0.9))
     level.glb.material("fire", BLACK, emission=(3000.0, 1500.0, 400.0))
     rings, sides = 24, 20

@@ -1,9 +1,10 @@
-"""Makes levels as designers build them, to test whether their light is correct.
+"""Makes levels as level designers build them, with parts that intersect, to test whether their light is correct.
 
-    python assets/make_levels.py            writes those with known answers to assets/levels
-    python assets/make_levels.py FOLDER     writes all of them to FOLDER, with the sky of each in levels.json
+    python assets/make_levels.py            writes the levels whose light is known to assets/levels
+    python assets/make_levels.py FOLDER     writes all levels to FOLDER
 
-The output is deterministic; tests make the levels again and compare. Metres, +Y up, cd/m2, cd and lx.
+The radiance of each level's sky is written to levels.json in the same folder. The output is deterministic.
+Tests make the levels again and compare the files. Units are metres, cd/m2, cd and lx; +Y is up.
 """
 
 from __future__ import annotations

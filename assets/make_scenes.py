@@ -1,9 +1,10 @@
 """Makes the project's own scenes: cornell.glb, interior.glb, hall.glb.
 
-    python assets/make_scenes.py            writes beside this file
-    python assets/make_scenes.py FOLDER     writes there
+    python assets/make_scenes.py            writes the scenes to the folder of this file
+    python assets/make_scenes.py FOLDER     writes the scenes to FOLDER
 
-The output is deterministic; a test makes the scenes again and compares. Metres, +Y up, cd/m2, cd and lx.
+The output is deterministic. A test makes the scenes again and compares the files. Units are metres, cd/m2, cd
+and lx; +Y is up.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Closed solids as triangles with normals: boxes, rounded boxes, lathe work, balls, tori, rooms.
+"""Solids as triangles with normals: boxes, rounded boxes, surfaces of revolution, balls, tori, rooms.
 
-All are in metres, +Y up, counter-clockwise seen from outside.
+Positions are in metres, +Y is up, and triangles are counter-clockwise seen from outside.
 """
 
 from __future__ import annotations
@@ -15,18 +15,20 @@ from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
 
-# Profile corners flatter than this many degrees are shaded smooth.
+# Angle between neighbouring segments of a profile, degrees. Below it, the corner between them is shaded
+# smooth.
 CREASE = 35.0
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles with one normal a vertex.
+    """Triangles with one normal for each vertex.
 
     Attributes
     ----------
     position, normal : (V, 3) float64
     triangle : (T, 3) int64
+        Indices of vertices.
     uv : (V, 2) float64 or None
     """
 
@@ -36,12 +38,12 @@ class Surface:
     uv: NDArray[np.float64] | None = None
 
     def moved(self, by: Point) -> Surface:
-        """Return the same surface elsewhere."""
+        """Return the surface translated by `by`, metres."""
         return Surface(self.position + np.array(by), self.normal, self.triangle, self.uv)
 
 
 def join(*parts: Surface) -> Surface:
-    """Return several surfaces as one; all with uv, or none."""
+    """Return several surfaces as one surface. It has uv if all of them have uv."""
     offset = np.cumsum([0, *(len(part.position) for part in parts)])
     uvs = [part.uv for part in parts if part.uv is not None]
     return Surface(
@@ -53,7 +55,10 @@ def join(*parts: Surface) -> Surface:
 
 
 def quads(corner: list[list[Point]], *, uv_scale: float | None = None) -> Surface:
-    """Return flat quads, four corners each, counter-clockwise; uv in metres times `uv_scale`."""
+    """Return flat quadrilaterals, each given by four corners, counter-clockwise.
+
+    With `uv_scale`, the uv are world coordinates in metres times `uv_scale`.
+    """
     position = np.array(corner, float)
     along, across = position[:, 1] - position[:, 0], position[:, 3] - position[:, 0]
     normal = np.cross(along, across)
@@ -62,7 +67,7 @@ def quads(corner: list[list[Point]], *, uv_scale: float | None = None) -> Surfac
     triangle = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
     uv = None
     if uv_scale is not None:
-        # Seen along the axis that the quad faces most, in world metres: neighbours match.
+        # Project along the axis of the normal's largest component. The uv of neighbouring quads then match.
         axis = np.abs(normal).argmax(axis=1)
         plane = np.array([[2, 1], [0, 2], [0, 1]])[axis]
         uv = (
@@ -76,7 +81,7 @@ FACES = ("-x", "+x", "-y", "+y", "-z", "+z")
 
 
 def box_faces(low: Point, high: Point) -> dict[str, list[Point]]:
-    """Return the six faces of a box, by the direction they face."""
+    """Return the corners of the six faces of a box, by the direction that each face points to."""
     (a, b, c), (d, e, f) = low, high
     return {
         "-x": [(a, b, c), (a, b, f), (a, e, f), (a, e, c)],
@@ -89,14 +94,17 @@ def box_faces(low: Point, high: Point) -> dict[str, list[Point]]:
 
 
 def box(size: Point, *, faces: tuple[str, ...] = FACES, uv_scale: float | None = None) -> Surface:
-    """Return a box that stands on y = 0 with its middle on the y axis."""
+    """Return faces of a box that stands on the plane y = 0, centred on the y axis."""
     x, y, z = size
     face = box_faces((-x / 2, 0.0, -z / 2), (x / 2, y, z / 2))
     return quads([face[name] for name in faces], uv_scale=uv_scale)
 
 
 def rounded_box(size: Point, radius: float, steps: int = 6) -> Surface:
-    """Return a box with round edges that stands on y = 0: each face a grid, pushed onto the rounding."""
+    """Return a box with rounded edges that stands on the plane y = 0.
+
+    Each face is a grid whose vertices are projected onto the rounded surface.
+    """
     half = np.array(size) / 2
     core = half - radius
     parts = []
@@ -115,25 +123,27 @@ def rounded_box(size: Point, radius: float, steps: int = 6) -> Surface:
 
 
 def _ticks(core: float, radius: float, steps: int) -> NDArray[np.float64]:
-    # The rounding is half of a quarter circle on each face; the grid runs over equal angles of it.
+    # Each face contains one half of the quarter circles at its edges. Space the grid lines by equal angles.
     angle = [math.tan(math.radians(45.0) * k / steps) for k in range(steps + 1)]
     arc = radius * np.array(angle)
     return np.concatenate([-core - arc[::-1], core + arc])
 
 
 def lathe(profile: list[tuple[float, float]], segments: int) -> Surface:
-    """Return a profile turned about the y axis.
+    """Return the surface of revolution of a profile around the y axis.
 
     Parameters
     ----------
     profile : list of (radius, y)
-        Runs upwards on the outside; radius 0 at both ends closes the solid.
+        Points of the profile, which runs upwards on the outside. The solid is closed if the radius is 0 at
+        both ends.
     segments : int
-        Sides of the circle.
+        Number of sides that approximate the circle.
     """
     point = np.array(profile, float)
     step = np.diff(point, axis=0)
-    # The outward normal of a segment that runs upwards points away from the axis.
+    # Compute the outward normals of the segments. That of a segment that runs upwards points away from the
+    # axis.
     side = np.stack([step[:, 1], -step[:, 0]], axis=1)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     smooth = (side[1:] * side[:-1]).sum(axis=1) > math.cos(math.radians(CREASE))
@@ -148,7 +158,7 @@ def lathe(profile: list[tuple[float, float]], segments: int) -> Surface:
         pair = np.array([start / np.linalg.norm(start), end / np.linalg.norm(end)])
         position = _spin(point[k : k + 2], turn)
         sheet = _sheet(position, _spin(pair, turn), flip=False)
-        # At the axis one side of every quad has no length: only one of its two triangles is kept.
+        # Drop triangles without area. At the axis, one of the two triangles of every quad has none.
         corner = sheet.position[sheet.triangle]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
         parts.append(Surface(sheet.position, sheet.normal, sheet.triangle[area > 1e-12]))
@@ -156,7 +166,7 @@ def lathe(profile: list[tuple[float, float]], segments: int) -> Surface:
 
 
 def ball(radius: float, subdivisions: int = 3) -> Surface:
-    """Return an icosahedron refined onto a sphere about the origin."""
+    """Return a sphere around the origin, made by subdividing an icosahedron."""
     golden = (1 + math.sqrt(5)) / 2
     point = [
         *[(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)],
@@ -187,7 +197,7 @@ def ball(radius: float, subdivisions: int = 3) -> Surface:
 
 
 def torus(radius: float, tube: float, around: int, across: int) -> Surface:
-    """Return a ring that lies about the y axis, its middle in the origin."""
+    """Return a torus around the y axis, centred at the origin."""
     circle = [(2 * math.pi * k / across) for k in range(across + 1)]
     outline = np.array([[math.cos(t), math.sin(t)] for t in circle])
     outline[-1] = outline[0]
@@ -204,21 +214,21 @@ def rooms(
     *,
     uv_scale: float | None = None,
 ) -> dict[str, Surface]:
-    """Return the surface of a building made of grid cells, each face once and none inside the walls.
+    """Return the surface of a building made of grid cells, without faces between solid cells.
 
     Parameters
     ----------
     grid : three ascending lists
-        Where cells end along x, y and z, metres.
+        Coordinates of the borders between cells along x, y and z, metres.
     solid : callable
-        Takes a point; names the material of the cell around it, or None for air.
+        Takes the centre (x, y, z) of a cell and returns the name of its material, or None for air.
     uv_scale : float or None
-        Texture repeats per metre.
+        Number of texture repeats per metre; None: no uv.
 
     Returns
     -------
-    dict of name to Surface
-        All names together are closed.
+    dict of str to Surface
+        The surface of each material. Together these surfaces are closed.
     """
     counts = [len(axis) - 1 for axis in grid]
     middle = [[(a + b) / 2 for a, b in pairwise(axis)] for axis in grid]
@@ -242,7 +252,10 @@ def rooms(
 
 
 def _spin(point: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn (P, 2) points (radius, y) to (P, S, 3)."""
+    """Rotate P points (radius, y) around the y axis to S angles; return (P, S, 3).
+
+    `turn` (S, 2) are the cosines and sines of the angles.
+    """
     out = np.zeros((len(point), len(turn), 3))
     out[..., 0] = point[:, None, 0] * turn[None, :, 0]
     out[..., 1] = point[:, None, 1]
@@ -251,7 +264,7 @@ def _spin(point: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.f
 
 
 def _sheet(position: NDArray[np.float64], normal: NDArray[np.float64], *, flip: bool) -> Surface:
-    """Return a grid of (P, Q) points as triangles."""
+    """Return the triangles of a grid of points: `position` and `normal` are (P, Q, 3)."""
     rows, columns = position.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
