@@ -201,8 +201,7 @@ def show(path, row, lane, camera, n_subpaths, value, ray):
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
     value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection. The radiance of a pixel
-    is
-        the sum of such splats over the light subpaths of all pixels
+        is the sum of its splats from the light subpaths of all pixels
     ray : (6,) float64, output, from the vertex to the camera, see `connect`
     """
     for a in range(3):
@@ -243,13 +242,12 @@ def trace_both_ways(
     where, toward, normal, begin, surfaces, lights, shading, sobol_points, settings, out : see `trace_paths`
     buffers : `PacketBuffers`
     camera : (15,) float64, see `camera`; unused if paths start at surface points
-    n_subpaths : float, number of light subpaths of the whole picture for each sample of a pixel, which is the
-        number of pixels; 0 if paths start at surface points
+    n_subpaths : float, number of pixels of the picture, which is the number of light subpaths for each sample
+        of a pixel; 0 if paths start at surface points
     sphere : (4,) float64, `Reference.sphere`
     splat_pixel : (q,) int64, output, number of the pixel of each splat, which may be outside this tile
     splat : (q, 3) float64, output, light of each splat, in the unit of `out`. With a camera, q must be at
-    least
-        m n (`MAX_LIGHT_VERTICES` - 1)
+        least m n (`MAX_LIGHT_VERTICES` - 1)
 
     Returns
     -------

@@ -35,13 +35,14 @@ MAX_LIGHT_VERTICES = 8
 #
 #     BACK      unit direction to the previous vertex, world (3)
 #     INVERSE   1 / density, per area, with which this vertex was sampled
-#     OPEN      factor of the technique that connects the previous vertex to this one. It is 1 except in three
-#               cases. Mirror reflection at the previous vertex: 0. Camera: `n_subpaths` of `trace_both_ways`.
-#               Sky: the ratio of densities in `reach_vertex`
+#     OPEN      relative density of the technique that connects the previous vertex to this one. It is 1 with
+#               three exceptions. If the previous vertex reflected as a mirror: 0. If it is the camera:
+#               `n_subpaths` of `trace_both_ways`. If it is the sky: the ratio of densities in `reach_vertex`
 #     LEAVE     cosine of the next ray to the geometric normal
 #     ORIGIN    before the first hit: 0 if the path started at a finite distance, 1 for parallel light, 2 for
 #               the sky. After the first hit: 0
-#     CHAIN     sums of p_s' / p_s over the techniques that connect at earlier vertices (MAX_LIGHT_VERTICES)
+#     CHAIN     MIS sums: sums of relative densities over the techniques that connect at earlier vertices. A
+#               light subpath uses the first row, an eye subpath uses MAX_LIGHT_VERTICES rows
 BACK, INVERSE, OPEN, LEAVE, ORIGIN, CHAIN = (N_ROWS + offset for offset in (0, 3, 4, 5, 6, 7))
 N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 
@@ -92,7 +93,7 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
 
 @inner
 def leave_vertex(path, lane, density, reverse, smooth, depth):
-    """Update the MIS sums of a path at its current vertex, after its next direction `GO` has been sampled.
+    """Update the MIS sums of a path (`CHAIN`) at its current vertex, after `GO` has been sampled.
 
     path : (N_ROWS_BOTH, n) float64
     density : density of `GO`, per steradian; 1 for a mirror reflection
@@ -121,7 +122,7 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):
 
 @inner
 def carry(path, lane, factor, depth):
-    """Multiply the MIS sums of a path by `factor`.
+    """Multiply the MIS sums of a path (`CHAIN`) by `factor`.
 
     The factor converts a density per steradian at the next vertex to a density per area at this vertex.
 
@@ -155,8 +156,7 @@ def reach_vertex(path, lane, distance, depth):
         # Light from infinity: its density per area does not depend on the distance.
         path[INVERSE, lane] = 1.0 / (path[DENSITY, lane] * cosine)
         if path[ORIGIN, lane] == 2.0:
-            # Ratio of the density of light samples of the sky, cosine / pi, to that of light subpaths, 0.25 /
-            # pi.
+            # Ratio of two densities of the sky: cosine / pi of light samples, 0.25 / pi of light subpaths.
             path[OPEN, lane] = 4.0 * cosine
     return cosine
 

@@ -53,9 +53,9 @@ _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 #     DELTA_CHANCE          probability with which the light is chosen
 #     DELTA_INVERSE_RANGE   1 / range^2, 1/m2; 0 without a range
 #     DELTA_TANGENT         unit direction of azimuth 0, if tabulated (3)
-#     DELTA_TABLE           index of its table's first number in `LightTable.falloff`
-#     DELTA_COSINES         number of the table's rows
-#     DELTA_AZIMUTHS        number of the table's columns
+#     DELTA_TABLE           index in `LightTable.falloff` of the first number of its fall-off table
+#     DELTA_COSINES         number of rows of the table, one for each cosine
+#     DELTA_AZIMUTHS        number of columns of the table, one for each azimuth
 DELTA_FORM, DELTA_POSITION, DELTA_AXIS, DELTA_INTENSITY, DELTA_MIN_COSINE, DELTA_CONE_SCALE = (
     0,
     1,
@@ -383,10 +383,11 @@ def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @inner
 def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the unit direction (3 floats) from (x, y, z) to light e without area, ray length, irradiance.
+    """Return the unit direction to a light without area, the length of a ray to it, and its irradiance.
 
-    The ray length, metres, is slightly shorter than the distance to the light. The irradiance is that of a
-    surface that faces the light, divided by the light's intensity.
+    Returns dx, dy, dz, length, irradiance. The ray starts at (x, y, z). Its length, metres, is slightly
+    shorter than the distance to the light. The irradiance is that of a surface at (x, y, z) that faces the
+    light, divided by the light's intensity.
 
     lights : `LightTable`; e : row of `LightTable.delta`
     """

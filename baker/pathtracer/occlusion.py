@@ -2,8 +2,8 @@
 
 A packet holds one ray from each of eight neighbouring points, all with the same sample number. The leading
 bits of their random numbers are the same for all points (`shared`), so that the rays of points close together
-are nearly parallel. Embree traces such a packet as coherent. Each loop over lanes accesses one array, so that
-the compiler vectorizes it (see `path_blocks`).
+are nearly parallel. Such a packet is traced with Embree's coherent flag, which is faster. Each loop over
+lanes accesses one array, so that the compiler vectorizes it (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """

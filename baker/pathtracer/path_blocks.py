@@ -127,7 +127,7 @@ def unsigned(index):  # type: ignore[no-untyped-def]
 
 @inner
 def lane_start(lane):  # type: ignore[no-untyped-def]
-    """Return the index in `s` of a lane's number in row 0; lanes are numbered through all blocks."""
+    """Return the index in `s` of row 0 of a lane. Lane numbers continue from one block to the next."""
     return unsigned(lane // BLOCK_WIDTH * BLOCK + lane % BLOCK_WIDTH)
 
 

@@ -8,6 +8,8 @@ float64, one at a time (`vertex`). Light is summed in float64. Results do not de
 the random numbers of a path depend on (seed, pass, point, sample) only, and the light of a tile's paths is
 added in a fixed order. `tests/path_tracer.py` is an independent path tracer for Lambertian surfaces.
 
+In all functions, `s` and `words` are the blocks of `path_blocks`, viewed as float32 and as uint32.
+
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 9 and 10.
 """
@@ -301,7 +303,7 @@ def trace_paths(
     where, toward, normal : (m, k, 3) float64, k starts for each point. If `at_surface`: position, shading
         normal and geometric normal. Else: origin and direction of a ray, `normal` unused. Sample s of pass p
         takes start (p n + s) modulo k. `where` may be (1, 1, 3), one origin for all rays
-    begin : number of the first point, for its random numbers
+    begin : number of the first point; random numbers depend on the number of the point
     surfaces : `Surfaces`; lights : `LightTable`; shading : `Shading`; memory : `PathMemory`
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     settings : `PathSettings`

@@ -37,7 +37,7 @@ class Picture(Result):
     variance : (H, W, 3) float32
         Squared standard error of `colour` before denoising.
     layers : dict of str to (H, W, C) float32
-        The layers that the setting `aov` names, by name.
+        Layers requested by the setting `aov`, by name.
     unit : str
         Unit of `colour`: "cd/m2", or "1" for ambient occlusion.
     spp : int

@@ -7,10 +7,12 @@ A part is a set of connected triangles, see `closed_parts`. Parts that let light
   both sides and contains a part. It is a room if it has small holes and contains a part. It is a room if most
   of the scene is inside (a sky sphere).
 - A closed part whose normals mostly point inwards and which lies in a solid is a hollow of that solid (a room
-  with thick walls). Other such parts are rooms if they emit or contain anything, else solids wound inwards.
-- An open part is a cover if a flat lid would close it, its normals point outwards and it contains nothing (a
-  crate without a bottom). A point all of whose rays hit the inside of a cover is hidden, because another
-  surface closes the opening.
+  with thick walls). Other closed parts whose normals mostly point inwards are rooms if they emit, contain a
+  light, a camera or another part, or are the only part. Otherwise they are solids wound inwards.
+- An open part is a cover if a flat lid would close it, its normals point outwards, and no light, camera or
+other
+  part is inside (a crate without a bottom). A point all of whose rays hit the inside of a cover is hidden,
+  because another surface closes the opening.
 
 No light is inside a solid and none enters it. So a room that is classified as a solid by mistake would be
 dark anyway.

@@ -37,8 +37,8 @@ FILTER_VALID, FILTER_DATA, FILTER_CONTEXT, FILTER_RAY, FILTER_HIT, FILTER_WIDTH 
 # `geomID` of BLEND triangles, see `RayScene`.
 BLEND_GEOMETRY = np.uint32(2)
 # Values of a ray's ID row. They select what the hit filter does at a BLEND surface of alpha a and colour c.
-# T = (1 - a) lerp(1, c, a) is the transmittance of the surface, t is `BlendBuffers.transmittance` of ray n -
-# 1:
+# T = (1 - a) lerp(1, c, a) is the transmittance of the surface. t is `BlendBuffers.transmittance` of the ray
+# with index n - 1.
 #
 #     scene of all triangles     0             the ray stops with probability a
 #                                n = 1 to 16   the ray passes, t is multiplied by T

@@ -80,7 +80,10 @@ class Packing:
 
 
 def border(gap: int) -> int:
-    """Return the width of a page's empty border, texels: half a gap, so that repeated pages keep the gap."""
+    """Return the width of a page's empty border, texels.
+
+    It is half a gap, so that there is a whole gap between a page and its repetition.
+    """
     return max(1, (gap + 1) // 2)
 
 
@@ -120,7 +123,7 @@ def pack(
     Returns
     -------
     Packing
-        Incomplete if not all items fit.
+        Positions of the items. The packing is incomplete if not all items fit.
     """
     from baker.uv.kernels.uv_pack import place_items
 

@@ -14,7 +14,8 @@ from baker.core.settings import BakeSettings
 from baker.uv.outlines import Outlines
 from baker.uv.pack import Packing, border, fit_page, pack, texel_gap
 
-# Share of a page's area that the first attempt to fill it uses, and largest number of attempts.
+# Estimated share of a page's area that the instances of the first attempt to fill it need, and largest number
+# of attempts for a page.
 _FIRST_FILL = 0.92
 _PAGE_TRIES = 8
 

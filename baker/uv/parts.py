@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_faces, connected_vertices
 
-# Number of triangles of a block above which it is halved, and number of triangles of a job of several parts.
+# Largest number of triangles of a block, which is halved above it, and of a job that bundles several parts.
 JOB_TRIANGLES = 20_000
 # Number of triangles of a connected part above which it is cut into blocks. The time of xatlas grows faster
 # than linearly with the size of a part, and it crashed on a part of 328,000 triangles.

@@ -43,7 +43,7 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     Raises
     ------
     Cancelled
-        If `progress` returned a truthy value. The workers are killed, as for any exception.
+        If `progress` returned a truthy value. The worker processes are then killed.
     """
     total = sum(len(job.triangle) for job in jobs)
     if total < IN_PROCESS_TRIANGLES:

@@ -5,7 +5,7 @@ An outline is one span of texels for each row. The search for free space skips w
 that its time hardly depends on the size of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
-Generation*, 2002 (packing along outlines). Unlike there, free space below other outlines is filled.
+Generation*, 2002 (packing along outlines). In addition, free space below outlines is used here.
 """
 
 from __future__ import annotations
