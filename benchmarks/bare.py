@@ -88,7 +88,7 @@ def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, 
 def _made(function, buffers, origin, normal, begin, net, shared, far):  # type: ignore[no-untyped-def]
     """Create and trace all hemisphere rays of a tile.
 
-    Returns a number that depends on all results, so that the compiler does not remove the loop.
+    Returns a number that depends on the results, so that the compiler does not remove the loop.
     """
     width, scene = buffers.width, buffers.scene
     on, rays, words = buffers.lane_valid, buffers.lane_floats, buffers.lane_words
@@ -141,7 +141,7 @@ def _store(buffers, origin, normal, begin, net, shared, far, corner, cumulative,
 
 @njit(cache=True, nogil=True)
 def _ready(function, buffers, bank, lanes_on):  # type: ignore[no-untyped-def]
-    """Trace the packets stored by `_store`; return a number that depends on all results, see `_made`."""
+    """Trace the packets stored by `_store`; return a number that depends on the results, see `_made`."""
     width, scene, valid, floats, words = (
         buffers.width,
         buffers.scene,

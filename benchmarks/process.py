@@ -42,7 +42,7 @@ class Run:
     pages: list[dict[str, Any]]
 
     def plain(self) -> dict[str, Any]:
-        """Return the measurements as a dict that JSON can hold."""
+        """Return the measurements as a JSON-serialisable dict."""
         return asdict(self)
 
 

@@ -33,8 +33,8 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0, allow_outside: 
     scale : float
         Metres per unit of formats other than glTF.
     allow_outside : bool
-        Also read files that the scene names outside its folder, such as "../textures/wood.png". Without it,
-        such a name is an error.
+        Also read referenced files outside the scene's folder, such as "../textures/wood.png". Otherwise such
+        a reference raises an error.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def check(
     progress: Progress = silent,
     **keywords: Unpack[CheckKeywords],
 ) -> CheckReport:
-    """Find defects of a scene that would make its bake fail or its lightmap wrong.
+    """Find defects of a scene that would make a bake fail or cause errors in its lightmap.
 
     Parameters
     ----------

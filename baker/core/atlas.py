@@ -86,7 +86,7 @@ class Atlas(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return sizes, warnings, and the page and density of each object, as values that JSON can hold."""
+        """Return sizes, warnings, and the page and density of each object, as JSON-serialisable values."""
         return {
             "resolution": self.resolution,
             "n_pages": self.n_pages,

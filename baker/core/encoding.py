@@ -225,14 +225,14 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     pixels : ndarray of float32
         Values to write.
     components : tuple of int
-        Numbers of components that the format holds.
+        Numbers of components that the format supports.
     name : str
         Name of the file, for the message.
 
     Raises
     ------
     ValueError
-        If the shape is wrong or a pixel is NaN.
+        If the shape differs or a pixel is NaN.
     """
     if pixels.ndim != 3 or pixels.shape[2] not in components or 0 in pixels.shape:
         shapes = " nor ".join(f"(H, W, {count})" for count in components)

@@ -39,21 +39,21 @@ class BakerError(Exception):
 
 
 class SettingsError(BakerError):
-    """A flag or a configuration key is wrong (exit code 2)."""
+    """A flag, a setting or a configuration key is invalid (exit code 2)."""
 
     kind = "settings"
     exit_code = 2
 
 
 class InputError(BakerError):
-    """An input is unreadable, malformed or holds nothing to bake (exit code 3)."""
+    """An input is unreadable, malformed or contains nothing to bake (exit code 3)."""
 
     kind = "input"
     exit_code = 3
 
 
 class IndexRangeError(InputError):
-    """A face refers to a vertex that does not exist. The file can be checked and repaired, but not baked."""
+    """A face refers to a vertex that does not exist. `baker check` reports it as a finding."""
 
 
 class ResourceError(BakerError):

@@ -44,7 +44,7 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     Raises
     ------
     SettingsError
-        For the first such export.
+        If an export or a channel is missing; the message names the first one.
     """
     for name in names:
         for channel in EXPORTS.require(name, "export", setting="export").needs:

@@ -28,8 +28,8 @@ class Geometry:
     vertex_source : (V,) int32, index of the mesh vertex that each vertex is a copy of
     triangle : (T, 3) int32, indices into the vertices, counter-clockwise seen from the front
     face_normal : (T, 3) float32, unit, world
-    area : (T,) float32, m2
-    page, instance, chart, material : (T,) int32, indices
+    area : (T,) float32, m2, area of each triangle
+    page, instance, chart, material : (T,) int32, indices of each triangle's page, instance, chart, material
     double_sided : (T,) bool, whether the material is double-sided
     origin : (3,) float64, metres, world: `Scene.origin`
     """
@@ -71,7 +71,7 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
     Returns
     -------
     Geometry
-        The triangles of all instances, in order.
+        The triangles of all instances, in the order of instances.
     """
     origin = scene.origin if origin is None else origin
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}

@@ -114,7 +114,7 @@ class Lightmap(Result):
         return self.value[0] if self.value.shape[-1] in (1, 3) else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return channel, shape and description as values that JSON can hold, without the texels."""
+        """Return channel, shape and description as JSON-serialisable values, without the texels."""
         meaning = {**asdict(self.description), "components": list(self.description.components)}
         return {"channel": self.channel, "shape": list(self.value.shape), **meaning}
 
@@ -175,7 +175,7 @@ class BakeResult(Result):
         return next((lightmap.value[0] for lightmap in self.lightmaps.values()), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return statistics, timings, warnings and the manifest as values that JSON can hold."""
+        """Return statistics, timings, warnings and the manifest as JSON-serialisable values."""
         found = {
             "out": None if self.out is None else str(self.out),
             "statistics": self.statistics,

@@ -31,7 +31,7 @@ class Result:
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as values that JSON can hold: numbers, strings, lists and dicts."""
+        """Return the result as JSON-serialisable values: numbers, strings, lists and dicts."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

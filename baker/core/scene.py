@@ -44,7 +44,7 @@ class Texture:
     wrap : (str, str)
         "repeat", "mirror" or "clamp" along u and along v.
     nearest : bool
-        Whether lookups return the nearest pixel instead of interpolating.
+        Whether magnification uses the nearest pixel instead of interpolation.
     """
 
     image: NDArray[Any]
@@ -284,7 +284,7 @@ class Scene(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return names, counts and warnings as values that JSON can hold."""
+        """Return names, counts and warnings as JSON-serialisable values."""
         return {
             "name": self.name,
             "path": None if self.path is None else str(self.path),

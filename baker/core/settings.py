@@ -81,7 +81,7 @@ class CommonSettings(Settings):
         gt=0,
         allow_inf_nan=False,
     )
-    allow_outside: bool = setting(False, "Also read files that the scene names outside its folder.")
+    allow_outside: bool = setting(False, "Also read referenced files outside the scene's folder.")
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 

@@ -159,7 +159,7 @@ def _check_input(
     standard_error: NDArray[np.float32] | None,
     signed: bool,
 ) -> None:
-    """Raise ValueError for arguments that `denoise_page` does not take."""
+    """Raise ValueError if an argument of `denoise_page` has a wrong shape or type."""
     check_page(value, chart, covered=covered)
     if value.shape[2] not in (1, 3):
         raise ValueError(f"a page to denoise has 1 or 3 channels, this one has {value.shape[2]}")

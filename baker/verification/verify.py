@@ -168,7 +168,7 @@ class VerifyReport(Result):
         return next((pages[0] for pages in self.bake.maps.values()), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the verification as values that JSON can hold; `baker verify --json` prints them."""
+        """Return the report as JSON-serialisable values; `baker verify --json` prints them."""
         return {
             "passed": self.passed,
             "channels": {

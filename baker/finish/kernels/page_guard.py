@@ -71,7 +71,7 @@ def high_pass(luminance, chart, covered, out, first_row, end_row):
 
 @kernel
 def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_row):
-    """Limit the difference between a denoised and a noisy page to what the standard error explains.
+    """Limit the difference between a denoised and a noisy page by the noisy page's standard error.
 
     Parameters
     ----------
