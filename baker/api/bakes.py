@@ -94,7 +94,7 @@ def bake(
         scale : float, m, above 0, default 1.0
             Metres per unit of files in formats that do not specify it.
         allow_outside : bool, default False
-            Also read files that the scene names outside its folder.
+            Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None

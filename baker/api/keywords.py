@@ -79,7 +79,7 @@ class BakeKeywords(TypedDict, total=False):
     # Metres per unit of files in formats that do not specify it.
     scale: float
 
-    # Also read files that the scene names outside its folder.
+    # Also read referenced files outside the scene's folder.
     allow_outside: bool
 
     # Seed of all random numbers.
@@ -241,7 +241,7 @@ class RenderKeywords(TypedDict, total=False):
     # Factor of the sky radiance.
     sky_strength: float
 
-    # Also read files that the scene names outside its folder.
+    # Also read referenced files outside the scene's folder.
     allow_outside: bool
 
     # Seed of all random numbers.
@@ -267,7 +267,7 @@ class RepairKeywords(TypedDict, total=False):
     # Metres per unit of files in formats that do not specify it.
     scale: float
 
-    # Also read files that the scene names outside its folder.
+    # Also read referenced files outside the scene's folder.
     allow_outside: bool
 
     # Number of threads; default: all cores.

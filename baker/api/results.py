@@ -210,7 +210,7 @@ def render(
         sky_strength : float, from 0, default 1.0
             Factor of the sky radiance.
         allow_outside : bool, default False
-            Also read files that the scene names outside its folder.
+            Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None

@@ -164,7 +164,7 @@ def repair(
         scale : float, m, above 0, default 1.0
             Metres per unit of files in formats that do not specify it.
         allow_outside : bool, default False
-            Also read files that the scene names outside its folder.
+            Also read referenced files outside the scene's folder.
         threads : int | None, 1 to 1024, default None
             Number of threads; default: all cores.
 
