@@ -21,8 +21,8 @@ BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
 # Number of hits on solids from inside that prove a point to be inside. A single such hit is no proof, because
 # the ray may have passed through an edge.
 PROOF = 2
-# Factor in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside is the number of rays that hit a solid from
-# inside, n_elsewhere the number of rays that hit neither a solid from inside nor a black back.
+# Factor in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside rays hit a solid from inside. n_elsewhere
+# rays hit neither a solid from inside nor a black back.
 ELSEWHERE = 16
 
 
@@ -39,7 +39,7 @@ def inside_hits(
         cosine-weighted rays
     lookup : TriangleLookup; hit_kind : (T,) uint8, see above
     buffers : PacketBuffers
-    begin : number of the first texel, which seeds its random numbers and is its row of `hits`
+    begin : number of the first texel, which seeds the random numbers and is the row of `hits`
     sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
     proof : number of hits on solids from inside that prove a point to be inside
     hits : (n, w) uint8, counts are added, see `ELSEWHERE`

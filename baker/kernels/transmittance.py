@@ -48,8 +48,7 @@ _f = np.float32
 # Columns of `TransmittanceTable.row`. Columns 0 to 11 are those of `AlphaTable.row`.
 #
 #     COLOUR                         factor times vertex colour at corner 0, RGB (3)
-#     COLOUR_EDGE_1, COLOUR_EDGE_2   its value at corner 1 and at corner 2, minus its value at corner 0 (3
-# each)
+#     COLOUR_EDGE_1, COLOUR_EDGE_2   value at corner 1 and at corner 2, minus value at corner 0 (3 each)
 COLOUR, COLOUR_EDGE_1, COLOUR_EDGE_2 = 12, 15, 18
 ROW_LENGTH = 21
 
@@ -294,10 +293,11 @@ def any_stopped(blend, words):
 def trace_gather_transmittance(blend, turn, function, width, on, rays, words, spare_on, spare):
     """Compute the RGB factors of the light of sixteen gather rays, which `transmittance` then returns.
 
-    In turn 0, the factor of a ray that stopped at a BLEND surface is the product of lerp(1, c, a) of the
-    surfaces that it passed before. All other rays have the factor 0. In turn 1, rays that stopped at a BLEND
-    surface have the factor 0. The factor of all other rays is the product of T of all BLEND surfaces that
-    they passed.
+    Each factor is a product over the BLEND surfaces that the ray passed before its hit:
+
+        turn    hit on a BLEND surface      other hit, or no hit
+        0       product of lerp(1, c, a)    0
+        1       0                           product of T
 
     blend, width : fields of `PacketBuffers`; turn : 0 or 1; function : `PacketBuffers.occluded`
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`

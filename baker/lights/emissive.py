@@ -4,7 +4,8 @@
 
 The power of a two-sided triangle is twice as large. Textured triangles are cut into parts
 (`emissive_texture`), and each part is an emitter. A part has its exact mean radiance instead of the texture
-if the texture is constant in the part, or too finely structured for the largest number of parts.
+if the texture is constant in the part. The same applies if the texture has too much detail for the largest
+number of parts.
 
 Based on: see `kernels.emitters`.
 """
@@ -46,9 +47,9 @@ _CROWD = 64.0
 # 0.001), the part has uniform radiance. Above the second limit, the part has its mean radiance, because most
 # texture samples would be black and no more parts were available to divide it.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Longest edge of parts, as a share of the scene's diagonal, up to which a part has its mean radiance if it is
-# also at most one texture texel wide. The difference is visible only from small distances, and the mean has
-# no noise.
+# Longest edge of a part, as a share of the scene's diagonal, up to which the part has its mean radiance. It
+# must also be at most one texel of the texture wide. The difference is visible only from small distances, and
+# the mean has no noise.
 _SMALL = 1.0 / 128.0
 
 

@@ -1,7 +1,7 @@
 """Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
 A texel line is a border between two rows or columns of texels. Each texel of a smaller texture contains the
-exact mean of the original texture over its area (RGB) and, in the fourth column, the variance inside this
+exact mean of the original texture over its area (RGB). The fourth column contains the variance inside this
 area. Width and height are halved independently. So a narrow triangle across many repeats loses resolution
 only along its length.
 
@@ -94,8 +94,8 @@ class TextureLevels:
         Returns
         -------
         halved : (n, 2) int64
-            Number of halvings along u and v. One halving more than the axis allows means that the texture is
-            constant along the axis, so the uv of the triangle may be set to 0 there.
+            Number of halvings along u and v. If it is one more than the axis allows, the texture is treated
+            as constant along the axis (`is_constant`).
         crossed : (n,) float64
             Texel lines crossed at that resolution.
         """

@@ -141,8 +141,8 @@ class _EmitterLight:
 
     Attributes
     ----------
-    lookup : TriangleLookup
-    chooser : EmitterChooser
+    lookup : TriangleLookup, finds the emitter of a hit
+    chooser : EmitterChooser, chooses the clusters to which shadow rays are cast
     shading : Shading or None, from `emitters.needed_shading`
     sobol_points : (n_light, 2) uint32
         Sobol points of shadow rays to visible clusters.

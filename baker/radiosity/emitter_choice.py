@@ -49,8 +49,8 @@ _FEW = 32
 # clusters, as a share of the visible clusters' total weight. With more than _FEW clusters, the dimmest hidden
 # clusters are treated in this way.
 _HARMLESS = 0.25
-# Ratio of the weights of two visible clusters above which the choice is made for each block, if the brighter
-# cluster is visible from only a part of the tile.
+# Ratio of the weights of two visible clusters above which clusters are chosen for each block. The condition
+# is that the cluster of larger weight is visible from only a part of the tile.
 _OUTSHINES = 4.0
 # Cosine between the normals of consecutive texels below which a new block begins.
 _TURN = 0.5

@@ -235,7 +235,7 @@ def _starts_of(patches: PatchSet, n_rays: int) -> NDArray[np.int64]:
     """Return (n,) int64: the number of rays that start from each texel entry in `patches.member`.
 
     An entry gets rays in proportion to its area. If the first entries of a patch cover the share c of its
-    area, the rays k with (k + 0.5) / n_rays <= c start from them.
+    area, they get the rays k with (k + 0.5) / n_rays <= c.
     """
     owner = np.repeat(np.arange(patches.n), np.diff(patches.first))
     running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)

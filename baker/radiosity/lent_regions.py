@@ -33,7 +33,7 @@ def lend_regions(
     texels : TexelBuffer
         All entries; only the front texels are read.
     surface : Surface
-        Kernel data of the same entries.
+        The same entries as arrays for kernels.
     region : (n_front,) int32
         Region of each front texel; changed in place where `valid_points` is 0.
     valid_points : (n_front,) uint16

@@ -17,7 +17,8 @@ from baker.radiosity.direct import TILE
 from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.trace_job import TraceJob
 
-# Rays per texel, and the number of rays after which sixteen consecutive texels are classified as outside gaps
+# _RAYS: number of rays per texel.
+# _EARLY_OUT: number of rays per texel after which sixteen consecutive texels are classified as outside gaps,
 # if at most one ray of each texel is blocked.
 _RAYS, _EARLY_OUT = 16, 4
 # _OPEN: share of unblocked rays below which a texel lies in a gap.

@@ -48,8 +48,8 @@ _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
 # Number of the point for the first test of a pair of neighbours. The second test uses all points of both.
 _ONE = np.zeros((1, 1), np.uint8)
-# Share of rays that hit backs of one-sided surfaces above which a side is treated as outside the model, and
-# the weight of its points in that case (otherwise 1).
+# _MANY_BACKS: share of rays that hit backs of one-sided surfaces above which a side is treated as outside the
+# model. _OUTSIDE: weight of the points of such a side; other points have the weight 1.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -64,7 +64,7 @@ class Sides:
     texels : TexelBuffer
         All n entries, with the new regions.
     surface : Surface
-        Kernel data of the same entries.
+        The same entries as arrays for kernels.
     valid_points : (n,) uint16
         Bit k is set where point k of an entry is not inside geometry and lies on the entry's side.
     owner : (S,) int32

@@ -47,7 +47,7 @@ def build_texels(
     TexelBuffer
         Fronts first, then the backs of texels on double-sided surfaces.
     Surface
-        Kernel data of the same entries, from which ray origins are computed.
+        The same entries as arrays for kernels, which compute ray origins from them.
     """
     found = _overlaps(geometry, atlas.resolution, atlas.n_pages)
     n_front = len(found.pixel)
@@ -115,7 +115,7 @@ class _Means(NamedTuple):
 def _surface(
     geometry: Geometry, atlas: Atlas, found: _Overlaps, front: NDArray[np.int32], seed: int
 ) -> Surface:
-    """Return the kernel data of the n entries; `front` (n,) int32 is the front entry of each."""
+    """Return the n entries as arrays for kernels; `front` (n,) int32 is the front entry of each."""
     return Surface(
         position=geometry.position,
         normal=geometry.normal,

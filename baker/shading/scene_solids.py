@@ -1,4 +1,7 @@
-"""Classifies the triangles of a scene: solids, rooms, covers, sheets; and what a first hit on each proves."""
+"""Classifies the triangles of a scene, and determines what a ray's first hit on each says about its origin.
+
+`topology.solids` defines the classes: solids, rooms, covers, and sheets (all other surfaces).
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
-    """Make the faces of solids without holes one-sided, and return what a first hit on each triangle proves.
+    """Make the faces of solids without holes one-sided, and return `hit_kind` of each triangle.
 
     No light arrives inside a solid without holes, so the backs of its faces need no texels.
 
@@ -61,7 +64,7 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
     Geometry
         The geometry with `double_sided` false for these faces.
     hit_kind : (T,) uint8
-        See `kernels.probe`.
+        What a first hit on each triangle says about the ray's origin, see `kernels.probe`.
     """
     solids = scene_solids(scene, geometry, shading)
     hidden = solids.sealed & (solids.inside == BEHIND) & geometry.double_sided

@@ -202,7 +202,7 @@ def light_samples(
 
     origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
     emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
-    buffers : PacketBuffers; begin : number of the first texel, which seeds its random numbers
+    buffers : PacketBuffers; begin : number of the first texel, which seeds the random numbers
     sobol_points : (n, 2) uint32, one row per shadow ray; shared : uint32, see `sampling`
     hemisphere : (2,) float64, numbers of hemisphere rays in the MIS weights of both estimates
     analytic : (m,) uint8, set to 1 for texels for which the closed form is used

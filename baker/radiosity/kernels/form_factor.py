@@ -49,7 +49,7 @@ def cast_form_factors(
 
     origin, normal : (m, R, 3) float32, metres, world, and unit; one point per ray
     lookup : TriangleLookup; seen : SeenPatch, maps hits to patches
-    buffers : PacketBuffers; begin : number of the first patch, which seeds its random numbers
+    buffers : PacketBuffers; begin : number of the first patch, which seeds the random numbers
     sobol_points : (R, 2) uint32, one row per ray; shared : uint32, see `sampling`
     target : (m, R) int32 output, patch that was hit, LOST or SKY
     tally : (P, 2) int32, counts are added, see the column names
@@ -196,8 +196,8 @@ def merge_reciprocal_estimates(
 
         F_ij' = (F_ij + F_ji) A_j / (A_i + A_j)
 
-    The variance of A_i F_ij is proportional to A_i, so the optimal weights are A_j / (A_i + A_j) for the
-    patch's own estimate and A_i / (A_i + A_j) for the reciprocal one.
+    The variance of A_i F_ij is proportional to A_i. Therefore the optimal weight of F_ij is A_j / (A_i +
+    A_j), and the optimal weight of the reciprocal estimate is A_i / (A_i + A_j).
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR, columns of a row ascend
     other_first, other_column, other_value : transpose of F, whose row i contains F_ji

@@ -70,7 +70,7 @@ def gather(
     origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
     lookup : TriangleLookup; seen : SeenLight, light that texels reflect
     emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
-    buffers : PacketBuffers; begin : number of the first texel, which seeds its random numbers
+    buffers : PacketBuffers; begin : number of the first texel, which seeds the random numbers
     sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
     sky : (3,) float32, radiance, cd/m2
     limits : (2,) float64, AO distance in metres, and the number of shadow rays in the MIS weights
@@ -271,7 +271,7 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
 
     origin, normal : (m, 16, 3) float32, metres, world, and unit; points of the texels
     buffers : PacketBuffers, without transmittance
-    begin : number of the first texel, which seeds its random numbers and is its index in `out`
+    begin : number of the first texel, which seeds the random numbers and is the index in `out`
     sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
     distance : float32, length of the rays, metres
     early_out : number of rays after which sixteen texels are finished if at most one ray of each was blocked;

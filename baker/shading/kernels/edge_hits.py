@@ -18,7 +18,7 @@ from baker.trace.jit import inner
 from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
 # Barycentric coordinate up to which a hit lies on an edge. Embree accepts coordinates down to -1.2e-7, so
-# both triangles at an edge are hit only within this distance from it.
+# both triangles at an edge are hit only within 1.2e-7 of it.
 EDGE = 1.0e-6
 # Largest relative difference of the distances of two hits at the same crossing, which rounding causes.
 SAME = np.float32(4.0e-6)
