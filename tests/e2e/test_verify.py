@@ -148,7 +148,7 @@ def test_texels_stand_for_the_surface_of_their_objects(sound):
     owner = instance_map(geometry, 1, 128).reshape(-1)
     pixel = np.flatnonzero(owner >= 0)
     size = np.bincount(owner[pixel], weights=surface_points(geometry, pixel, 128, 4, 0).surface)
-    # The six largest areas are the walls of a room of 2 x 3 x 2 m.
+    # The first six objects are the walls of a room of 2 x 3 x 2 m.
     np.testing.assert_allclose(np.sort(size[:6]), [4, 4, 6, 6, 6, 6], rtol=0.02)
     assert size[6] == pytest.approx(0.48, rel=0.06)
     np.testing.assert_allclose(size[7:], 0.36, rtol=0.06)
