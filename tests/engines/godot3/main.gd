@@ -1,6 +1,6 @@
 extends Node
 # Draws the export in res://godot once for each exposure and writes the pixels to res://result.json.
-# The picture has 8 bits behind an sRGB curve, so a bright and a dark value each need an exposure of their own.
+# The picture has 8 bits after an sRGB curve, so bright and dark values need different exposures.
 
 
 func _ready():
