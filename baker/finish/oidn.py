@@ -210,7 +210,7 @@ def _execute(
 
 
 class _Monitor:
-    """Reports OIDN's progress. `pyoidn` does not wrap that function, so the C library is called directly."""
+    """Reports OIDN's progress through its C library, because `pyoidn` does not wrap the progress function."""
 
     def __init__(self, library: Any, filter_: Any, progress: Progress) -> None:
         self._progress = progress
@@ -226,7 +226,7 @@ class _Monitor:
         )
 
     def _step(self, user: int | None, fraction: float) -> bool:
-        # Exceptions (KeyboardInterrupt included) cannot pass through the C library: store it and stop.
+        # Store any exception, KeyboardInterrupt included, and stop the filter: it cannot pass through C code.
         try:
             if self._caught is None:
                 report(self._progress, Stage.DENOISE, float(fraction))
