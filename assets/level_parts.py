@@ -202,7 +202,7 @@ def leaf_picture(size: int = 32) -> NDArray[np.uint8]:
 
 
 def glass_picture(size: int = 16) -> NDArray[np.uint8]:
-    """Return a texture of stained glass, (size, size, 4) uint8: squares of four colours between opaque lead."""
+    """Return a texture of stained glass, (size, size, 4) uint8: coloured squares between opaque lead."""
     colours = np.array([(230, 60, 40), (50, 90, 220), (240, 200, 60), (60, 180, 90)], np.uint8)
     row, column = np.mgrid[:size, :size]
     picture = np.zeros((size, size, 4), np.uint8)
@@ -214,7 +214,7 @@ def glass_picture(size: int = 16) -> NDArray[np.uint8]:
 
 
 def led_picture(size: int = 64, step: int = 16) -> NDArray[np.uint8]:
-    """Return a black emissive texture, (size, size, 3) uint8, with one white pixel in each step x step pixels."""
+    """Return a black texture, (size, size, 3) uint8, with one white pixel in each step x step pixels."""
     picture = np.zeros((size, size, 3), np.uint8)
     picture[step // 2 :: step, step // 2 :: step] = 255
     return picture

@@ -45,7 +45,7 @@ def ground(low: tuple[float, float], high: tuple[float, float], cells: tuple[int
 
 
 def make_street() -> Level:
-    """A sunlit street with four houses: closed, with a window, closed with a light inside, and with a door."""
+    """A sunlit street with four houses: closed, closed with a light inside, with a window, with a door."""
     level = _outdoors(2000.0, 50_000.0)
     level.put("street", ground((-13, -7), (13, 7), (13, 7)), "concrete")
     house(level, "shut", (-8, -3), (4, 2.6, 4), "plaster")

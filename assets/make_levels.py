@@ -1,4 +1,4 @@
-"""Makes levels as level designers build them, with parts that intersect, to test whether their light is correct.
+"""Makes levels as designers build them, with parts that intersect, to test whether their light is correct.
 
     python assets/make_levels.py            writes the levels whose light is known to assets/levels
     python assets/make_levels.py FOLDER     writes all levels to FOLDER

@@ -110,5 +110,5 @@ def _leave(code: int) -> None:
         try:
             stream.flush()
         except OSError:
-            continue  # the reader is gone
+            continue  # the reader has closed the pipe
     os._exit(code)

@@ -69,7 +69,7 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
             "file": known.file,
             "object": known.object,
         }
-        with contextlib.suppress(OSError):  # standard output may be what failed
+        with contextlib.suppress(OSError):  # a failure to write may be the error that is reported
             out.write(json.dumps({"error": body}) + "\n")
             out.flush()
     return known.exit_code

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class LazyGroup(TyperGroup):
-    """Lists every subcommand with its summary, and imports only the one that runs."""
+    """The group of subcommands. It imports only the module of the subcommand that runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the subcommands in the order of `COMMANDS`."""

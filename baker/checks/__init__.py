@@ -1,1 +1,1 @@
-"""Checks of a scene before it is baked: shared data of the rules, the runner, reports."""
+"""Checks a scene before it is baked: the rules, the data that they share, the runner and the reports."""

@@ -123,7 +123,7 @@ def points_inside(
 def _punctual(
     world: WorldTriangles, light: PunctualLight, origin: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the irradiance of a light without area at (n, 3) points, (n, 3) float64."""
+    """Return the irradiance at n points from one light without area, (n, 3) float64, lx."""
     # `LightKind.fill` takes points in groups of 16.
     shape = (len(origin) // 16, 16)
     ray, weight = np.zeros((*shape, 4), np.float32), np.zeros(shape, np.float32)
@@ -171,7 +171,7 @@ def _emissive(
 def cosine_directions(
     normal: NDArray[np.float64], n: int, random: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return n cosine-weighted directions around each normal, (N n, 3) float64."""
+    """Return n cosine-weighted random directions around each of N normals, (N n, 3) float64, not normalised."""
     direction = random.normal(size=(len(normal) * n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     out: NDArray[np.float64] = direction * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)

@@ -69,7 +69,21 @@ class RawFinding:
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding with the severity and advice of its rule."""
+    """A finding with the code, severity and advice of its rule.
+
+    Attributes
+    ----------
+    code : str
+        Code of the rule.
+    severity : str
+        One of `SEVERITIES`.
+    message : str
+        One sentence that states what was found.
+    fix : str
+        Advice of the rule, one line.
+    found : RawFinding
+        The finding as the rule yielded it.
+    """
 
     code: str
     severity: str

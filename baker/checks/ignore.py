@@ -15,7 +15,13 @@ from baker.core.names import unknown_name
 
 @dataclass(frozen=True)
 class Ignore:
-    """A pattern of accepted findings."""
+    """A pattern of accepted findings.
+
+    Attributes
+    ----------
+    code, object : str
+        Patterns for the code and for the name of the object, with `*` for any letters.
+    """
 
     code: str
     object: str = "*"

@@ -148,7 +148,7 @@ class MeshFacts:
         Corners with equal positions have the same number.
         """
         corner = self.triangle[self.good]
-        # + 0 makes -0 equal to 0.
+        # Add 0 to make -0 equal to 0, because bits are compared.
         return unique_rows([self.position + np.float32(0.0)], len(self.position))[1][corner]
 
     @cached_property

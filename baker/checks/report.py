@@ -11,7 +11,7 @@ from baker.checks.scenes import Unreadable
 
 
 def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable] = ()) -> dict[str, Any]:
-    """Return the object of `--json`, for one scene or several.
+    """Return the JSON object that `baker check --json` prints for all scenes together.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class Check:
 
     @property
     def title(self) -> str:
-        """Return the first line of the docs."""
+        """Return the first line of the rule's docstring, which names the defect."""
         return self.docs.splitlines()[0]
 
 

@@ -48,7 +48,7 @@ class ObjectPairs:
 
 
 def pair_objects(a: Scene, b: Scene) -> ObjectPairs:
-    """Pair the instances of two scenes by the rules at the top of this file."""
+    """Pair the instances of two scenes by the three rules in the docstring of this module."""
     partner = np.full(len(a.instances), -1, np.int64)
     known: dict[tuple[int, int], bool] = {}
 

@@ -58,7 +58,7 @@ _MIN_COLOUR = 0.1
 def relative_error(
     value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> NDArray[np.float64]:
-    """Return |v - r| / max(r, floor) of means over colours.
+    """Return |v - r| / max(r, floor), where v and r are means over colours.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def relative_error(
 
 
 def dark_floor(reference: NDArray[np.float64]) -> float:
-    """Return the level below which a colour mean counts as dark: max(0.1 median, 0.01 mean).
+    """Return the level below which light counts as dark: max(0.1 median, 0.01 mean) of means over colours.
 
     Parameters
     ----------

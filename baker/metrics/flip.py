@@ -36,7 +36,7 @@ def flip_error(
         same = bool((picture <= 0).all())
         return np.full(reference.shape[:2], 0.0 if same else 1.0, np.float32), 0.0 if same else 1.0
     first, second = (
-        # Copy: the library refuses read-only arrays.
+        # Copy the arrays, because the library refuses read-only arrays.
         np.array(np.broadcast_to(np.maximum(image, 0), (*image.shape[:2], 3)), np.float32, order="C")
         for image in (reference, picture)
     )

@@ -49,7 +49,7 @@ def outlier_factor(page: NDArray[np.float64], covered: NDArray[np.bool_]) -> NDA
 
 
 def outlier_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
-    """Return the texels that differ most from all their neighbours.
+    """Return the texels with the largest outlier factor in any component, see `outlier_factor`.
 
     Parameters
     ----------

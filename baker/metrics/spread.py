@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Bound of psi, and E psi(z^2) for normal z.
+# Bound of psi, and the expectation E psi(z^2) for a standard normal z.
 _PSI_BOUND = 4.0
 _EXPECTED = (
     math.erf(math.sqrt(_PSI_BOUND / 2))

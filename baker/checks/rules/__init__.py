@@ -1,1 +1,1 @@
-"""Plugins: the checks, one subject a file, one function a code."""
+"""The rules of `baker check`: one module for each subject, one function for each code."""

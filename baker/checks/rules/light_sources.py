@@ -237,7 +237,7 @@ def _painted(context: CheckContext, material: int) -> float:
 
 
 def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
-    """Return the mean linear colour of an image, (3,) float64."""
+    """Return the mean linear colour of an image, (3,) float64. uint8 images are decoded from sRGB."""
     if image.dtype != np.uint8:
         return np.asarray(image[..., :3].reshape(-1, 3).mean(axis=0), np.float64)
     table = linear_from_srgb(np.arange(256, dtype=np.float64) / 255.0)

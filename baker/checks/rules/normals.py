@@ -143,7 +143,7 @@ def duplicate_vertices(context: CheckContext) -> Iterator[RawFinding]:
                 continue
             further = None if p.further is None else p.further.astype(np.float32)
             columns = [p.position, p.normal, *p.texcoord.values(), p.colour, further]
-            # + 0 makes -0 equal to 0.
+            # Add 0 to make -0 equal to 0, because bits are compared.
             rows = [c + np.float32(0.0) for c in columns if c is not None]
             distinct, number = unique_rows(rows, len(p.position))
             repeats = len(number) - len(distinct)
