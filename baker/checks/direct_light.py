@@ -171,7 +171,7 @@ def _emissive(
 def cosine_directions(
     normal: NDArray[np.float64], n: int, random: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return n cosine-weighted random directions around each of N normals, (N n, 3) float64, not normalised."""
+    """Return n cosine-weighted directions around each of N normals, (N n, 3) float64, not normalised."""
     direction = random.normal(size=(len(normal) * n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     out: NDArray[np.float64] = direction * (1.0 - 1e-6) + np.repeat(normal, n, axis=0)
