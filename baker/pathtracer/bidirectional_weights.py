@@ -51,8 +51,7 @@ N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
     """Evaluate the BSDF at the vertex in column k, for light from direction l reflected in direction e.
 
-    e and l are unit world directions away from the vertex; e is on the side of the eye, l on that of the
-    light.
+    e and l are unit world directions away from the vertex, e towards the eye and l towards the light.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64
     value : (3,) float64, output, f(e, l) |n.l| / |ng.l|, where n is the shading and ng the geometric normal.

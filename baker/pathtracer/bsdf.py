@@ -63,7 +63,7 @@ def ggx_visibility(nl, nv, a):
 def specular_chance(row, lane, nv):
     """Return the probability with which `bsdf_sample` chooses the specular lobe, for n.v = nv.
 
-    row : (5, n) float64, parameters; those of `lane` are one column
+    row : (5, n) float64; column `lane` is the parameters of the BSDF
     """
     if row[WIDTH, lane] < 0.0:
         return 0.0
@@ -82,7 +82,7 @@ def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
 
     The density is per steradian.
 
-    row : (5, n) float64, parameters; those of `lane` are one column
+    row : (5, n) float64; column `lane` is the parameters of the BSDF
     v, l : unit directions away from the surface, in the frame of the shading normal
     """
     return bsdf_cosines(row, lane, vz, lz, vx * lx + vy * ly + vz * lz, out)

@@ -1,8 +1,8 @@
 """Irradiance and ambient occlusion at points of surfaces, in passes, with standard errors.
 
-    E = pi mean(L)        L: radiance of a white Lambertian surface at the point, one sample
-    AO                    share of cosine-weighted rays without a hit
+    E  = pi mean(L)                        AO = share of cosine-weighted rays without a hit
 
+Each sample L estimates the radiance of a white Lambertian surface at the point.
 A pass is a fixed number of samples at every point. The samples of a pass may be stratified, but passes are
 independent. So the standard error of the mean over passes follows from the variance between passes.
 """
@@ -152,8 +152,9 @@ def ambient_occlusion_pass(
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 
-    # If points are dense, use larger tiles, because more neighbours of a point are then in its own tile. The
-    # limits keep at least 32 tiles, so that threads rarely wait for the last tile.
+    # If points are dense, use tiles of up to 4096 points, because more neighbours of a point are then in its
+    # tile. A tile of more than 512 points is at most 1/32 of all points, so that threads rarely wait for the
+    # last tile.
     tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
     run_tiles(
         len(position), tile, work, threads=reference.threads, stage=Stage.AMBIENT_OCCLUSION, progress=progress

@@ -348,7 +348,7 @@ def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
 
 @inner
 def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
-    """Convert barycentrics (b1, b2) of emitter e to those of the scene's triangle of which it is a part.
+    """Convert barycentrics (b1, b2) of emitter e to barycentrics of the scene's triangle that contains it.
 
     emitter : (E, 24) float64, see `emitters`
     """

@@ -91,7 +91,8 @@ def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
     """Write a pair of random numbers in [1, 2) for each lane, to rows U_DIRECTION and W_DIRECTION.
 
-    The bits of `shared` are those of (first, second), the other bits are scrambled with the lane's seeds.
+    The bits in the mask `shared` are equal to the bits of (first, second). The other bits are scrambled with
+    the lane's seeds.
 
     words : block, uint32; first, second : uint32, a bit-reversed Sobol point
     shared : uint32, see `open_rays`
@@ -140,7 +141,8 @@ def extent(s, lanes):  # type: ignore[no-untyped-def]
 def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
     """Write a cosine-weighted ray direction of length `max_distance` to each lane.
 
-    `ALIVE` becomes 0 for directions below the triangle, which `count_lanes` treats as occluded, else 1.
+    `ALIVE` becomes 0 if the direction points below the triangle, which `count_lanes` treats as occluded. It
+    becomes 1 for other directions.
 
     s : block, float32
     """

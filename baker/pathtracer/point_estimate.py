@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+# Default number of samples of a point in a pass.
 SAMPLES_PER_PASS = 16
 
 
@@ -14,8 +15,8 @@ SAMPLES_PER_PASS = 16
 class PointEstimate:
     """Means over passes of C values at n points. Points may have different numbers of passes.
 
-    A pass estimates the mean of `samples` samples at some of the points. Index 0 of the first axis below
-    holds even passes, index 1 odd passes.
+    A pass computes the mean of `samples` samples at each point of a subset. Along the first axis of the
+    arrays, index 0 is for even passes and index 1 for odd passes.
 
     Attributes
     ----------

@@ -91,7 +91,7 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
 
 
 def other_scene(bake: StoredBake, scene: Path, *, allow_outside: bool) -> list[SceneWarning]:
-    """Return a list with a warning if a scene file differs from the file that was baked, else an empty list.
+    """Return a list with one warning if a scene file differs from the baked file; otherwise, an empty list.
 
     `allow_outside` is passed to `load_scene`.
 

@@ -196,8 +196,8 @@ def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> Poin
 def first_layers(run: Run) -> dict[str, NDArray[np.float32]]:
     """Return the layers of first hits: "albedo", "normal" (H, W, 3) and "depth" (H, W, 1), metres.
 
-    Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is that of the first ray, 0 without a
-    hit.
+    Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is the
+    distance of the first ray's hit, 0 without a hit.
     """
     n = run.pixels
     total: dict[str, NDArray[Any]] = {

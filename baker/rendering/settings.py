@@ -10,7 +10,9 @@ from baker.core.names import unknown_name
 from baker.core.settings import BakeSettings, ao_metres
 from baker.core.settings_model import Names, Numbers, Settings, Text, same_setting, setting
 
+# Names of the layers that `aov` can request.
 AOVS = ("albedo", "normal", "depth")
+# Default number of paths per pixel.
 DEFAULT_SPP = 64
 
 

@@ -22,7 +22,9 @@ from baker.io.png import encode_png, grey_levels, srgb_levels
 from baker.io.temporary import atomic_path
 from baker.rendering.render import Picture
 
+# Suffixes of picture files.
 SUFFIXES = (".exr", ".png")
+# Descriptions of the tone mapping in a PNG, of radiance and of ambient occlusion.
 TONE = "L / (L + median luminance), then the sRGB curve"
 PLAIN = "none, 0 to 1 is 0 to 255"
 

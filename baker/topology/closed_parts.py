@@ -294,8 +294,9 @@ def _loops(
 
 
 def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
-    """Return (F,) int8: -1 for faces to reverse so that windings agree across edges of two faces, else 1.
+    """Return (F,) int8: -1 for faces to reverse, 1 for other faces.
 
+    After the reversal, windings agree across all edges that exactly two faces share.
     A graph has two nodes for each face, one for each winding. Its edges connect windings of neighbouring
     faces that agree. Faces of a one-sided surface (a Moebius strip) keep their windings.
     """
@@ -342,7 +343,8 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     joined = np.zeros(len(pieces.area), bool)
     joined[np.unique(np.concatenate([group[a], group[b]]))] = True
     chosen = np.flatnonzero(joined[group[pieces.piece]])
-    # Renumber vertices on boundaries by position, so that those of different objects become equal.
+    # Renumber vertices on boundaries by position, so that coincident vertices of different objects become
+    # equal.
     shared = vertex.copy()
     base = int(vertex.max()) + 1
     renamed = np.arange(base)
@@ -360,7 +362,8 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     turn[chosen[chosen_closes]] = again.turn[chosen_closes]
     name, number = np.unique(piece, return_inverse=True)
     holes = np.concatenate([pieces.holes, again.holes])[name]
-    # A piece that lost some of its faces to a joined piece keeps its former hole area, a lower limit.
+    # If a piece lost faces to a joined piece, its hole area is not updated. The former value is a lower
+    # limit.
     area = np.concatenate([pieces.area, again.area])[name]
     flat = np.concatenate([pieces.flat, again.flat])[name]
     return pieces._replace(

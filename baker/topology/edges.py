@@ -14,7 +14,7 @@ from baker.topology.weld import connected, number_by_first
 class Edges:
     """The E edges of a mesh and their H half edges, which are sorted by edge.
 
-    A half edge is an edge as one side of one face. Its direction is that of the face's winding.
+    A half edge is one of the three sides of a face, directed by the face's winding.
 
     Attributes
     ----------

@@ -14,8 +14,8 @@ other
   part is inside (a crate without a bottom). A point all of whose rays hit the inside of a cover is hidden,
   because another surface closes the opening.
 
-No light is inside a solid and none enters it. So a room that is classified as a solid by mistake would be
-dark anyway.
+No light is inside a solid and none enters it. So the error is small if a room is classified as a solid:
+without light, the room is dark in any case.
 """
 
 from __future__ import annotations
@@ -344,8 +344,8 @@ class _Classifier:
         """Return whether `part` is inside `shell`, which it may touch.
 
         `_WITNESSES` of its triangle centres are tested. At least half of them must be inside, and none
-        outside. With `mostly`, more than half must be inside, and the others may be outside. If the part
-        emits, `mostly` tests only its emitting triangles.
+        outside. With `mostly`, it is sufficient that more than half are inside. If the part emits, `mostly`
+        tests only its emitting triangles.
 
         surface : faces of `shell`
         """

@@ -1,4 +1,4 @@
-"""Finds triangles that must not be baked: with unusable vertices, without area, or duplicates of others."""
+"""Finds triangles that must not be baked: with unusable vertices, without area, or duplicated."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def duplicates(
 
 
 def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the indices, ascending, of triangles whose corner positions hash like those of another one."""
+    """Return the indices, ascending, of triangles that share a hash of their corner positions."""
     with np.errstate(invalid="ignore"):
         bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)

@@ -9,7 +9,7 @@ from baker.topology.unique_rows import unique_rows
 
 
 def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
-    """Return a number for each row, which is the same for equal rows. Numbers follow the first occurrence.
+    """Number the values of rows: equal rows get the same number, in the order of first occurrence.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
 
 
 def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Return a number for each row, which is the same for equal rows. Numbers follow a hash.
+    """Number the values of rows: equal rows get the same number, in the order of a hash.
 
     -0 equals 0, and NaN equals NaN with the same bits.
 
@@ -76,7 +76,7 @@ def connected_vertices(triangle: NDArray[np.integer], n_vertices: int) -> NDArra
     Returns
     -------
     (T,) int32
-        Pieces, numbered by their first triangle.
+        Piece of each triangle. Pieces are numbered in the order of their first triangles.
     """
     a = np.concatenate([triangle[:, 0], triangle[:, 1]])
     b = np.concatenate([triangle[:, 1], triangle[:, 2]])
@@ -107,7 +107,7 @@ def connected_faces(
     Returns
     -------
     (T,) int32
-        Pieces, numbered by their first triangle.
+        Piece of each triangle. Pieces are numbered in the order of their first triangles.
     """
     n = len(triangle)
     if n == 0:

@@ -81,7 +81,7 @@ def _call_embree(typing_context, address, valid, scene, ray):  # type: ignore[no
     """Call rtcIntersectN or rtcOccludedN for a packet.
 
     address, scene : int64, addresses of the function and of the RTCScene
-    valid : (N,) int32, -1 for lanes to trace, else 0; ray : the packet, float32
+    valid : (N,) int32, -1 for lanes to trace, 0 for other lanes; ray : the packet, float32
     """
     signature = types.void(types.int64, valid, types.int64, ray)
 
@@ -321,7 +321,7 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 
 @inner
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
-    """Trace those of sixteen rays whose `lane_valid` is -1, in packets of the native width.
+    """Trace the rays, of sixteen, whose `lane_valid` is -1, in packets of the native width.
 
     function : address of `intersect` or `occluded`; scene, width, query : see `PacketBuffers`
     lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, packet of the sixteen rays and their hits

@@ -21,8 +21,8 @@ class KeptUv:
     Attributes
     ----------
     usable : (I,) bool
-        Whether the TEXCOORD_1 of the instance is a valid lightmap uv by itself. It may overlap that of other
-        instances.
+        Whether the TEXCOORD_1 of the instance is a valid lightmap uv. Overlap with other instances is not
+        tested.
     together : bool
         Whether the TEXCOORD_1 of all instances fit one page without overlap. They are then kept unchanged.
     warnings : tuple of SceneWarning

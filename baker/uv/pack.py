@@ -245,8 +245,8 @@ def fit_page(
 def _estimate(shapes: Shapes, item_shape: NDArray[np.int64], inner: int, gap: int) -> float:
     """Return the density d, texels per metre, at which outlines and gaps fill 85 % of the page.
 
-    Solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2, where the sum is over all items, w and h are their
-    extents, metres, and g is the gap, texels. The area of the item replaces the product w h.
+    d solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2. The sum is over all items. w and h are width and
+    height of an item, metres. g is the gap, texels. The area of the item replaces the product w h.
     """
     area = float(shapes.area[item_shape].sum())
     half = float(shapes.extent[item_shape].sum()) * (1 + gap)

@@ -49,8 +49,8 @@ def planar_charts(
         [np.einsum("tkx,tx->tk", corner, tangent[chart]), np.einsum("tkx,tx->tk", corner, bitangent[chart])],
         axis=2,
     )
-    # Make single charts of faces whose normal deviates more than 75 degrees from that of their chart, and of
-    # all faces of charts that overlap themselves.
+    # Make each face a single chart if its normal deviates more than 75 degrees from the normal of its chart,
+    # or if its chart overlaps itself.
     area = np.linalg.norm(cross, axis=1)
     facing = np.einsum("tx,tx->t", cross, normal[chart])
     alone = (

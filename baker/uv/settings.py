@@ -25,7 +25,7 @@ class UnwrapSettings(Settings):
     threads: int | None = same_setting(BakeSettings, "threads")
 
     def for_bake(self) -> BakeSettings:
-        """Return bake settings with these values, and defaults for the others."""
+        """Return bake settings with these values, and defaults for all other settings."""
         return BakeSettings(**self.model_dump())
 
 

@@ -215,7 +215,7 @@ def _structure(
 def _verify(
     layouts: list[InstanceLayout], n_pages: int, resolution: int, scene: Scene, progress: Progress
 ) -> list[SceneWarning]:
-    """Return warnings about instances that overlap others in a page, or whose uv leave it."""
+    """Return warnings about instances whose uv overlap in a page, or leave the page."""
     found: list[SceneWarning] = []
     for page in range(n_pages):
         report(progress, Stage.UNWRAP, 0.95 + 0.05 * page / n_pages)
@@ -266,7 +266,7 @@ def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
     assert uv is not None
     wide = uv.astype(np.float64)
     used = wide[mesh.triangle].reshape(-1, 2)
-    # Move the uv of unused vertices, which may have any value, into the bounds of the others.
+    # Clamp the uv of unused vertices, which may have any value, to the bounds of the used ones.
     wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
     factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
     return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)

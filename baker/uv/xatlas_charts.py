@@ -74,8 +74,8 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
     Returns
     -------
     FlatCharts
-        Charts, numbered over the whole job. Triangles that xatlas considers degenerate, and those of charts
-        that fold, have chart -1.
+        Charts, numbered over the whole job. Triangles that xatlas considers degenerate, and triangles of
+        charts that fold or lose area, have chart -1.
     """
     part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
     corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]
@@ -193,7 +193,8 @@ def _drop_flat(
     signed = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     total = np.bincount(chart, weights=signed, minlength=n_charts)
     real = np.bincount(chart, weights=area, minlength=n_charts)
-    # Area, per chart, of faces whose signed area is opposite to that of the chart. They overlap a neighbour.
+    # Area, per chart, of faces whose signed area has the opposite sign of the chart's. They overlap a
+    # neighbour.
     back = np.where(signed * np.sign(total)[chart] < 0, np.abs(signed), 0.0)
     fold = np.bincount(chart, weights=back, minlength=n_charts)
     # Area in space, per chart, of faces that have almost no area in the plane.
