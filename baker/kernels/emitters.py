@@ -206,7 +206,8 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
 
     `angle` is a lower bound of the angle between a normal of the cluster and a direction from the cluster to
     the sphere. If it is 90 degrees or more, the weight is 0, because no point of the sphere sees an emitting
-    side. The probability of the other clusters is 0.95 weight / (sum of weights) + 0.05 / (their number).
+    side. The probability of the other clusters is 0.95 weight / (sum of weights) + 0.05 / (number of other
+    clusters).
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
     chance, cumulative : (C,) float32 output, see `TileEmitters`

@@ -37,7 +37,7 @@ def inside_hits(
 
     origin, normal : (m, w, 3) float32, metres, world, and unit; each point casts `rays_per_point`
         cosine-weighted rays
-    lookup : TriangleLookup; hit_kind : (T,) uint8, see above
+    lookup : TriangleLookup; hit_kind : (T,) uint8, see `BLACK_BACK`
     buffers : PacketBuffers
     begin : number of the first texel, which seeds the random numbers and is the row of `hits`
     sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`

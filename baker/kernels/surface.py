@@ -33,7 +33,7 @@ N_POINTS = 16
 # each, and faces that are meant to be coplanar may be a few spacings apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Distance by which points near the border of their triangle move towards its centroid, as a multiple of the
-# offset. They move at most half way.
+# offset. It is limited to half of the distance to the centroid.
 INWARD = 2.0
 # Barycentric coordinate below which a point is near the border.
 BORDER = 0.01

@@ -30,7 +30,8 @@ _THIN = 1.0e-9
 # Largest side of a triangle's uv bounding box, texels, up to which the spread of a bilinear texture is
 # estimated from sixteen points.
 _FEW_CELLS = 3.0
-# Share of the sum of the magnitudes of its terms below which an integral is rounding error: it is set to 0.
+# integral / (sum of the magnitudes of its terms) below which an integral is treated as rounding error and set
+# to 0.
 _ROUNDING = 1.0e-12
 # Spread of a triangle whose mean is positive although the texture is black at all sixteen points.
 _UNSEEN = 15.0

@@ -150,7 +150,8 @@ class RayRows(NamedTuple):
     tally : (m, 2) int32, number of rays that hit no patch, columns `ESCAPED` and `ABSORBED`
     passed : (k, 3) float32, RGB transmittance summed over the rays of `hits`; None if no surface colours
         light
-    sky_passed : (m, 3) float32, RGB transmittance summed over the rays that escaped; None likewise
+    sky_passed : (m, 3) float32, RGB transmittance summed over the rays that escaped; None if no surface
+        colours light
     """
 
     column: NDArray[np.int32]

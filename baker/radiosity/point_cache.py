@@ -37,7 +37,8 @@ def points_of(
     chosen : (m,) int64
         Texel entries.
     wanted : (m, w) or (1, w) uint8
-        Numbers 0 to 15 of the points of each chosen entry, or of all of them; all 16 by default.
+        Numbers 0 to 15 of the wanted points of each chosen entry. A single row is used for all entries. By
+        default, all 16 points are returned.
 
     Returns
     -------

@@ -1,13 +1,13 @@
 """Splits texels that another surface passes through, and groups texels into regions.
 
 Examples are a floor that continues under a wall, a ceiling above walls, and a beam through a wall. A texel
-there has points on both sides of the wall. A single value per texel would mix the light of both sides and
-show it on both.
+there has points on both sides of the other surface. A single value per texel would mix the light of both
+sides and show it on both.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
 called a side, becomes a texel entry (a row of `TexelBuffer`). The side with most points gets the texel's
 original entry, a front or back; fronts are stored in the page. The other sides get new entries after all
-backs. They take part in light transport but are stored in no page.
+backs. The new entries take part in light transport but are stored in no page.
 
 Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
 are its regions. Later filters do not mix values of different regions. Texels of a block that are not

@@ -50,7 +50,7 @@ def light_warnings(
     Returns
     -------
     list of SceneWarning
-        At most one of each kind.
+        `solve-not-converged` and `albedo`, each if it applies.
     """
     return [*solve_warnings(solution), *trapped_light(matrix, albedo, area, bounces)]
 

@@ -220,8 +220,8 @@ def light_samples(
     any_alpha = False
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
-    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque. The
-    # early-out tests find the other triangles with alpha, which are occluders.
+    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque.
+    # Occluders with alpha are found by the early-out tests.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)

@@ -141,7 +141,7 @@ def gather(
             trace_gather_transmittance(
                 buffers.blend, turn, buffers.occluded, width, on, rays, words, spare_on, spare
             )
-            # Count the rays that leave the scene, and those without a hit within the AO distance.
+            # Count the rays that leave the scene, and the rays without a hit within the AO distance.
             for lane in range(PACKET_WIDTH):
                 none = words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT
                 missed[lane] += _f(1.0) if none else _f(0.0)

@@ -255,7 +255,7 @@ def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, 
     surface : Surface; chosen : (m,) int64, texel entries
     origin, normal : (m, 16, 3) float32, metres, world, and unit; height : (m, 16) float32, metres
     valid_points : (m,) uint16, see `group_points`; side : (m,) float32, metres
-    buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for such texels
+    buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for these texels
     Returns the number of rays cast.
     """
     position, shading, face = surface.position, surface.normal, surface.face_normal

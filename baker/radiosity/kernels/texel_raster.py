@@ -80,7 +80,8 @@ def keep_main_chart(first, entry, area, chart, texel_chart, kept):
     chart : (T,) int32, chart of each triangle
     texel_chart : (n,) int32 output, chart of each texel
     kept : (m,) bool output, set for the items of `entry` in that chart
-    Triangles without area in the texel are marked only if the chart has no others there, and then only one.
+    If no triangle of the chart has area in the texel, one triangle is marked. Otherwise triangles without
+    area in the texel are not marked.
     """
     for i in range(len(first) - 1):
         best = -1.0
