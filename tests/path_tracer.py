@@ -15,6 +15,7 @@ from embreex.rtcore_scene import EmbreeScene
 
 from baker.core.scene import Scene
 
+# Offset of ray origins along the normal, metres.
 LIFT = 1e-4
 
 
