@@ -21,7 +21,7 @@ SMALL_HOLES = 0.005
 # slits without width, at which one edge meets two shorter edges.
 NO_HOLES = 1e-6
 # Volume of a part divided by its area and by its largest distance from the centre, below which the part
-# encloses no space. The offset of ray origins has this relative size, too.
+# encloses no space. Offsets of ray origins are about as large, relative to the size of a surface.
 THINNEST = 1e-5
 # Largest distance of a boundary loop from its plane, divided by the square root of its area, up to which the
 # loop is flat. A part without a lid has a single boundary loop, which is flat.
@@ -216,10 +216,11 @@ def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
 def _single(
     vertex: NDArray[np.int64], first: NDArray[np.int64], same_winding: NDArray[np.int8]
 ) -> NDArray[np.int64]:
-    """Return the indices of the faces that form pieces: the first of each set of faces with the same corners.
+    """Return the indices of the faces that form pieces.
 
-    If two boxes of one object touch, their common wall occurs with both windings. It lies inside the union of
-    the boxes and is left out. If all faces of a piece occur with both windings, none of them is left out.
+    Of the faces with the same corners, only the first is used. If two boxes of one object touch, their common
+    wall occurs with both windings. It lies inside the union of the boxes and is left out. If all faces of a
+    piece occur with both windings, they are not left out.
 
     vertex : (F, 3) int64; first : (F,) int64, same_winding : (F,) int8, see `_twins`
     """
@@ -372,7 +373,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
 
 
 def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
-    """Return a number (N,) for each point (N, 3), which is equal for points close together.
+    """Number points (N, 3) by position: points close together get the same number. Return (N,).
 
     Two points get different numbers if, along any axis, the sorted coordinates of all points have a gap wider
     than `step` between them.

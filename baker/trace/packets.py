@@ -321,7 +321,7 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 
 @inner
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
-    """Trace the rays, of sixteen, whose `lane_valid` is -1, in packets of the native width.
+    """Trace up to sixteen rays, those with `lane_valid` -1, in packets of the native width.
 
     function : address of `intersect` or `occluded`; scene, width, query : see `PacketBuffers`
     lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, packet of the sixteen rays and their hits

@@ -48,7 +48,7 @@ class MeshCharts:
 
     @property
     def n_charts(self) -> int:
-        """Count the charts."""
+        """Return the number of charts."""
         return int(self.chart.max()) + 1 if len(self.chart) else 0
 
 
