@@ -19,7 +19,7 @@ from baker.io.bake.output_folder import MANIFEST_NAME
 # Number of entries of the scene's folder that are searched for `bake.json`.
 # Size above which a manifest is not read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages whose time is proportional to the number of texels, of triangles, and of rays.
+# Stages whose time is proportional to the number of texels, to that of triangles, and to that of rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (
@@ -76,6 +76,7 @@ def rates_of(folder: Path) -> Rates:
     Returns
     -------
     Rates
+        The rates of that bake.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The good triangles of all instances in world space, and rays that are traced against them."""
+"""The triangles of all instances in world space, and rays that are traced against them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TILE = 1 << 16
 
 
 class WorldTriangles:
-    """The T good faces of all instances in world space, sorted by instance.
+    """The good faces (see `MeshFacts`) of all instances as T triangles in world space, sorted by instance.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class WorldTriangles:
         self.material: NDArray[np.int32] = np.concatenate(material or [none.astype(np.int32)])
         sided = np.array([m.double_sided for m in materials], bool)
         self.double_sided: NDArray[np.bool_] = sided[self.material]
-        # Divide safely, because an instance with a scale of zero has faces without area.
+        # Compute areas and normals. Areas may be 0, because a node may have a scale of zero.
         a, b, c = (self.position[self.triangle[:, k]].astype(np.float64) for k in range(3))
         cross = np.cross(b - a, c - a)
         length = np.sqrt(np.einsum("tx,tx->t", cross, cross))
@@ -115,7 +115,7 @@ class WorldTriangles:
         return np.asarray(point + step[:, None] * normal)
 
     def middle_of(self, triangle: int) -> tuple[float, float, float]:
-        """Return the centroid of the triangle with this index, metres, world."""
+        """Return the centroid of triangle number `triangle`, metres, world."""
         middle = self.position[self.triangle[triangle]].mean(axis=0) + self.origin
         x, y, z = (float(v) for v in middle)
         return x, y, z

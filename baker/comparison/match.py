@@ -1,9 +1,10 @@
 """Finds the points on the surface of bake b that match given points on the surface of bake a.
 
-If the two objects of a pair have the same mesh, the matching point has the same triangle and the same
-barycentric weights. A bake then differs from itself by exactly 0, and an object that was moved is compared
-with itself. If the meshes differ, the nearest point of b is searched along the normal. It must be within a
-small distance in world space, on a face with a similar normal.
+`baker.comparison.pairs` pairs the objects of both bakes. If the two objects of a pair have the same mesh, the
+matching point has the same triangle and the same barycentric weights. A bake then differs from itself by
+exactly 0, and an object that was moved is compared with itself. If the meshes differ, the nearest point of b
+is searched along the normal. It must be within a small distance in world space, on a face with a similar
+normal.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class Sides:
-    """The surfaces of bakes a and b, and the pairs of their objects.
+    """The surfaces of bakes a and b, and the pairs of their objects; I is the number of instances of a bake.
 
     Attributes
     ----------

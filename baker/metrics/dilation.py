@@ -25,7 +25,7 @@ def misfilled_share(
     maps : (P, H, W, C) float32
         Pages of a channel.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
     dilated : (P, H, W) bool
         Texels filled by dilation.
 

@@ -11,10 +11,10 @@ colours. Means and medians are over all points, unless stated otherwise:
     z                (v_c - r_c) / standard error of r_c
     colour error     |v_c - r_c| / max(r_c, 0.1 r, floor)
     energy ratio     R = sum w v / sum w r            w: surface area, m2, that a point represents
-    standard error of R   sqrt(sum w^2 (v - R r)^2) / sum w r
+    std. error of R  sqrt(sum w^2 (v - R r)^2) / sum w r
 
-`median`, `p95`, `p99` and `max` are statistics of the relative error. Its floor keeps dark points from
-dominating them.
+`median`, `p95`, `p99` and `max` are statistics of the relative error. Without the floor in the denominator,
+dark points would dominate them.
 
 `colour_median` and `colour_p95` are the median and the 95th percentile of the colour error. They are computed
 for each colour, and the largest is returned. A mean over colours would not detect that red and blue are
@@ -22,12 +22,12 @@ swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the colour where this r
 denominator is at least a tenth of mean(r).
 
 `noise_floor` and `noise_p95` are the median and the 95th percentile of the relative error that the noise of
-the reference causes. This noise is estimated as half the difference of two independent halves of the
-reference, which has the same variance as the error of their mean.
+the reference causes. The reference is the mean of two independent halves. Its noise is estimated as half the
+difference of the halves, which has the same variance.
 
-`energy_ratio` is the ratio R of the light of the maps to the light of the reference. It detects gain or loss
-of energy, as a furnace test does. `bias` does not weight points by area, and small objects have more points
-than their area would give. `energy_ratio_se` is the standard error of R as a ratio estimator. It includes the
+`energy_ratio` is the ratio R of the total light of the bake to that of the reference. It detects gain or loss
+of energy, as a furnace test does. The points are weighted by area, unlike in `bias`, because small objects
+have more points per area. `energy_ratio_se` is the standard error of R as a ratio estimator. It includes the
 noise of the reference and the random choice of points, because both change v - R r.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,

@@ -29,9 +29,9 @@ The noise of colour shifts is small, because the colours of a path are correlate
 If the rms noise of a group's reference exceeds `_UNRELIABLE` of its mean light, the lower bound of its own
 error is set to 0. Light of rare paths is then missing at most points and too strong at a few.
 
-If the reference of a group is below three of its standard errors, differences are relative to at least a
-thousandth of the scene's bright light. The standard error then includes one missed path with the bright
-light.
+The bright light of a scene is the 95th percentile of its reference values. If the reference of a group is
+below three of its standard errors, differences are relative to at least a thousandth of the bright light. The
+standard error then includes one missed path that carries the bright light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.
@@ -134,12 +134,12 @@ class GroupMetrics:
 
     @property
     def sure_bias(self) -> float:
-        """Return the bias, reduced by its uncertainty; 0 if it is not significant."""
+        """Return the bias, with its absolute value reduced by `z_needed` standard errors, not below 0."""
         return float(self._sure(np.array(self.bias), np.array(self.bias_se)))
 
     @property
     def sure_colour(self) -> float:
-        """Return the largest colour shift, reduced by its uncertainty; with its sign."""
+        """Return the largest colour shift, with its absolute value reduced like that of the bias."""
         sure = self._sure(self.colour, self.colour_se)
         return float(sure[np.argmax(np.abs(sure))])
 
@@ -182,7 +182,7 @@ def z_needed(n: float) -> float:
 
 
 def bright_light(reference: NDArray[np.float64]) -> float:
-    """Return the bright light of a scene: the 95th percentile of its colour means.
+    """Return the bright light of a scene: the 95th percentile over points of the mean over colours.
 
     Parameters
     ----------

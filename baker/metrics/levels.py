@@ -12,8 +12,9 @@ _MIN_LEVELS, _TEXELS_PER_LEVEL = 16, 8
 # Levels count as evenly spaced if the median of |log(d2 / d1)| is below this, where d1 and d2 are successive
 # differences of sorted levels. For random values the median is about 1.1.
 _EVEN = 0.2
-# Largest relative spacing of half floats. Quantised levels are spaced more coarsely by at least this factor.
+# Quantised levels are spaced more coarsely than half floats by at least this factor.
 _COARSE = 4.0
+# Largest relative spacing of half floats.
 _HALF_SPACING = 2.0**-10
 # Smallest number of texels at exactly the largest value that indicates clamping.
 _MIN_CLAMPED = 8
@@ -29,7 +30,7 @@ def few_levels(maps: NDArray[np.float32], covered: NDArray[np.bool_]) -> bool:
     maps : (P, H, W, C) float32
         Pages of a channel.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
 
     Returns
     -------
@@ -65,7 +66,7 @@ def cut_off(
     maps : (P, H, W, C) float32
         Pages of a channel.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
     compared : ComparedPoints
         Reference values of n compared texels.
     pixel : (n,) int64

@@ -34,9 +34,11 @@ class Limit:
     Attributes
     ----------
     channel, metric : str
+        Names of the channel and of the metric.
     operator : str
         ">", ">=", "<" or "<=".
     number : float
+        The number with which the metric is compared.
     """
 
     channel: str

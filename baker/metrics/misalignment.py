@@ -46,7 +46,8 @@ def best_shift(
     page : (P, H, W) float64
         Colour means of the map.
     covered : (P, H, W) bool
-        Texels with a measured value. Only texels whose four neighbours are covered are used.
+        Texels whose values were computed, not filled by dilation. Only texels whose four neighbours are
+        covered are used.
     pixel : (n,) int64
         (page * H + row) * W + column of the compared texels.
     truth : (n,) float64
@@ -89,7 +90,7 @@ def is_blurred(
     page : (P, H, W) float64
         Colour means of the map.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
     pixel : (n,) int64
         (page * H + row) * W + column of the compared texels.
     truth : (n,) float64

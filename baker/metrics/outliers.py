@@ -32,7 +32,8 @@ def outlier_factor(page: NDArray[np.float64], covered: NDArray[np.bool_]) -> NDA
     page : (H, W) float64
         Values, not below 0.
     covered : (H, W) bool
-        Texels with a measured value. Only texels with eight covered neighbours are compared.
+        Texels whose values were computed, not filled by dilation. Only texels with eight covered neighbours
+        are compared.
 
     Returns
     -------
@@ -56,7 +57,7 @@ def outlier_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count:
     maps : (P, H, W, C) float32
         Pages of a channel.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
     count : int
         Largest number of texels to return.
 
@@ -88,7 +89,7 @@ def steep_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: i
     maps : (P, H, W, C) float32
         Pages of a channel.
     covered : (P, H, W) bool
-        Texels with a measured value.
+        Texels whose values were computed, not filled by dilation.
     count : int
         Largest number of texels to return.
 

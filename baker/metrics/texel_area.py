@@ -126,8 +126,8 @@ def lift(
     """Return the vectors (n, k, 3) from points to the curved surface that the shading normals describe.
 
     A vector is the sum over the triangle's corners of the vector from the point to the corner's tangent
-    plane, weighted by barycentric coordinates. Planes that the point is above are left out, and so are
-    corners at hard edges.
+    plane, weighted by barycentric coordinates. A corner does not contribute if the point is above its tangent
+    plane, or if the corner lies at a hard edge.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def lift(
     weight : (n, k, 3) float64
         Barycentric coordinates.
     position : (n, k, 3) float64, metres, world, relative to the geometry's origin
-        The points on the facets.
+        The points on the flat triangles.
     face : (n, k, 3) float64, unit
         Normals of the triangles.
 

@@ -1,8 +1,8 @@
 """Finds the faces that can be removed without a visible change: degenerate faces and exact duplicates.
 
-A duplicate face is removed only if no renderer can distinguish it from the first face: both have the same
-corners with the same attributes, and the material does not blend. Faces at the same positions with different
-attributes are kept, because it depends on the renderer which of them is visible.
+A duplicate face is removed only if no renderer can distinguish it from an earlier face. Both then have the
+same corners with the same attributes, and the material does not blend. Faces at the same positions with
+different attributes are kept, because it depends on the renderer which of them is visible.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _exact_duplicates(primitive: EditablePrimitive, triangle: NDArray[np.int64])
         given = normal[np.take_along_axis(triangle, order, axis=1)]
         if primitive.double_sided:
             given = np.where(turned[:, None, None], -given, given)
-        signature.append(given + np.float32(0.0))  # + 0 turns -0 into 0
+        signature.append(given + np.float32(0.0))  # + 0 makes -0 equal to 0
     if not primitive.double_sided or "TANGENT" in primitive.column:
         signature.append(turned.reshape(-1, 1))
     repeated: NDArray[np.bool_] = np.asarray(first_equal(signature, len(triangle)) != row)

@@ -207,10 +207,9 @@ def _rows_of_one_primitive(
 def _patch_normals(
     edit: PrimitiveEdit, patched: NDArray[np.bool_], front: NDArray[np.float64]
 ) -> PrimitiveEdit:
-    """Replace vertex normals of patch faces that deviate from the face normal by too much.
+    """Replace vertex normals of patch faces by the face normal, if the angle between them is too large.
 
-    `patched` (T,) marks the patch faces, and `front` (T, 3) are the area vectors of all faces. A replaced
-    normal is the face normal.
+    `patched` (T,) marks the patch faces, and `front` (T, 3) are the area vectors of all faces.
     """
     given = edit.primitive.arrays.normal
     if given is None or not patched.any():
