@@ -38,7 +38,8 @@ def alpha_material(
 def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
     """Return a builder and a black floor of 2 x 2 m under square cards at rising heights.
 
-    cards : functions that add a material to the builder and return its index"""
+    cards : functions that add a material to the builder and return its index
+    """
     builder = SceneBuilder(96)
     floor = builder.quad(
         (-half, 0, -half), (0, 0, 2 * half), (2 * half, 0, 0), builder.material(0.0), (texels, texels)

@@ -35,7 +35,8 @@ def panels(size=48):
 
     The red panel has one lit texel, the green one 5 x 5 mirrored repeats of one lit texel, and the blue one
     a grid
-    of lit texels."""
+    of lit texels.
+    """
     builder = SceneBuilder(size)
     floor = builder.quad((-1.5, 0, -1.5), (0, 0, 3), (3, 0, 0), builder.material(0.0), (16, 16))
     leds = lit(*((r, c) for r in range(3, 64, 6) for c in range(2, 64, 5)))
@@ -69,7 +70,7 @@ def spots():
 
 
 def irradiance(points, panel):
-    """Return E of one panel at floor points (..., 3); spots count as points, being small against 1 m."""
+    """Return E of one panel at floor points (..., 3), treating spots as points, since they are small."""
     place, share = spots()[panel]
     middle = np.array(PANELS[panel]) + (place - 0.5) * SIDE
     away = points[..., None, [0, 2]] - middle
@@ -99,7 +100,7 @@ def test_the_reference_finds_a_lit_texel():
             truth = irradiance(points, panel)
             error = mean[..., panel].std(axis=1) / math.sqrt(32)
             assert (np.abs(mean[..., panel].mean(axis=1) - truth) < critical(27) * error + 1e-3 * truth).all()
-            # A copy with a path that hit a spot by chance would be some hundred times the truth.
+            # If a path hit a spot by chance, its copy would be about a hundred times the truth.
             assert mean[..., panel].max() < 2.0 * truth.max()
 
 

@@ -79,7 +79,7 @@ def test_inside_a_sphere_every_pair_depends_on_the_target_only():
     texels = world.texels
     triangle = texels.entry[texels.first[:-1]]
     group = np.zeros(patches.n, int)
-    # `icosphere` stores the children of icosahedron face k at indices k modulo 20.
+    # `icosphere` stores the children of icosahedron face k at indices i with i mod 20 = k.
     group[patches.patch] = triangle % 20
     area = np.bincount(group, patches.area)
     found = between(group, patches, matrix)

@@ -102,7 +102,8 @@ def test_sky_over_a_floor_beside_a_wall_is_half_hidden():
 
 def test_sky_light_bounces_once_from_a_wall():
     """Half of a floor texel's hemisphere is sky, the other half a huge white wall. The floor is so small that
-    the wall has E = pi, as without a floor."""
+    the wall has E = pi, as without a floor.
+    """
     builder = SceneBuilder(64)
     builder.quad((0, -2000, -2000), (0, 4000, 0), (0, 0, 4000), builder.material(0.6), (8, 8))
     speck = builder.quad((1e-3, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))

@@ -15,7 +15,8 @@ UNDER = [(c, r) for c in (4, 12, 20, 28) for r in (4, 12, 20, 28)]
 def _floor_with_plates():
     """Return a builder and its floor: 2 m wide, with plates 1 mm above it; all surfaces are black.
 
-    A canopy 1 m above the floor covers x > 0.5 and is closed at x = 20."""
+    A canopy 1 m above the floor covers x > 0.5 and is closed at x = 20.
+    """
     builder = SceneBuilder(160)
     black = builder.material(0.0, double_sided=True)
     builder.quad((SLOT, 1, -50), (20 - SLOT, 0, 0), (0, 0, 100), black, (4, 4))
