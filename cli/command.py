@@ -14,6 +14,7 @@ from typer.core import TyperCommand
 from baker.cli.commands import COMMANDS
 from baker.cli.fields import flag_of, help_of, is_repeated, is_switch, metavar_of
 from baker.cli.flags import FlagStream
+from baker.core.errors import SettingsError
 from baker.core.settings_model import Settings
 from baker.core.stage import Stage
 
@@ -160,6 +161,16 @@ class _SettingsCommand(TyperCommand):
         app.command()(holder)
         self.params += typer.main.get_command(app).params
         self.flag_names = [name for name, _, _ in flags]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; an empty one for a path is refused, since `Path("")` is the current folder."""
+        paths = {flag for p in self.params if "Path" in str(p.type_descriptor.annotation) for flag in p.opts}
+        for before, word in zip(["", *args], args, strict=False):
+            flag = before if not word else word.removesuffix("=")
+            if (not word and (before in paths or not before.startswith("-"))) or (word != flag in paths):
+                name = f"{flag} is" if flag in paths else "an argument is"
+                raise SettingsError(f"{name} empty; name a file or a folder ('.' is the current folder)")
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Combine settings from all sources, and call the function of the subcommand."""

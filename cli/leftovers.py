@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 from baker.io.bake.recovery import recover
@@ -21,7 +22,7 @@ def survey(out: str) -> bytes:
     bytes
         One line for `restore`: the path, and its parent folders that do not exist yet.
     """
-    target = Path(out).resolve()
+    target = Path(os.path.realpath(out))
     missing = [str(parent) for parent in target.parents if not parent.exists()]
     note = {"out": str(target), "missing": missing}
     return json.dumps(note).encode() + b"\n"

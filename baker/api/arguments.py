@@ -43,10 +43,12 @@ def path_of(value: Any, name: str, what: str = "a path") -> Path:
     Raises
     ------
     SettingsError
-        If the value is neither a str nor a Path.
+        If the value is neither a str nor a Path, or is empty.
     """
     if not isinstance(value, str | os.PathLike):
         raise wrong_type(name, what, value)
+    if not os.fspath(value):
+        raise SettingsError("is empty; name a file or a folder, or '.'", object=name)
     return Path(value)
 
 

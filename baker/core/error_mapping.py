@@ -6,7 +6,7 @@ import contextlib
 import errno
 from collections.abc import Iterator
 
-from baker.core.errors import BakerError, Cancelled, ResourceError
+from baker.core.errors import BakerError, Cancelled, InputError, ResourceError
 
 _OUT_OF_MEMORY = (
     "out of memory; try a smaller `resolution`, a lower `density`, fewer `samples` or fewer `threads`"
@@ -42,6 +42,9 @@ def explain(error: BaseException) -> BakerError | None:
         return Cancelled("interrupted")
     if isinstance(error, MemoryError):
         return ResourceError(_OUT_OF_MEMORY)
+    if isinstance(error, RuntimeError) and str(error).startswith("Symlink loop"):
+        # From Path.resolve of Python 3.11 and 3.12.
+        return InputError("the links in this path form a loop", file=str(error).partition("'")[2].rstrip("'"))
     if isinstance(error, OSError):
         reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))
         return ResourceError(reason, file=None if error.filename is None else str(error.filename))

@@ -16,6 +16,7 @@ from baker.core.scene import Scene
 from baker.io.bake.output_folder import MANIFEST_NAME, file_state
 from baker.io.bake.read_manifest import read_manifest
 from baker.io.bake.recovery import recover
+from baker.io.output_path import not_text
 from baker.io.png import decode_palette_png
 
 
@@ -51,6 +52,8 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
     if path.suffix.lower() == ".png" and (found := _status(path)) is not None:
         return found
     encoding = encoding_of(path.name)
+    if encoding is not None and (why := not_text(path)):
+        raise InputError(f"{why}; rename it", file=str(path))
     if encoding is not None:
         return _image(path, encoding.decode(path))
     from baker.io.load import load_scene

@@ -114,7 +114,7 @@ def temporaries(out: Path) -> list[Temporary]:
     list of Temporary
         Sorted by name; empty if the parent folder cannot be listed.
     """
-    target = out.resolve()
+    target = Path(os.path.realpath(out))
     found = []
     for home, prefix in ((target.parent, f".{target.name}"), (target, "")):
         with contextlib.suppress(OSError), os.scandir(home) as entries:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.errors import ResourceError, SettingsError
 from baker.encodings.exr import encode_layers
+from baker.io.output_path import resolved_output
 from baker.io.png import encode_png, grey_levels, srgb_levels
 from baker.io.temporary import atomic_path
 from baker.rendering.render import Picture
@@ -53,7 +54,7 @@ def check_image(path: Path, aov: Collection[str] = ()) -> None:
         raise SettingsError("this is a folder; name an image file", file=str(path))
     if aov and path.suffix.lower() != ".exr":
         raise SettingsError("only an EXR takes the layers of `aov`; name an .exr file", file=str(path))
-    parent = next(p for p in path.resolve().parents if p.exists())
+    parent = next(p for p in resolved_output(path).parents if p.exists())
     if not parent.is_dir():
         raise SettingsError(f"'{parent}' is a file; the picture cannot lie in it", file=str(path))
     if not os.access(parent, os.W_OK):

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from baker.core.errors import ResourceError, SettingsError
+from baker.io.output_path import resolved_output
 from baker.io.temporary import write_atomically
 
 
@@ -40,7 +41,7 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
             )
         if not force:
             raise SettingsError("the file exists; name another one, or add `force=True`", file=str(out))
-    parent = next(p for p in out.resolve().parents if p.exists())
+    parent = next(p for p in resolved_output(out).parents if p.exists())
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
         raise ResourceError("nothing can be written there; name another place", file=str(out))
 

@@ -192,6 +192,10 @@ WRONG = [
     (("a.glb", "-o", "x", "--ao-distance", "-1"), "--ao-distance"),
     (("a.glb", "-o", "x", "--channels", ","), "channels"),
     (("a.glb", "b.glb", "-o", "x"), "b.glb"),
+    (("a.glb", "-o", ""), "-o is empty"),
+    (("a.glb", "--out=", "-q"), "--out is empty"),
+    (("", "-o", "x"), "an argument is empty"),
+    (("a.glb", "-o", "x", "--config", ""), "--config is empty"),
 ]
 
 

@@ -25,7 +25,7 @@ class OutputLock:
     """
 
     def __init__(self, out: Path) -> None:
-        folder = out.resolve()
+        folder = Path(os.path.realpath(out))
         self.out = out
         self.path = folder.parent / f".{folder.name}.baker.lock"
         self._made: list[Path] = []

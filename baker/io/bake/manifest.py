@@ -175,10 +175,12 @@ def _relative(path: Path | None, out: Path) -> str | None:
     if path is None:
         return None
     try:
-        return Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
+        relative = Path(os.path.relpath(path.resolve(), out.resolve())).as_posix()
     except ValueError:
         # On Windows there is no relative path from one drive to another.
-        return path.resolve().as_posix()
+        relative = path.resolve().as_posix()
+    # A name that is not text has no other form in JSON.
+    return relative.encode("utf-8", "backslashreplace").decode()
 
 
 def _instances(result: BakeResult, instance_mesh: tuple[int, ...]) -> list[dict[str, Any]]:

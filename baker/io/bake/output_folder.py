@@ -20,6 +20,7 @@ from baker.core.errors import ResourceError, SettingsError
 from baker.io.bake.mounts import cannot_move
 from baker.io.bake.recovery import MANIFEST_NAME, NEW, exchange_files, lies_inside, recover, undo
 from baker.io.exchange import exchange_paths
+from baker.io.output_path import resolved_output
 from baker.io.temporary import TemporaryFolder
 
 __all__ = ["MANIFEST_NAME", "OutputFolder", "check_out", "file_state", "is_file", "own_files"]
@@ -42,12 +43,12 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     Raises
     ------
     SettingsError
-        If `out` is a file, if it contains files that baker did not write and `force` is False, or if the bake
-        would replace the input.
+        If `out` is a file or no possible name of a folder, if it contains files that baker did not write and
+        `force` is False, or if the bake would replace the input.
     ResourceError
         If the folder cannot be read or written to.
     """
-    folder = _resolved(out)
+    folder = resolved_output(out)
     if not folder.name:
         raise SettingsError("this is the root of the file system; name a folder in it", file=str(out))
     if folder.exists() and not folder.is_dir():
@@ -143,7 +144,7 @@ class OutputFolder:
     """
 
     def __init__(self, out: Path) -> None:
-        self.out = out.resolve()
+        self.out = Path(os.path.realpath(out))
         self._in_place = self.out.is_dir() and cannot_move(self.out)
         self._home = TemporaryFolder(self.out, inside=self._in_place)
         self._made: list[Path] = []
@@ -216,14 +217,6 @@ class OutputFolder:
             if exchange_paths(self.path, self.out):
                 return
         exchange_files(self._home.path, self.out, own, new)
-
-
-def _resolved(out: Path) -> Path:
-    try:
-        return out.resolve()
-    except (OSError, RuntimeError) as error:
-        why = "its links form a loop" if isinstance(error, RuntimeError) else error.strerror
-        raise SettingsError(f"this is no path of a folder ({why}); name another one", file=str(out)) from None
 
 
 def _check_writable(folder: Path, parent: Path, out: Path) -> None:

@@ -14,6 +14,7 @@ from baker.core.errors import InputError
 from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 from baker.io.bake.recovery import recover
+from baker.io.output_path import not_text
 
 # Size above which a manifest is not read, bytes.
 _LONGEST = 1 << 30
@@ -43,6 +44,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         If there is no such folder, it holds no bake, or the manifest is damaged.
     """
     recover(folder)
+    if why := not_text(folder):
+        raise InputError(f"{why}; rename it", file=str(folder))
     if not folder.exists():
         raise InputError("there is no such folder; name the output folder of a bake", file=str(folder))
     if folder.is_file():

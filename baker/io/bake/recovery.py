@@ -114,9 +114,9 @@ def recover(out: Path) -> None:
         The output folder or file, which need not exist.
     """
     try:
-        target = out.resolve()
-    except (OSError, RuntimeError, ValueError):
-        return  # the links form a loop, or `out` is no valid path
+        target = Path(os.path.realpath(out))
+    except ValueError:
+        return  # no path at all: it contains a zero byte
     found = temporaries(target)
     for temporary in found:
         with claim(temporary) as free:
