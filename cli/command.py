@@ -164,7 +164,12 @@ class _SettingsCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; an empty one for a path is refused, since `Path("")` is the current folder."""
-        paths = {flag for p in self.params if "Path" in str(p.type_descriptor.annotation) for flag in p.opts}
+        paths = {
+            flag
+            for p in cast("list[Any]", self.params)
+            if "Path" in str(p.type_descriptor.annotation)
+            for flag in p.opts
+        }
         for before, word in zip(["", *args], args, strict=False):
             flag = before if not word else word.removesuffix("=")
             if (not word and (before in paths or not before.startswith("-"))) or (word != flag in paths):
